@@ -45,10 +45,29 @@ _IDLE = "no capture holds what an equation needs: record a torque map"
 
 
 def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Comparison:
-    """Fits a model's parameters to all captures and gives its errors, capture by capture.
+    """Fits the parameters of a model to all captures and gives its errors, capture by capture.
 
-    An error marked `held_out` is of a capture predicted from all the others; `fit` marks a
-    capture that alone carries a constant.
+    Parameters
+    ----------
+    campaign
+        Captures of the motor.
+    model
+        The model.
+    start
+        Constants that are known; they give pole pairs and sizes.
+
+    Returns
+    -------
+    Comparison
+        An error marked `held_out` is of a capture predicted from all the others; `fit` marks a
+        capture that alone carries a constant. Without errors, and with a note, where no capture can
+        be used.
+
+    Raises
+    ------
+    UsageError
+        There is no such model or effect.
+
     """
     machine = machine_of(campaign, start, policy_of(model.policy))
     if machine is None:

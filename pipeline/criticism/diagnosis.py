@@ -71,7 +71,25 @@ _GUESS = "takes some of what is left, but too little to be named beside what not
 def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:
     """Which physical effects a model of one motor lacks, from its captures alone.
 
-    Reads recorded signals, tests and nameplate numbers; `start` gives pole pairs and sizes.
+    Parameters
+    ----------
+    campaign
+        Captures of the motor: recorded signals, tests and nameplate numbers are read.
+    model
+        The model.
+    start
+        Constants that are known; they give pole pairs and sizes.
+
+    Returns
+    -------
+    Diagnosis
+        Verdict `insufficient` where the captures cannot fit the base model.
+
+    Raises
+    ------
+    UsageError
+        There is no such model or effect, or an effect of the user's fails.
+
     """
     base = base_fit(campaign, model, start)
     if isinstance(base, str):
@@ -80,7 +98,23 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
 
 
 def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> BaseFit | str:
-    """The model fitted to a motor's captures, or why it cannot be."""
+    """The requested model fitted to the captures of a motor.
+
+    Parameters
+    ----------
+    campaign
+        Captures of the motor.
+    model
+        The model.
+    start
+        Constants that are known.
+
+    Returns
+    -------
+    BaseFit or str
+        The reason where it cannot be fitted.
+
+    """
     machine = machine_of(campaign, start, policy_of(model.policy))
     if machine is None:
         return PAIRLESS
@@ -89,7 +123,23 @@ def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> BaseFit 
 
 
 def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagnosis, BaseFit]:
-    """The diagnosis from a model fitted, and the fit that its first step stands on."""
+    """The diagnosis that follows from a fitted model.
+
+    Parameters
+    ----------
+    campaign
+        Captures of the motor.
+    model
+        The model.
+    base
+        Its fit.
+
+    Returns
+    -------
+    tuple of Diagnosis and BaseFit
+        The fit is the one that the first reported step stands on.
+
+    """
     library, machine = effects(model.effects_path), base.system.fit.machine
     name = f"{file_stem(campaign.motor_id)}_unknown"
     end = search_ladder(campaign, model, machine, base, library, name)

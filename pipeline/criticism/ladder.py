@@ -20,7 +20,16 @@ from pipeline.records.diagnosis import LadderRung, ReportedParameter, RungError
 
 
 def step_record(step: LadderStep, held: HeldOut) -> LadderRung:
-    """One step for people: held-out errors and maps; angle maps are those of the fit."""
+    """One step of the search as a record for people.
+
+    Parameters
+    ----------
+    step
+        The step.
+    held
+        Its held-out residual; maps over an angle are those of the fit.
+
+    """
     residual = held.or_fit(step.system)
     policy = step.fit.policy.validation
     errors = window_errors(step.system, residual)
@@ -40,7 +49,21 @@ def step_record(step: LadderStep, held: HeldOut) -> LadderRung:
 
 
 def parameters_of(step: LadderStep, held: HeldOut) -> dict[str, ReportedParameter]:
-    """Value, standard uncertainty and unit of every effect's parameters on a step."""
+    """The parameters of every effect on a step.
+
+    Parameters
+    ----------
+    step
+        The step.
+    held
+        Its held-out residual.
+
+    Returns
+    -------
+    dict of ReportedParameter
+        By full name; without a value where not determined.
+
+    """
     reported = reported_parameters(step.system, held)
     own = step.fit.model.parameters()
     found = ((name, reported[name]) for name in own)

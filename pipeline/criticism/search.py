@@ -1,7 +1,8 @@
-"""The ladder of one campaign: by what its equations look at, and by what its instruments do.
+"""The search of one campaign, with orders that no equation observes and with instruments that
+drift.
 
-An order that no equation looks at, or an instrument that drifts, is left over whatever is added;
-so the ladder is searched once more where either is found, and the end that is reported is the last.
+An order that no equation observes, or an instrument that drifts, is left over whatever effect is
+added. So the search is done once more where either is found, and the last result is reported.
 """
 
 from __future__ import annotations
@@ -45,9 +46,22 @@ _WITHIN = (
 
 @dataclass(frozen=True, slots=True)
 class Ladder:
-    """The steps as far as they are trusted and where they began, their held-out errors, what is
-    `left` at their end, and every effect that would take some of that and was `cut`: with a note
-    where captures speak against it, with none where it would be a guess.
+    """The steps of a search as far as they are supported.
+
+    Attributes
+    ----------
+    base
+        Where the search began.
+    steps
+        The steps.
+    held
+        Their held-out errors.
+    left
+        What is over the floor at their end.
+    cut
+        Every effect that would remove some of that and was dropped, with a note where captures
+        contradict it, an empty one where it would be unsupported.
+
     """
 
     base: BaseFit
@@ -57,7 +71,14 @@ class Ladder:
     cut: dict[str, str]
 
     def explains(self, left: Sequence[Remainder]) -> bool:
-        """Whether its names explain what the captures show, but for what is `left`."""
+        """Whether its effects explain what the captures show.
+
+        Parameters
+        ----------
+        left
+            What is over the floor and may have another cause.
+
+        """
         return explained(self.steps, self.held, left)
 
     def large(self) -> tuple[Remainder, ...]:
@@ -74,8 +95,21 @@ class Ladder:
 
 @dataclass(frozen=True, slots=True)
 class SearchResult:
-    """The last ladder, what it leaves that is reported, the sketch of that or the constant that
-    changed, and notes on all.
+    """The result of the last search.
+
+    Attributes
+    ----------
+    ladder
+        Its steps.
+    left
+        What is over the floor and is reported.
+    sketch
+        The unknown structure in that; None without one.
+    change
+        The constant that changed between captures; None without one.
+    notes
+        Remarks, one sentence each.
+
     """
 
     ladder: Ladder
@@ -93,10 +127,29 @@ def search_ladder(
     library: Mapping[str, Effect],
     name: str,
 ) -> SearchResult:
-    """Searches the ladder, once more with instruments that drift where no state of the machine
-    predicts what is left, and sketches what nothing explains as an effect of some `name`.
+    """Searches a campaign, and describes what no effect explains.
 
-    `base` is the fit of the model to the campaign's segments.
+    Parameters
+    ----------
+    campaign
+        Captures of the motor.
+    model
+        The requested model.
+    machine
+        Size of the motor.
+    base
+        The fit of the requested model.
+    library
+        Effects that may be added.
+    name
+        Name of the effect that describes the unknown structure.
+
+    Returns
+    -------
+    SearchResult
+        Of the last search: with the orders that were found, and with instruments that drift where
+        no state of the machine predicts what is left.
+
     """
 
     def search_again(*orders: float) -> Ladder:
@@ -170,7 +223,16 @@ def _with_drift(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder | None:
 
 
 def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
-    """The ladder from a model fitted, as far as it is trusted."""
+    """The search from a fitted model, without unsupported steps.
+
+    Parameters
+    ----------
+    start
+        The fitted model.
+    library
+        Effects that may be added.
+
+    """
     searched = search(start.system.fit, library)
     alone = [leave_out(step.system) for step in searched]
     steps, unconfirmed = _confirmed(searched, alone)

@@ -42,7 +42,17 @@ _SEED = 20260303
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A further experiment: what it adds to the normal matrix of [d, others...]."""
+    """A further experiment: what it adds to the normal matrix of [d, others...].
+
+    Attributes
+    ----------
+    further experiment.
+    words
+        What it is.
+    normal
+        What it adds to the normal matrix of the effect and the other columns.
+
+    """
 
     words: str
     normal: Array
@@ -54,11 +64,25 @@ def separations(
     offered: Sequence[Candidate],
     remedies: Mapping[str, str],
 ) -> tuple[Separation, ...]:
-    """What would part an effect of the model from each alternative in `remedies`, the best first.
+    """Experiments that would separate an effect from its alternatives, the best first.
 
-    Power is that of a test at the 1 % level, from the captures at hand and the experiment
-    together. If no experiment that can be predicted helps, the one in `remedies`, which the effects
-    themselves declare, is reported without a power.
+    Parameters
+    ----------
+    effect
+        The effect.
+    wide
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+    remedies
+        What the effects declare to separate them, by alternative.
+
+    Returns
+    -------
+    tuple of Separation
+        With the power of a test at the 1 % level, from the captures and the experiment together.
+        Where no experiment that can be predicted helps, the one of `remedies` without a power.
+
     """
     policy = wide.policy.design
     separations_found: list[Separation] = []

@@ -37,15 +37,31 @@ _NOISE = {
 
 
 def planned_words(test: str, policy: Design) -> str:
-    """What one of `PLANNED` is, for people."""
+    """What one of the planned tests is, in words.
+
+    Parameters
+    ----------
+    test
+        A key of `PLANNED`.
+    policy
+        Its speeds.
+
+    """
     speeds = (f"{100.0 * speed:g} %" for speed in policy.map_speeds if speed > 0.0)
     return PLANNED[test].format(" and ".join(speeds))
 
 
 def planned(test: str, fit: Fit) -> tuple[Segment, ...]:
-    """The segments [n each] of one of `PLANNED`, without noise, at 25 °C.
+    """The segments that a planned test would give, without noise, at 25 °C.
 
-    Sensors are as noisy as in the captures at hand, or as usual where they were not used there.
+    Parameters
+    ----------
+    test
+        A key of `PLANNED`.
+    fit
+        The model that records it. Sensors are as noisy as in its captures, or as usual where they
+        were not used there.
+
     """
     noise = _noise(fit)
     makers = {"torque_map": _torque_map, "spin_down": _spin_down, "cogging": _cogging}

@@ -19,8 +19,21 @@ _EDGE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """What a curve may depend on. `columns` are the capture columns that hold it, `code` reads it
-    from an `Operating` x, `top` is its range [unit]; `kind` is `signed`, `size`, `warm` or `turn`.
+    """What a curve may depend on.
+
+    Attributes
+    ----------
+    name, unit
+        Glossary name, and unit.
+    columns
+        Columns of a capture that hold it.
+    kind
+        `signed`, `size`, `warm` or `turn`.
+    top
+        Its range [unit].
+    code, read
+        How it is read from an `Operating` x, as Python and as a function.
+
     """
 
     name: str
@@ -36,8 +49,19 @@ class Variable:
 class Basis:
     """Curves c(v) = Σ c_k mix_k(v) + Σ waves.
 
-    `mix` [N, K] holds the curves at `nodes` [N]; they are linear between nodes and constant beyond
-    them. Each of `orders` adds a sine and a cosine.
+    Attributes
+    ----------
+    names
+        One a coefficient.
+    nodes
+        Places between which the curves are linear; constant beyond them [N].
+    mix
+        The curves at the nodes [N, K].
+    orders
+        Each adds a sine and a cosine.
+    period
+        Of the variable; None where it has none.
+
     """
 
     names: tuple[str, ...]
@@ -47,7 +71,21 @@ class Basis:
     period: float | None
 
     def curve(self, at: Any, weights: Array) -> Any:
-        """The curve of `weights` [len(names)] at `at` [n]; analytic where there are only waves."""
+        """The curve with given coefficients.
+
+        Parameters
+        ----------
+        at
+            Values of the variable [n]; complex where there are only waves.
+        weights
+            One a name.
+
+        Returns
+        -------
+        array [n]
+            Analytic where there are only waves.
+
+        """
         count = self.mix.shape[1]
         total = 0.0 * at
         if np.any(weights[:count]):
@@ -64,7 +102,19 @@ class Basis:
 
 
 def variables(machine: Machine) -> Mapping[str, Variable]:
-    """Every variable, by name, with its range on one machine."""
+    """Every variable that a curve may depend on, with its range on one machine.
+
+    Parameters
+    ----------
+    machine
+        Scales of current and speed.
+
+    Returns
+    -------
+    mapping of Variable
+        By glossary name.
+
+    """
     current, speed = machine.scales["current_a"], machine.scales["speed_rad_s"]
     listed = (
         _speed(speed),
@@ -107,6 +157,25 @@ def coarse(variable: Variable, machine: Machine, policy: Discovery) -> Basis:
     """A few smooth curves, enough to see whether and how something depends on the variable.
 
     A signed variable has a spline for each sign, since friction jumps at zero.
+
+    Parameters
+    ----------
+    variable
+        The variable.
+    machine
+        Orders that its waves may have.
+    policy
+        Number of knots.
+
+    Attributes
+    ----------
+    few smooth curves, enough to see whether and how something depends on a variable.
+
+    Returns
+    -------
+    Basis
+        A signed variable has a spline for each sign, since friction jumps at zero.
+
     """
     if variable.kind == "turn":
         return waves(_orders(variable, machine, policy))
@@ -124,7 +193,18 @@ def coarse(variable: Variable, machine: Machine, policy: Discovery) -> Basis:
 
 
 def fine(variable: Variable, machine: Machine, policy: Discovery) -> Basis:
-    """Hats narrow enough for any curve that the sketch may try, and the waves they miss."""
+    """Hats narrow enough for any curve of the dictionary, and the waves that they miss.
+
+    Parameters
+    ----------
+    variable
+        The variable.
+    machine
+        Orders that its waves may have.
+    policy
+        Number of hats.
+
+    """
     nodes = _nodes(variable, policy)
     periodic = variable.kind == "turn"
     high: tuple[float, ...] = ()
@@ -135,7 +215,14 @@ def fine(variable: Variable, machine: Machine, policy: Discovery) -> Basis:
 
 
 def waves(orders: tuple[float, ...]) -> Basis:
-    """Sine and cosine of each order."""
+    """Sine and cosine of some orders.
+
+    Parameters
+    ----------
+    orders
+        Waves a turn.
+
+    """
     return Basis(_wave_names(orders), np.empty(0), np.empty((0, 0)), orders, TURN_RAD)
 
 

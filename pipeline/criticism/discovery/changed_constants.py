@@ -29,6 +29,21 @@ from pipeline.physics.notation import number_text
 class Change:
     """A constant with one value in most captures, and another in `captures`, as a difference with
     its standard uncertainty [unit]; `gain` is the deviance that it takes, its penalty paid.
+
+    Attributes
+    ----------
+    constant with one value in most captures and another in some.
+    name, unit
+        Full name of the parameter, and its unit.
+    value
+        In most captures.
+    difference, u
+        In `captures` less `value`, with its standard uncertainty.
+    captures
+        Captures with the other value.
+    gain
+        Fall of the deviance beyond its penalty.
+
     """
 
     name: str

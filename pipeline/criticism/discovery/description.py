@@ -37,10 +37,23 @@ def describe(
     signals: Sequence[str],
     name: str,
 ) -> UnknownStructure:
-    """The structure of a port with its expression, curve and effect file.
+    """An unknown structure as curve, expression and effect file.
 
-    `smooth` is the port with the few smooth curves that its evidence rests on, `others` are the
-    variables of ports that explain nearly as much and their share of its evidence.
+    Parameters
+    ----------
+    pursuit
+        The residual input in narrow hats.
+    found
+        The expression.
+    smooth
+        The same input with the few smooth curves that its evidence rests on.
+    others
+        Variables of inputs that explain nearly as much, and their share of the evidence.
+    signals
+        Recorded signals that miss, the worst first.
+    name
+        Name of the effect.
+
     """
     port = pursuit.port
     carrier = _leading(pursuit, found)
@@ -127,7 +140,19 @@ def _curve(
 
 
 def turn_angles(orders: Sequence[float]) -> Array:
-    """Angles of a turn [n, rad] at which a curve of these orders is reported."""
+    """Angles of a turn at which a curve is reported.
+
+    Parameters
+    ----------
+    orders
+        Waves a turn of the curve.
+
+    Returns
+    -------
+    array [n]
+        In rad, `_A_WAVE` points a wave at least.
+
+    """
     points = max(_TURN_POINTS, _A_WAVE * math.ceil(max(orders, default=1.0)))
     angles: Array = 2 * np.pi * np.arange(points) / points
     return angles

@@ -23,7 +23,23 @@ _ABOVE_DEGC = 25.0
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A curve of a = |u|, by name; `code` computes it from `{a}`, `scaled` if its scale matters."""
+    """A curve of a = |u|, by name; `code` computes it from `{a}`, `scaled` if its scale matters.
+
+    Attributes
+    ----------
+    curve of a = |u|.
+    name
+        Its name.
+    even, odd
+        Formula in u, for each parity.
+    code
+        Python with `{a}` for |u|.
+    scaled
+        Whether its scale matters.
+    value
+        The curve [n] of |u| [n].
+
+    """
 
     name: str
     even: str
@@ -71,11 +87,24 @@ SHAPES = (
 class Term:
     """One term of an expression, of unit amplitude, on one carrier.
 
-    `kind` is the name of a shape, `sin` or `cos` (of `order`), `bump` (in a turn, at `centre`, of
-    width `scale`), `hump` or `resonance` (exp(-u²) or 1/(1 + u²) around a `centre` that is not
-    zero, of width `scale`), or `power` (`monomial` numbers the port's). A shape is `even`,
-    `odd` (times the sign of u), or `plain` (of u itself, no size). `carrier` numbers the port's
-    carriers.
+    Attributes
+    ----------
+    kind
+        Name of a shape; `sin` or `cos`; `bump` in a turn; `hump` or `resonance`, which are exp(−u²)
+        and 1/(1 + u²) around a centre that is not zero; or `power`.
+    carrier
+        Number of the carrier.
+    parity
+        `even`, `odd` (times the sign of u), or `plain` (of u itself).
+    scale
+        Of the variable, or width of a bump.
+    order
+        Waves a turn.
+    centre
+        Of a bump, hump or resonance.
+    monomial
+        Number of the monomial, for `power`.
+
     """
 
     kind: str
@@ -104,7 +133,19 @@ class Term:
         return ("scale",) if self.shape.scaled else ()
 
     def value(self, v: Array) -> Array:
-        """The term [n] at values of its variable [n]."""
+        """The term at values of its variable.
+
+        Parameters
+        ----------
+        v
+            Values [n].
+
+        Returns
+        -------
+        array [n]
+            Of unit amplitude [1].
+
+        """
         if self.kind in WAVES:
             wave: Array = getattr(np, self.kind)(self.order * v)
             return wave
@@ -120,7 +161,14 @@ class Term:
         return np.sign(v) * half if self.parity == "odd" else half
 
     def words(self, variable: Variable) -> str:
-        """The term in a formula, its scale with unit."""
+        """The term as a formula, its scale with unit.
+
+        Parameters
+        ----------
+        variable
+            The variable that it is of.
+
+        """
         name = variable.name
         if self.kind in WAVES:
             return (
@@ -143,7 +191,16 @@ class Term:
         return text if "u" not in text else f"{text}, u = {over}/({self.scale:.4g} {variable.unit})"
 
     def code(self, scale: str, centre: str) -> str:
-        """The term in Python, of `v`; `scale` and `centre` are how those are read."""
+        """The term as Python, of `v`.
+
+        Parameters
+        ----------
+        scale
+            How its scale is read.
+        centre
+            How its centre is read.
+
+        """
         if self.kind in WAVES:
             return f"np.{self.kind}({self.order} * v)"
         if self.kind == "bump":

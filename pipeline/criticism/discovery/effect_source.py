@@ -38,9 +38,28 @@ from pipeline.criticism.effect import {imports}
 def effect_source(
     port: Port, found: Expression, name: str, shape: str, current_a: float, policy: Discovery
 ) -> str:
-    """Source of `NAME.py` with one `EFFECT`, which `compare` can use as it stands.
+    """Source of an effect file that `compare` can use as it stands.
 
-    Amplitudes start at zero and scales at what was found, as in every effect.
+    Parameters
+    ----------
+    port
+        Where the structure acts.
+    found
+        Its expression.
+    name
+        Name of the effect.
+    shape
+        The dependence in words.
+    current_a
+        Current that monomials are relative to.
+    policy
+        Bounds of the parameters.
+
+    Returns
+    -------
+    str
+        One `EFFECT`; amplitudes start at zero and scales at what was found, as in every effect.
+
     """
     lines = [*_body(port, found, current_a), "", "", *_effect(port, found, name, shape, policy)]
     kinds = {"torque": "Array", "drop": "Complex", "flux": "Any"}[port.hook]

@@ -39,6 +39,21 @@ class Expression:
 
     `covariance` is in the order of `directions`: (term, "amplitude" or a field of the term).
     `gain`: fall of −2 log likelihood. `left` [R]: the residual with everything refitted.
+
+    Attributes
+    ----------
+    sum of terms.
+    terms, amplitudes
+        Terms, and their amplitudes [unit of the input].
+    directions
+        (term, `amplitude` or a field of the term) of each row of the covariance.
+    covariance
+        Of amplitudes and scales, in that order.
+    gain
+        Fall of −2 log likelihood.
+    left
+        Residual with everything refitted [R].
+
     """
 
     terms: tuple[Term, ...]
@@ -49,7 +64,21 @@ class Expression:
     left: Array
 
     def value(self, v: Array, carrier: int = 0) -> Array:
-        """The expression [n] on one carrier."""
+        """The expression on one carrier.
+
+        Parameters
+        ----------
+        v
+            Values of its variable [n].
+        carrier
+            Number of the carrier.
+
+        Returns
+        -------
+        array [n]
+            In the unit of the input.
+
+        """
         total = np.zeros(np.shape(v))
         for term, amplitude in zip(self.terms, self.amplitudes, strict=True):
             if term.carrier == carrier:
@@ -57,7 +86,21 @@ class Expression:
         return total
 
     def spread(self, v: Array, carrier: int = 0) -> Array:
-        """Standard uncertainty [n] of the expression on one carrier."""
+        """Standard uncertainty of the expression on one carrier.
+
+        Parameters
+        ----------
+        v
+            Values of its variable [n].
+        carrier
+            Number of the carrier.
+
+        Returns
+        -------
+        array [n]
+            In the unit of the input.
+
+        """
         rows = [
             _direction(self.terms[n], self.amplitudes[n], name, v)
             if self.terms[n].carrier == carrier
@@ -72,7 +115,16 @@ class Expression:
         return found
 
     def u(self, term: int, name: str) -> float:
-        """Standard uncertainty of a term's amplitude or scale."""
+        """Standard uncertainty of an amplitude or scale of a term.
+
+        Parameters
+        ----------
+        term
+            Number of the term.
+        name
+            `amplitude` or a field of the term.
+
+        """
         place = self.directions.index((term, name))
         return math.sqrt(max(float(self.covariance[place, place]), 0.0))
 
@@ -86,10 +138,19 @@ def _direction(term: Term, amplitude: float, name: str, v: Array) -> Array:
 
 
 class Pursuit:
-    """One port's weak columns in hats, over the noise, with the model's own refitted.
+    """The weak columns of one residual input in hats, with the model's own parameters refitted.
 
-    `around`: a system whose first `own` columns are the model's and whose others are the port's;
-    `weight` [R] the weights of rows under the port's best fit.
+    Parameters
+    ----------
+    system
+        Its first `own` columns are the model's, the others those of the input.
+    own
+        Number of the model's columns.
+    port
+        The residual input.
+    weight
+        Weights of the rows [R] under the best fit of the input.
+
     """
 
     def __init__(self, system: LinearSystem, own: int, port: Port, weight: Array) -> None:
@@ -110,7 +171,23 @@ class Pursuit:
         self.moment = -(hats.T @ (weight * system.residual) - cross.T @ inverse @ slope)
 
     def hats_of(self, term: Term) -> Array:
-        """A term as coefficients [K] of the port's hats and waves."""
+        """A term as coefficients [K] of the port's hats and waves.
+
+        Parameters
+        ----------
+        term
+            The term.
+
+        Attributes
+        ----------
+        term as coefficients of the hats and waves of the input.
+
+        Returns
+        -------
+        array [K]
+            One a column of the input.
+
+        """
         basis = self.port.basis
         found = np.zeros(self.system.matrix.shape[1] - self.own)
         if basis is None or term.kind == POWER:
@@ -126,7 +203,16 @@ class Pursuit:
         return found
 
     def linear_gain(self, known: Array, new: Array) -> float:
-        """Fall of the weighted squares by curves `new` [K, m] beside `known` [K, k]."""
+        """Fall of the weighted sum of squares by further curves.
+
+        Parameters
+        ----------
+        known
+            Curves that are there [K, k].
+        new
+            Further curves [K, m].
+
+        """
         both = np.column_stack([known, new])
         return self._fall(both) - (self._fall(known) if known.shape[1] else 0.0)
 
@@ -134,7 +220,19 @@ class Pursuit:
         return float(self.moment @ curves @ self.amplitudes(curves))
 
     def amplitudes(self, curves: Array) -> Array:
-        """Best amplitudes [k] of some curves [K, k]."""
+        """Best amplitudes of some curves.
+
+        Parameters
+        ----------
+        curves
+            [K, k].
+
+        Returns
+        -------
+        array [k]
+            In the unit of the input.
+
+        """
         normal = curves.T @ self.gram @ curves
         found: Array = np.linalg.lstsq(
             normal + _RIDGE * np.diag(np.diag(normal)), curves.T @ self.moment, rcond=1e-10
@@ -142,12 +240,36 @@ class Pursuit:
         return found
 
     def curves(self, terms: Sequence[Term]) -> Array:
-        """Coefficients [K, k] of terms."""
+        """Terms as coefficients of the hats and waves of the input.
+
+        Parameters
+        ----------
+        terms
+            k terms.
+
+        Returns
+        -------
+        array [K, k]
+            One column a term.
+
+        """
         width = self.system.matrix.shape[1] - self.own
         return np.column_stack([np.empty((width, 0)), *(self.hats_of(t) for t in terms)])
 
     def fit(self, curves: Array) -> tuple[Array, Array, Array, float]:
-        """Own step, amplitudes, residual [R] and deviance with curves [K, k] beside own columns."""
+        """Fits curves together with the model's own parameters.
+
+        Parameters
+        ----------
+        curves
+            [K, k].
+
+        Returns
+        -------
+        tuple
+            Own step, amplitudes [k], residual [R] and deviance.
+
+        """
         system, own = self.system, self.own
         matrix = np.column_stack([system.matrix[:, :own], system.matrix[:, own:] @ curves])
         prior_precision = np.concatenate([system.prior_precision[:own], np.zeros(curves.shape[1])])
@@ -174,7 +296,20 @@ class Pursuit:
 
 
 def expression(pursuit: Pursuit) -> Expression:
-    """The expression at which the Bayesian information criterion [2] stops; four steps at most."""
+    """The expression at which the Bayesian information criterion stops.
+
+    Parameters
+    ----------
+    pursuit
+        The residual input.
+
+    Returns
+    -------
+    Expression
+        Of `policy.discovery.most_groups` groups at most; without terms where none is worth its
+        parameters.
+
+    """
     policy = pursuit.policy
     chosen: list[Group] = []
     none = pursuit.curves([])

@@ -28,8 +28,17 @@ _SCALES = {
 
 @dataclass(frozen=True, slots=True)
 class Carrier:
-    """What multiplies a curve. `columns` are the capture columns it adds to the curve's own;
-    `words` and `code` say it in a sentence and in Python, `value` computes it.
+    """What multiplies a curve.
+
+    Attributes
+    ----------
+    columns
+        Columns of a capture that it adds to those of the curve.
+    words, code
+        It in a sentence, and in Python.
+    value
+        Computes it from the state.
+
     """
 
     columns: tuple[str, ...]
@@ -40,10 +49,23 @@ class Carrier:
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """One generic effect: the hook it enters, its variable, basis and carriers.
+    """One residual input: a generic effect without a formula.
 
-    `signals` are the recorded signals that the carriers act on, one each; a torque's is the
-    shaft's. `monomials` [K] are the powers of d and q current of a co-energy, in place of a curve.
+    Attributes
+    ----------
+    effect
+        The effect whose parameters are the coefficients.
+    hook
+        Where it acts: `torque`, `drop` or `flux`.
+    variable, basis
+        What its curve is of, and the curves; None for a polynomial of the currents.
+    carriers
+        What the curve is multiplied by.
+    signals
+        Recorded signal that each carrier acts on; for a torque the shaft's.
+    monomials
+        Powers of d and q current of a co-energy, in place of a curve [K].
+
     """
 
     effect: Effect
@@ -71,13 +93,44 @@ class Port:
 def ports(
     machine: Machine, policy: Discovery, hooks: Iterable[str] = ("torque", "drop", "flux")
 ) -> tuple[Port, ...]:
-    """Every port of some hooks for one machine."""
+    """Every residual input of one machine.
+
+    Parameters
+    ----------
+    machine
+        Ranges and orders of the variables.
+    policy
+        Number of knots.
+    hooks
+        Where they act.
+
+    """
     makers = {"torque": _torque_ports, "drop": _drop_ports, "flux": _flux_ports}
     return tuple(port for hook in hooks for port in makers[hook](machine, policy))
 
 
 def refined(port: Port, machine: Machine, policy: Discovery) -> Port:
-    """The same port with narrow hats instead of a few smooth curves, where it has a curve."""
+    """The same port with narrow hats instead of a few smooth curves, where it has a curve.
+
+    Parameters
+    ----------
+    port
+        The input.
+    machine
+        Ranges and orders of the variables.
+    policy
+        Number of hats.
+
+    Attributes
+    ----------
+    residual input with narrow hats in place of a few smooth curves.
+
+    Returns
+    -------
+    Port
+        The same where it has no curve to refine.
+
+    """
     if port.variable is None or (port.hook == "flux" and port.variable.kind == "turn"):
         return port
     return _port(

@@ -30,6 +30,23 @@ class Found:
 
     `left` [R] is the residual after it, `step` [k] the model's constants and its coefficients,
     `place` where it stands in the list of ports.
+
+    Attributes
+    ----------
+    residual input that helps.
+    port
+        The input.
+    gain
+        Fall of the deviance less its penalty.
+    held
+        The same, held out.
+    left
+        Residual after it [R].
+    step
+        The model's constants and its coefficients [k].
+    place
+        Its place in the list of inputs.
+
     """
 
     port: Port
@@ -46,16 +63,32 @@ def unknown_structure(
     name: str = "unknown",
     in_parts: bool = False,
 ) -> tuple[UnknownStructure | None, float]:
-    """What the structure left in `signals`, the worst first, depends on, as curve, expression and
-    effect file.
+    """What the structure that no effect explains depends on, as curve, expression and effect file.
 
-    Ports are compared by the deviance they remove from whole captures that they were not fitted to.
-    Of those that do as well, the one of fewest variables is reported, and the others are named
-    beside it. The result is None if the best takes less than a tenth of what is over the floor:
-    instruments that drift follow no state of the machine. Also returns the deviance (−2 log
-    likelihood) that the port removes. `name`: of the effect. `in_parts`: captures that miss the
-    floor are held out a twelfth at a time, for a heat run that has no second. A drift of an
-    instrument would then pass for a state of the machine.
+    Parameters
+    ----------
+    system
+        The last fit.
+    signals
+        Recorded signals that miss, the worst first.
+    name
+        Name of the effect that describes it.
+    in_parts
+        Whether captures that miss the floor are held out a twelfth at a time, for a heat run that
+        has no second one. A drift of an instrument would then pass for a state of the machine.
+
+    Returns
+    -------
+    tuple of UnknownStructure or None and float
+        None where the best input removes too little of what is over the floor: instruments that
+        drift follow no state of the machine. The number is the fall of the deviance.
+
+    Notes
+    -----
+    Inputs are compared by the deviance that they remove from whole captures that they were not
+    fitted to. Of those that do as well, the one of fewest variables is reported, and the others are
+    named beside it.
+
     """
     fit = system.fit
     found, wide = _ranked(system, _hooks(signals), in_parts)

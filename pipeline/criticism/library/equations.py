@@ -19,5 +19,12 @@ def equations() -> Mapping[str, Equation]:
 
 
 def equation_of(segment: Segment) -> Equation:
-    """The equation that a segment is of."""
+    """The equation that a segment is of.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+
+    """
     return equations()[segment.kind]

@@ -51,7 +51,19 @@ def _size(wanted: str, parameters: Mapping[str, ReportedParameter]) -> str:
 
 
 def amplitude(parts: Sequence[ReportedParameter]) -> ReportedParameter:
-    """Length of a vector of parameters, and its u to first order; one alone keeps its sign."""
+    """Length of a vector of parameters, with its standard uncertainty to first order.
+
+    Parameters
+    ----------
+    parts
+        Components in one unit; one alone keeps its sign.
+
+    Returns
+    -------
+    ReportedParameter
+        Without a value where a component has none.
+
+    """
     values = [(value, u or 0.0) for value, u, _ in parts if value is not None]
     if len(values) < len(parts):
         return ReportedParameter(None, None, parts[0].unit)

@@ -18,7 +18,26 @@ MODELS: dict[str, tuple[str, ...]] = {
 
 
 def model_of(spec: ModelSpec, machine: Machine) -> Model:
-    """The model a specification asks for. Raises UsageError for an unknown model or effect."""
+    """The model that a specification asks for.
+
+    Parameters
+    ----------
+    spec
+        Its name, effects and policy.
+    machine
+        Size of the motor.
+
+    Returns
+    -------
+    Model
+        Effects in the order of the named model, then of the request.
+
+    Raises
+    ------
+    UsageError
+        There is no such model or effect.
+
+    """
     if spec.name not in MODELS:
         raise UsageError(f"unknown model {spec.name}", f"known are {', '.join(MODELS)}")
     less = {name[1:] for name in spec.effects if name.startswith("-")}

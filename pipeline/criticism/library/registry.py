@@ -19,11 +19,25 @@ from pipeline.records.errors import UsageError
 
 
 def effects(effects_path: str | None = None) -> dict[str, Effect]:
-    """Every effect by name, sorted; a user's file may not take the name of one of ours.
+    """Every effect by name, sorted.
 
-    The folder is looked at anew every time, and files that have not changed are the same effects.
-    Raises UsageError for a folder that is not there, a file that cannot be run or holds no
-    `EFFECT`, an effect that cannot be right (`guarded`), a name taken twice.
+    Parameters
+    ----------
+    effects_path
+        Folder of effects of the user's own; it is read anew every time, and files that have not
+        changed give the same effects.
+
+    Returns
+    -------
+    dict of Effect
+        Those of this package, of other packages, and of the folder.
+
+    Raises
+    ------
+    UsageError
+        There is no such folder, a file cannot be run or holds no `EFFECT`, an effect cannot be
+        right (`guarded`), or a name is taken twice.
+
     """
     return dict(_library(_user_files(effects_path)))
 
@@ -105,7 +119,21 @@ def known_effects(wanted: Sequence[str], effects_path: str | None = None) -> Non
 
 
 def chosen(names: tuple[str, ...], effects_path: str | None = None) -> dict[str, Effect]:
-    """The effects of these names, in this order. Raises UsageError for an unknown name."""
+    """The effects of some names, in their order.
+
+    Parameters
+    ----------
+    names
+        Names of effects.
+    effects_path
+        Folder of effects of the user's own.
+
+    Raises
+    ------
+    UsageError
+        There is no effect of a name.
+
+    """
     library = effects(effects_path)
     unknown = [name for name in names if name not in library]
     if unknown:

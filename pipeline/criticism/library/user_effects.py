@@ -110,6 +110,31 @@ def guarded(effect: Effect, path: Path, text: str) -> Effect:
 
     Its scales must be known, and every hook is called once, to see that it asks for no parameter
     that is not there; `text` is the file's.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    path
+        Its file.
+    text
+        Content of the file, to find lines in.
+
+    Attributes
+    ----------
+    user's effect whose hooks report what goes wrong in them.
+
+    Returns
+    -------
+    Effect
+        Its hooks are behind `Hook`.
+
+    Raises
+    ------
+    UsageError
+        A scale is not known, or a hook asks for a parameter that the effect has not; every hook is
+        called once to see that.
+
     """
     what = f"effect {effect.name}"
     for parameter in effect.parameters:
@@ -209,7 +234,23 @@ def _ask(hook: Any, arguments: tuple[Any, ...], q: Mapping[str, float], path: Pa
 
 @contextmanager
 def errors_of(path: Path, what: str = "", q: Mapping[str, float] | None = None) -> Iterator[None]:
-    """Whatever goes wrong in a user's file, as one line of file, line and remedy."""
+    """Reports whatever goes wrong in a user's file as one line of file, line and remedy.
+
+    Parameters
+    ----------
+    path
+        The file.
+    what
+        Which hook of which effect.
+    q
+        Its parameters.
+
+    Raises
+    ------
+    UsageError
+        In place of the error inside the block; errors of this package pass.
+
+    """
     try:
         yield
     except PipelineError:

@@ -21,12 +21,31 @@ def alternatives_to(
     offered: Sequence[Candidate],
     passed_over: Sequence[Candidate] = (),
 ) -> tuple[str, ...]:
-    """Effects that explain the captures as well in an effect's place (deviance within 12, and so
-    much of it that is over noise floors and priors).
+    """Effects that explain the captures as well as one that was found.
 
-    Refitted in its place are those that to first order keep half of what it explains, and those
-    that were `passed_over` for it. Effects that share its discriminator are
-    alternatives if that look does not discriminate them.
+    Parameters
+    ----------
+    name
+        The effect that was found.
+    wide
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+    passed_over
+        Candidates that were close when the effect was added.
+
+    Returns
+    -------
+    tuple of str
+        Sorted names of effects with which, in its place, the deviance and its part over noise
+        floors and priors both rise by less than `policy.selection.tie`. Effects that share its
+        discriminator are among them where full logs do not discriminate.
+
+    Notes
+    -----
+    Refitted in its place are those that to first order keep a share of what it explains
+    (`alternative_share`), and those that were passed over for it.
+
     """
     policy, effect = wide.policy.selection, wide.fit.effect(name)
     alike = sharing_discriminator(effect, {one.effect.name: one.effect for one in offered})
@@ -67,7 +86,23 @@ def _refitted(name: str, candidate: Candidate, wide: LinearSystem) -> LinearSyst
 
 
 def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]) -> str:
-    """The test or calibration that parts an effect from what it is confused with."""
+    """The test or calibration that separates an effect from what it is confused with.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    confused
+        Names of its alternatives.
+    library
+        Every effect by name.
+
+    Returns
+    -------
+    str
+        One remedy an alternative; the effect's own experiment where it has none.
+
+    """
     parted = [f"against {name}: {one}" for name, one in remedies(effect, confused, library).items()]
     return "; ".join(parted) if parted else effect.experiment
 
@@ -75,7 +110,24 @@ def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str
 def remedies(
     effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]
 ) -> dict[str, str]:
-    """What the effects themselves declare to part them from each other, by alternative."""
+    """What effects themselves declare to separate them from each other.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    confused
+        Names of its alternatives.
+    library
+        Every effect by name.
+
+    Returns
+    -------
+    dict of str
+        By alternative: what `effect` declares, else what the other one does, else the other one's
+        experiment.
+
+    """
     return {
         other: effect.rivals.get(other)
         or library[other].rivals.get(effect.name)
@@ -87,8 +139,21 @@ def remedies(
 def detectable(effect: Effect, wide: LinearSystem, offered: Sequence[Candidate]) -> float:
     """Signal-to-noise ratio that the captures give an effect of typical size.
 
-    The typical amplitudes over their standard deviations when fitted with all else; the best
-    shape and amplitude count.
+    Parameters
+    ----------
+    effect
+        The effect.
+    wide
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+
+    Returns
+    -------
+    float
+        Typical amplitude over its standard deviation when fitted with all else; the best shape and
+        amplitude count. 0 where nothing observes it.
+
     """
     own, machine = wide.own, wide.fit.machine
     sizes = {

@@ -14,11 +14,24 @@ from pipeline.criticism.regression.linear_system import LinearSystem
 
 
 def reconsidered(system: LinearSystem) -> LinearSystem:
-    """The fit with other choices of its effects, where anything is left over the floor and these
-    are better by 12 of −2 log L.
+    """The fit with other choices inside its effects, where these are better.
 
+    Parameters
+    ----------
+    system
+        The fit.
+
+    Returns
+    -------
+    LinearSystem
+        The same where nothing is over the floor, or no choice lowers the deviance by
+        `policy.selection.tie`.
+
+    Notes
+    -----
     A choice may have been right only while another effect was missing: a lagging transducer does
-    not pass on the torque's ripple, which so seemed not to reach the shaft.
+    not pass on the ripple of the torque, which so seemed not to reach the shaft.
+
     """
     for effect in system.fit.model.effects:
         if not significant_groups(system).any():

@@ -18,7 +18,21 @@ from pipeline.criticism.residuals.residual import measured, operate
 
 
 def discriminate(fit: Fit, effect: Effect) -> Discrimination | None:
-    """What the discriminator of an effect in the model says; None where it has none, or no logs."""
+    """Which of the effects that share a discriminator full logs show.
+
+    Parameters
+    ----------
+    fit
+        A fit with the effect in its model.
+    effect
+        The effect.
+
+    Returns
+    -------
+    Discrimination or None
+        None where it has no discriminator, or the logs do not decide.
+
+    """
     if effect.discriminator is None:
         return None
     model, values = fit.model.without(effect.name), fit.values
@@ -55,7 +69,16 @@ def _undone(recorded: Array, model: Model, values: Values) -> Array:
 
 
 def sharing_discriminator(effect: Effect, library: Mapping[str, Effect]) -> tuple[str, ...]:
-    """The other effects that share an effect's discriminator."""
+    """The other effects that share an effect's discriminator.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    library
+        Every effect by name.
+
+    """
     if effect.discriminator is None:
         return ()
     return tuple(
@@ -66,7 +89,16 @@ def sharing_discriminator(effect: Effect, library: Mapping[str, Effect]) -> tupl
 
 
 def settled(effect: Effect, found: Discrimination) -> Effect:
-    """The effect with the shapes that whole logs give: they are known, and no fit moves them."""
+    """An effect with the shapes that full logs give; no fit moves them any more.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    found
+        What its discriminator gave.
+
+    """
     return replace(effect, parameters=tuple(_known(p, found) for p in effect.parameters))
 
 
@@ -77,8 +109,23 @@ def _known(p: Parameter, found: Discrimination) -> Parameter:
 
 
 def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> LinearSystem:
-    """The fit with the effect `name` exchanged for the one that whole logs show, of those that
-    share its discriminator, and with the numbers that these logs give.
+    """The fit with an effect exchanged for the one that full logs show, with the numbers that they
+    give.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    name
+        The effect; those that share its discriminator may take its place.
+    library
+        Every effect by name.
+
+    Returns
+    -------
+    LinearSystem
+        Refitted; the same where full logs do not decide.
+
     """
     fit = system.fit
     effect = fit.effect(name)

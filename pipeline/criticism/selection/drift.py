@@ -59,7 +59,27 @@ def drifting_segments(fit: Fit, left: Sequence[Remainder]) -> tuple[Segment, ...
 
 
 def with_drift(segment: Segment, model: Model, values: Values) -> Segment:
-    """A segment with the slowest sines of a random walk of each of its sensors."""
+    """A segment with the slowest sines of a random walk of each of its sensors.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    model
+        The model, which determines what a sensor's error does to the residual.
+    values
+        Parameters by full name.
+
+    Attributes
+    ----------
+    segment with the slowest sines of a random walk of each of its sensors as disturbances.
+
+    Returns
+    -------
+    Segment
+        The same for a table, and where no voltage, current or torque was recorded.
+
+    """
     if segment.weak is None:
         return segment
     policy = model.policy.selection

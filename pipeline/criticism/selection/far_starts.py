@@ -67,10 +67,25 @@ def with_starts(
     scores: Sequence[Score],
     significant: NDArray[np.bool_],
 ) -> tuple[Score, ...]:
-    """The scores, those of effects with `starts` from the best of them if that beats the tangent.
+    """Scores, those of effects with `starts` from the best of them where that beats the tangent.
 
-    Nothing is tried where nothing is `significant` [G] as a remainder: a delay of many samples
-    shows.
+    Parameters
+    ----------
+    wide
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+    scores
+        Scores by the tangent.
+    significant
+        Groups [G] over their floor; without any, nothing is tried, since a delay of many samples
+        shows.
+
+    Returns
+    -------
+    tuple of Score
+        The largest fall first.
+
     """
     if not significant.any():
         return tuple(scores)

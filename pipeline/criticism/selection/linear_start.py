@@ -46,10 +46,25 @@ def with_linear_start(
     scores: Sequence[Score],
     significant: NDArray[np.bool_],
 ) -> tuple[Score, ...]:
-    """The scores, each of an effect from its linear form where that beats the tangent.
+    """Scores, those of effects with a linear form from that form where it beats the tangent.
 
-    Tried where the form's signal is `significant` [G] as a remainder and misses by
-    `coupling_floors`.
+    Parameters
+    ----------
+    wide
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+    scores
+        Scores by the tangent.
+    significant
+        Groups [G] over their floor; a form is tried where its signal is among them and misses by
+        `policy.selection.coupling_floors`.
+
+    Returns
+    -------
+    tuple of Score
+        The largest fall first.
+
     """
     found = list(scores)
     for name, candidate in {c.effect.name: c for c in reversed(offered)}.items():

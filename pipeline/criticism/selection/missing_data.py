@@ -20,7 +20,25 @@ from pipeline.records.diagnosis import Unexcited
 
 
 def unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
-    """A note of the captures that no equation could use, none where all are used."""
+    """A note of the captures that no equation could use, none where all are used.
+
+    Parameters
+    ----------
+    campaign
+        Captures of the motor.
+    found
+        Segments made of them.
+
+    Attributes
+    ----------
+    note of the captures that no equation could use.
+
+    Returns
+    -------
+    tuple of str
+        Empty where all captures are used.
+
+    """
     used = {segment.capture for segment in found}
     idle = [
         c.path for c in campaign.captures if c.path not in used and c.meta.test in known_tests()
@@ -59,7 +77,21 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
 
 
 def at_ambient(found: Sequence[Segment], model: Model) -> tuple[str, ...]:
-    """Notes of the captures in which a temperature that the model asks for is not recorded."""
+    """Notes of the captures in which a temperature that the model uses was not recorded.
+
+    Parameters
+    ----------
+    found
+        The segments.
+    model
+        The model.
+
+    Returns
+    -------
+    tuple of str
+        One a temperature, with the uncertainty that it is taken with.
+
+    """
     notes = []
     for effect in model.effects:
         for name in (signal for signal in effect.signals if signal.startswith("temp_")):
@@ -78,8 +110,25 @@ def unexcited(
     last: LadderStep,
     offered: Sequence[Candidate],
 ) -> tuple[Unexcited, ...]:
-    """Effects that no capture here would show at typical size, for want of their first test or of
-    a signal in it; each with the tests that are not there.
+    """Effects that no capture would show at typical size.
+
+    Parameters
+    ----------
+    campaign
+        Captures of the motor.
+    library
+        Every effect by name.
+    last
+        The last step of the search.
+    offered
+        The candidates on it.
+
+    Returns
+    -------
+    tuple of Unexcited
+        Each with the tests that are missing, or the signals missing in them. An effect whose first
+        test was recorded with all its signals is not among them.
+
     """
     inside = {effect.name for effect in last.system.fit.model.effects}
     least, found = last.system.policy.selection.visible_u, []

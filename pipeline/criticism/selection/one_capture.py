@@ -19,8 +19,20 @@ from pipeline.criticism.regression.linear_system import LinearSystem
 
 
 def rests_on(systems: Sequence[LinearSystem], held: Sequence[HeldOut]) -> str | None:
-    """`only_capture` of the step from the first of two systems to the second, by what each predicts
-    of captures held out.
+    """`only_capture` of the step from the first of two fits to the second.
+
+    Parameters
+    ----------
+    systems
+        The fits before and after the step.
+    held
+        Their held-out residuals.
+
+    Returns
+    -------
+    str or None
+        Path of the capture.
+
     """
     without, after = (predicted_chi2(one, out) for one, out in zip(systems, held, strict=True))
     return only_capture(systems[-1], without, after)

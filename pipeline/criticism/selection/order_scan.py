@@ -81,8 +81,19 @@ def orders_left(system: LinearSystem) -> tuple[float, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Part of a log [n]: what is left of a signal, the shaft's angle, the weight of each sample,
-    and the current that waves of the angle may grow with.
+    """Part of a log, over which waves of the angle are sought.
+
+    Attributes
+    ----------
+    left
+        Residual of a signal [n, its unit].
+    theta_rad
+        Angle of the shaft [n].
+    weight
+        Weight of each sample [n].
+    current
+        Current that waves may grow with [n, A].
+
     """
 
     left: Array
@@ -103,18 +114,57 @@ class Part:
         return scales
 
     def power(self, orders: Array) -> Array:
-        """Mean square [2, K] of some orders with each carrier."""
+        """Mean square of waves of some orders with each carrier.
+
+        Parameters
+        ----------
+        orders
+            Waves a turn [K].
+
+        Returns
+        -------
+        array [2, K]
+            In squared units of the signal; carriers are the weight, and the weight times the
+            current.
+
+        """
         power: Array = self.scales[:, None] * np.abs(self.waves(orders)) ** 2
         return power
 
     def waves(self, orders: Array) -> Complex:
-        """The sums [2, K] of what is left times a wave of the angle and a carrier."""
+        """Sums of the residual times a wave of the angle and a carrier.
+
+        Parameters
+        ----------
+        orders
+            Waves a turn [K].
+
+        Returns
+        -------
+        array [2, K], complex
+            One row a carrier.
+
+        """
         carried = np.stack(self.carriers) * self.left
         sums = [carried @ np.exp(-1j * order * self.theta_rad) for order in orders.tolist()]
         return np.array(sums).T
 
     def spectrum(self, count: int, step: float) -> Array:
-        """Mean square [2, K] of every order of the grid from its first step, as `power`."""
+        """Mean square of waves of every order of a grid, as `power`.
+
+        Parameters
+        ----------
+        count
+            Number K of orders.
+        step
+            Distance between them, and the first order.
+
+        Returns
+        -------
+        array [2, K]
+            In squared units of the signal.
+
+        """
         turn = np.exp(-1j * step * self.theta_rad)
         carried = np.stack(self.carriers) * self.left + 0j
         sums = np.empty((2, count), dtype=np.complex128)
@@ -125,7 +175,19 @@ class Part:
         return power
 
     def without(self, order: float) -> Part:
-        """The part less its best waves of an order: of one size, and as current and load go."""
+        """The part less its best waves of one order.
+
+        Parameters
+        ----------
+        order
+            Waves a turn.
+
+        Returns
+        -------
+        Part
+            Less waves of constant size, in proportion to the current, and to its magnitude.
+
+        """
         turn = np.exp(1j * order * self.theta_rad)
         sizes = np.stack([np.ones(turn.size), self.current, np.abs(self.current)])
         waves = np.concatenate([sizes * turn.real, sizes * turn.imag])
@@ -136,8 +198,19 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Log:
-    """What is left of one signal of a capture: whole, and in parts of a few turns. `least` [its
-    unit] is an rms that matters, `looked_at` the orders that the signal's equations see.
+    """The residual of one signal of a capture, in which orders are sought.
+
+    Attributes
+    ----------
+    capture, channel
+        The capture and the signal.
+    whole, parts
+        The log, and parts of a few turns each.
+    least
+        Rms that matters [unit of the signal].
+    looked_at
+        Orders that the equations of the signal observe.
+
     """
 
     capture: str

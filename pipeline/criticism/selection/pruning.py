@@ -20,11 +20,26 @@ from pipeline.criticism.regression.normal_equations import NormalEquations
 
 
 def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
-    """The fit with the optional terms of the named effects that do not pay left out.
+    """The fit without optional terms of some effects that are not worth their parameters.
 
-    A term pays when −2 log L falls by more than ln n a parameter. All terms that to first order do
-    not pay are left out in one refit. If that loses too much, they are tried one by one, and with
-    them the terms that to first order pay less than twenty penalties. One amplitude always stays.
+    Parameters
+    ----------
+    system
+        The fit.
+    names
+        The effects.
+
+    Returns
+    -------
+    LinearSystem
+        Refitted; one amplitude of each effect stays.
+
+    Notes
+    -----
+    A term is worth its parameters when −2 log L falls by more than ln n a parameter. All terms that
+    to first order are not are left out in one refit. Where that loses too much, they are tried one
+    by one, and with them the terms that to first order are worth less than `tangent_penalties`.
+
     """
     penalty = math.log(max(system.size, 2))
     for name in names:
@@ -45,7 +60,17 @@ def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
 def with_all_terms(fit: Fit) -> Fit:
     """Where a fit begins in which the machine's own effects have all their terms again.
 
-    A term that did not pay while another effect was missing may pay now.
+    Parameters
+    ----------
+    fit
+        The fit.
+
+    Returns
+    -------
+    Fit
+        Terms that were left out are in at zero: a term that was not worth its parameters while
+        another effect was missing may be now.
+
     """
     model = fit.model
     own = [e if e.hook == "sensor" else replace(e, left_out=()) for e in model.effects]

@@ -24,7 +24,17 @@ _FRAME = (
 
 @dataclass(frozen=True, slots=True)
 class BaseFit:
-    """The system around a model fitted to segments, which know the mains lines in them."""
+    """The system around a model fitted to segments, which know the mains lines in them.
+
+    Attributes
+    ----------
+    requested model, fitted.
+    system
+        The fit, linearised; its segments know the mains lines in them.
+    hum
+        Mains lines that were found.
+
+    """
 
     system: LinearSystem
     hum: tuple[Hum, ...]
@@ -60,7 +70,23 @@ def in_better_frame(system: LinearSystem, near: Fit) -> LinearSystem:
 
 
 def frame_notes(segments: Sequence[Segment]) -> tuple[str, ...]:
-    """A note on voltages that are in the frame of the sampling instant."""
+    """A note on voltages that are in the frame of the sampling instant.
+
+    Parameters
+    ----------
+    segments
+        The segments of a fit.
+
+    Attributes
+    ----------
+    note on voltages that are in the rotor frame of the sampling instant.
+
+    Returns
+    -------
+    tuple of str
+        Empty where there are none.
+
+    """
     captures = dict.fromkeys(segment.capture for segment in segments if segment.instrument.frame)
     return (_FRAME.format(len(captures)),) if captures else ()
 
@@ -78,11 +104,25 @@ def _at_start(segment: Segment) -> Segment:
 
 
 def fit_of(segments: Sequence[Segment], model: Model) -> BaseFit:
-    """Fits a model from orders of magnitude.
+    """Fits a requested model from orders of magnitude.
 
-    Effects that have a shape or a choice come in one by one, the most helpful first. Each begins at
-    the best of its trial values: from another one, a bump of friction may move its speed the wrong
-    way.
+    Parameters
+    ----------
+    segments
+        The segments.
+    model
+        The model.
+
+    Returns
+    -------
+    BaseFit
+        Effects that nothing observes stay at zero.
+
+    Notes
+    -----
+    Effects with a shape or a choice are added one by one, the most helpful first, each at the best
+    of its trial values: from another one, a bump of friction may move its speed the wrong way.
+
     """
     shaped = {
         effect.name: effect

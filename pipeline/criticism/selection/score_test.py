@@ -26,7 +26,18 @@ from pipeline.criticism.regression.normal_equations import Descent, NormalEquati
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """An effect that is not in the model, its shape parameters at one of their trial values."""
+    """An effect that is not in the model, its shape parameters at one of their trial values.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    columns
+        One a parameter that is fitted.
+    values
+        Its parameters by full name, amplitudes zero.
+
+    """
 
     effect: Effect
     columns: tuple[Column, ...]
@@ -35,15 +46,34 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """What a candidate would do, to first order.
+    """What a candidate would do for a fit, to first order.
 
-    `fall` is the fall of deviance, `penalty` what its parameters and the search cost, `step` its
-    own parameters, `moves` how the model's own move with it, `share` the part of the removable
-    excess of the channel it helps most, `size` the largest of its amplitudes over its negligible
-    size, `quiet` the part of the fall in signals that have nothing over their floor to take a share
-    of. `clears`: it takes most of what would be reported as a remainder without it, and so matters
-    at any size; no coupling, which noise of an encoder in a speed loop looks like. `confounder`
-    names an effect that explains the same better, but is too small to matter.
+    Attributes
+    ----------
+    candidate
+        The candidate.
+    fall
+        Fall of the deviance.
+    penalty
+        What its parameters and the search over candidates cost.
+    step
+        Its own parameters, by full name.
+    moves
+        Changes of the model's own parameters.
+    share
+        Part that it removes of the removable excess, of the channel that it helps most [1].
+    size
+        Largest of its amplitudes over its negligible size [1].
+    quiet
+        Part of the fall in signals that have nothing over their floor.
+    clears
+        Whether it removes most of what would be reported as a remainder, and so matters at any
+        size; never for a coupling, which noise of an encoder in a speed loop looks like.
+    confounder
+        An effect that explains the same better, but is too small to matter.
+    policy
+        Constants of judgement.
+
     """
 
     candidate: Candidate
@@ -99,7 +129,18 @@ class Score:
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How well a fit stands: deviance, χ²/n [G] of every group, cost of the priors."""
+    """How well a fit stands.
+
+    Attributes
+    ----------
+    deviance
+        −2 log likelihood with the cost of the priors.
+    reduced_chi2
+        χ²/n of every group [G].
+    prior_cost
+        Cost of the priors alone.
+
+    """
 
     deviance: float
     reduced_chi2: Array
@@ -107,13 +148,33 @@ class Standing:
 
     @classmethod
     def of(cls, system: LinearSystem, places: NDArray[np.int64], end: Descent) -> Standing:
-        """Where a descent along `places` left the system."""
+        """How well a system stands after a descent.
+
+        Parameters
+        ----------
+        system
+            The system.
+        places
+            Columns that moved.
+        end
+            Where the descent ended.
+
+        """
         cost = float(system.prior_costs(places, end.step).sum())
         return cls(end.deviance, end.reduced_chi2, cost)
 
 
 def candidates(library: Mapping[str, Effect], model: Model) -> tuple[Candidate, ...]:
-    """Every effect that is not in the model, once for each combination of trial shapes."""
+    """Every effect that is not in the model, once for each combination of trial shapes.
+
+    Parameters
+    ----------
+    library
+        Every effect by name.
+    model
+        The model; effects whose wave of the angle no capture goes through are left out.
+
+    """
     inside = {effect.name for effect in model.effects}
     found = []
     for effect in library.values():
@@ -137,6 +198,27 @@ def widened(
     The candidates' may stay as they were in `before`. Its own are made anew: what the station's
     priors alone hold apart, such as a gain and the effect of that name, columns that are made in
     two places would seem to discriminate.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    offered
+        The candidates.
+    before
+        An earlier system whose columns of candidates may be used again.
+
+    Attributes
+    ----------
+    fit with the columns of candidates behind its own.
+
+    Returns
+    -------
+    LinearSystem
+        The model's own columns are computed anew: what only priors of the station separate, such as
+        a gain and the effect of that name, would seem to be separated by columns computed at two
+        places.
+
     """
     columns = [c for candidate in offered for c in candidate.columns]
     if before is not None:
@@ -152,9 +234,22 @@ def score_all(
     offered: Sequence[Candidate],
     significant: NDArray[np.bool_] | None = None,
 ) -> tuple[Score, ...]:
-    """Every candidate's score, the best fall first; of one effect the best shape only.
+    """The score of every candidate, of each effect its best shape.
 
-    `significant` [G] are groups that would be reported as a remainder if nothing were added.
+    Parameters
+    ----------
+    system
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+    significant
+        Groups [G] that would be reported as a remainder if nothing were added.
+
+    Returns
+    -------
+    tuple of Score
+        The largest fall first.
+
     """
     by, policy = _Scoring.of(system, significant), system.policy.selection
     penalty = math.log(float(system.size))
@@ -175,7 +270,21 @@ def score_all(
 def placed(
     wide: LinearSystem, offered: Sequence[Candidate]
 ) -> Iterator[tuple[Candidate, NDArray[np.int64]]]:
-    """Every candidate of a widened system with the places of its columns there."""
+    """Every candidate of a widened system with the places of its columns.
+
+    Parameters
+    ----------
+    wide
+        The system.
+    offered
+        The candidates, as `widened` had them.
+
+    Yields
+    ------
+    tuple of Candidate and array
+        Indices into `wide.columns`.
+
+    """
     first = wide.own.size
     for candidate in offered:
         yield candidate, np.arange(first, first + len(candidate.columns))
@@ -183,7 +292,18 @@ def placed(
 
 
 def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
-    """How many parameters a score costs: of optional terms those that the step makes use of."""
+    """How many parameters a score costs.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    machine
+        Determines which parameters there are.
+    score
+        Of optional terms those that its step uses are counted; None counts none.
+
+    """
     used = {} if score is None else score.step
     return sum(
         not p.optional or bool(used.get(f"{effect.name}.{p.name}"))
@@ -324,8 +444,24 @@ class _Scoring:
 def clears(
     system: LinearSystem, significant: NDArray[np.bool_], before: Array, after: Array
 ) -> bool:
-    """Whether most of the power over the floor goes, between two sets of χ²/n [G], of the groups
-    that are `significant` [G] as a remainder.
+    """Whether most of the power over the floor goes, of the groups that count as a remainder.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    significant
+        Groups that count [G].
+    before
+        χ²/n without the candidate [G].
+    after
+        χ²/n with it [G].
+
+    Returns
+    -------
+    bool
+        False where no group counts.
+
     """
     over, left = (system.counts * np.maximum(q - 1.0, 0.0) for q in (before, after))
     most = system.policy.selection.clears_share * float(over[significant].sum())
@@ -337,12 +473,31 @@ def _outside(value: float, parameter: Parameter) -> bool:
 
 
 def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Standing) -> float:
-    """Largest share of the removable deviance that went away: of one recorded signal, of the
-    captures of the tests that excite the effect, or of what the priors of the station cost; but of
-    a signal's error no more than the share of its power, at one order, that went with it.
+    """Largest share of the removable deviance that an effect removes.
 
+    Parameters
+    ----------
+    system
+        The fit.
+    effect
+        The effect.
+    before
+        The fit without it.
+    after
+        The fit with it.
+
+    Returns
+    -------
+    float
+        From 0 to 1: of one recorded signal, of the captures of the tests that excite the effect, or
+        of what the priors of the station cost; of a signal's error no more than the share of its
+        power, at one order.
+
+    Notes
+    -----
     Small excesses do not count (`excess`, `excess_a_sample`): drift and unmodelled effects are
     deviance that many candidates partly absorb.
+
     """
     policy = system.policy.selection
     excess = system.counts * np.log(np.maximum(before.reduced_chi2, 1.0))
@@ -361,7 +516,18 @@ def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Stan
 
 
 def quiet_fall(system: LinearSystem, before: Array, after: Array) -> float:
-    """Fall of deviance between two sets of χ²/n [G], in signals without an excess that counts."""
+    """Fall of the deviance in signals without an excess that counts.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    before
+        χ²/n without the candidate [G].
+    after
+        χ²/n with it [G].
+
+    """
     fall, policy = 0.0, system.policy.selection
     channel = np.array([name for _, name, _ in system.labels])
     for name in dict.fromkeys(channel.tolist()):
@@ -374,8 +540,22 @@ def quiet_fall(system: LinearSystem, before: Array, after: Array) -> float:
 
 
 def power_share(system: LinearSystem, before: Array, after: Array) -> float:
-    """Largest share of the power over the noise floor, of one signal at one order, that went away
-    between two sets of χ²/n [G].
+    """Largest share of the power over the noise floor that is removed, of one signal at one order.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    before
+        χ²/n without the candidate [G].
+    after
+        χ²/n with it [G].
+
+    Returns
+    -------
+    float
+        From 0 to 1; 0 where no signal has an excess that counts.
+
     """
     numbers: dict[tuple[str, int], int] = {}
     pool = [numbers.setdefault((name, k), len(numbers)) for _, name, k in system.labels]

@@ -41,7 +41,18 @@ from pipeline.criticism.selection.score_test import (
 
 @dataclass(frozen=True, slots=True)
 class LadderStep:
-    """One step of the ladder: the fit with these effects and every candidate's score on it."""
+    """One step of the search.
+
+    Attributes
+    ----------
+    added
+        Effects that were added so far.
+    system
+        The fit with them, and the columns of all candidates.
+    scores
+        Every candidate's score on it.
+
+    """
 
     added: tuple[str, ...]
     system: LinearSystem
@@ -54,8 +65,20 @@ class LadderStep:
 
 
 def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
-    """The ladder: adds the best effect, refits, checks backwards, until nothing passes or five
-    effects are in.
+    """Adds the best effect, refits and checks backwards, until nothing passes.
+
+    Parameters
+    ----------
+    fit
+        The fit of the requested model.
+    library
+        Effects that may be added.
+
+    Returns
+    -------
+    tuple of LadderStep
+        The first without any addition; `policy.selection.most_steps` at most.
+
     """
     steps: list[LadderStep] = []
     policy = fit.policy.selection
@@ -307,11 +330,24 @@ def _holds(
 
 
 def spoils(tried: LinearSystem, before: Array, after: Array) -> bool:
-    """Whether the newest effect adds more power than it takes, of what other captures predict.
+    """Whether the newest effect adds more power than it removes, of what other captures predict.
 
-    A deviance is logarithmic: it falls where a small error is halved and a large one doubled. Only
-    groups [G] in which the effect acts count, and of these what changes by more than `least_share`:
-    an error that something else makes moves a little with any refit.
+    Parameters
+    ----------
+    tried
+        The fit with the effect.
+    before
+        χ²/n predicted without it [G].
+    after
+        χ²/n predicted with it [G].
+
+    Returns
+    -------
+    bool
+        A deviance is logarithmic: it falls where a small error is halved and a large one doubled.
+        Only groups count in which the effect acts, and of these what changes by more than
+        `least_share`, since any refit moves an error of another cause a little.
+
     """
     name = f"{tried.fit.model.effects[-1].name}."
     own = [n for n, column in enumerate(tried.columns) if column.name.startswith(name)]
@@ -336,7 +372,16 @@ def _shrunk(tried: LinearSystem) -> Array:
 
 
 def begin_from(fit: Fit, score: Score) -> Fit:
-    """Where a refit with a candidate begins: what its score foresees."""
+    """Where a refit with a candidate begins: what its score predicts.
+
+    Parameters
+    ----------
+    fit
+        The fit without it.
+    score
+        The score of the candidate.
+
+    """
     model = fit.model.with_effects(score.candidate.effect)
     moved = {name: fit.values[name] + change for name, change in score.moves.items()}
     start = {**moved, **score.candidate.values, **score.step}
@@ -344,14 +389,35 @@ def begin_from(fit: Fit, score: Score) -> Fit:
 
 
 def material(fit: Fit, effect: Effect) -> bool:
-    """Whether some amplitude of an effect is over its negligible size, and every shape that has
-    one over its own.
+    """Whether an effect is large enough to matter.
+
+    Parameters
+    ----------
+    fit
+        A fit with the effect.
+    effect
+        The effect.
+
+    Returns
+    -------
+    bool
+        Some amplitude is over its negligible size, and every shape that has one over its own.
+
     """
     return shaped(fit, effect) and size_of(fit, effect, "negligible") >= 1.0
 
 
 def shaped(fit: Fit, effect: Effect) -> bool:
-    """Whether every shape of an effect is over its negligible size, if it has one."""
+    """Whether every shape of an effect is over its negligible size.
+
+    Parameters
+    ----------
+    fit
+        A fit with the effect.
+    effect
+        The effect.
+
+    """
     machine = fit.machine
     return all(
         fit.size(effect, p) >= p.negligible * machine.scale(p)
@@ -361,7 +427,23 @@ def shaped(fit: Fit, effect: Effect) -> bool:
 
 
 def size_of(fit: Fit, effect: Effect, unit: str) -> float:
-    """The largest amplitude of an effect over its `negligible` or `typical` size."""
+    """The largest amplitude of an effect, relative to one of its declared sizes.
+
+    Parameters
+    ----------
+    fit
+        A fit with the effect.
+    effect
+        The effect.
+    unit
+        `negligible` or `typical`.
+
+    Returns
+    -------
+    float
+        0 where no amplitude declares such a size.
+
+    """
     machine = fit.machine
     sizes = [
         fit.size(effect, p) / (getattr(p, unit) * machine.scale(p))
@@ -390,10 +472,24 @@ def loss_without(
     instead: NDArray[np.int64] | None = None,
     normal_equations: NormalEquations | None = None,
 ) -> float:
-    """Rise of deviance when effects go to zero amplitude and the rest, with `instead`, refits.
+    """Rise of the deviance when effects go to zero amplitude and the rest is refitted.
 
-    The model is taken as linear between here and there. `normal_equations` are those of all
-    columns, where they are there already.
+    Parameters
+    ----------
+    system
+        The fit.
+    names
+        The effects.
+    instead
+        Places of columns that are fitted in their stead.
+    normal_equations
+        Those of all columns, where they were computed before.
+
+    Returns
+    -------
+    float
+        To first order: the model is taken as linear between here and there.
+
     """
     gone = tuple(f"{name}." for name in names)
     fit, own = system.fit, system.own

@@ -16,14 +16,28 @@ from pipeline.records.diagnosis import Remainder
 def truncated(
     steps: Sequence[LadderStep], held: Sequence[HeldOut]
 ) -> tuple[tuple[LadderStep, ...], tuple[Remainder, ...]]:
-    """The ladder without unsupported trailing steps, and what is left over the floor at its end.
+    """The search without unsupported trailing steps.
 
-    While anything is left, trailing steps are dropped that
+    Parameters
+    ----------
+    steps
+        Steps of the search.
+    held
+        Held-out residuals of each, over the same rows.
 
-    1. captures contradict, where the effects found do not explain what is left;
-    2. lowered the held-out error by less than `guess_share`, where they do not explain it, unless
-       the step cleared a signal of all waves of the angle;
-    3. came after the first effect and lowered the held-out error by less than `little_share`.
+    Returns
+    -------
+    tuple
+        The steps that stay, and what is over the floor at their end.
+
+    Notes
+    -----
+    While anything is left, trailing steps are dropped that 1. captures contradict, where the
+    effects found do not explain what is left; 2. lowered the held-out error by less than
+    `guess_share`, where they do not explain it, unless the step cleared a signal of all waves of
+    the angle; 3. came after the first effect and lowered the held-out error by less than
+    `little_share`.
+
     """
     policy = steps[0].fit.policy.selection
     for count in range(len(steps), 0, -1):
@@ -43,9 +57,19 @@ def truncated(
 
 
 def contradiction(step: LadderStep) -> str:
-    """What captures say against the effect that a step added, nothing where they don't: that an
-    amplitude of it that they know is not half of the one that it should come to
-    (`Parameter.at_least`).
+    """What captures say against the effect that a step added.
+
+    Parameters
+    ----------
+    step
+        The step.
+
+    Returns
+    -------
+    str
+        Empty where they say nothing: an amplitude that they determine is less than half of the one
+        that it should reach (`Parameter.at_least`).
+
     """
     system, model = step.system, step.fit.model
     share = step.fit.policy.selection.companion_share
@@ -84,13 +108,30 @@ def _waved(system: LinearSystem) -> set[str]:
 def explained(
     steps: Sequence[LadderStep], held: Sequence[HeldOut], left: Sequence[Remainder]
 ) -> bool:
-    """Whether the effects found took most of the deviance of signals that still miss, a tenth at
-    least of each one's own, and most of the power that held-out errors have over the floor.
+    """Whether the effects found explain what is left over the floor.
 
-    An offset of the angle that takes all the torque's error explains nothing of a shaft that coasts
-    too short. Signals that had less than a tenth of the deviance do not count alone. Deviance is
-    logarithmic: of an equation that is given up at a million floors it takes half to come to a
-    thousand.
+    Parameters
+    ----------
+    steps
+        Steps of the search.
+    held
+        Held-out residuals of each.
+    left
+        What is over the floor at the end.
+
+    Returns
+    -------
+    bool
+        True where nothing is left.
+
+    Notes
+    -----
+    They must remove most of the deviance of the signals that still miss, at least a share of each
+    one's own (`least_share`), and most of the power that held-out errors have over the floor. An
+    offset of the angle that removes all of the torque's error explains nothing of a shaft that
+    coasts too short. Signals with a small part of the deviance do not count alone. Deviance is
+    logarithmic: for an equation at a million floors, half of it remains at a thousand.
+
     """
     policy = steps[0].fit.policy.selection
     first, last = (max(held[n].total ** 2 - 1.0, 0.0) for n in (0, len(steps) - 1))

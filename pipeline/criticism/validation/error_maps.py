@@ -36,10 +36,19 @@ CURVES = (
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """A signal's errors as window means [n, its unit], with their noise and where they were made.
+    """The errors of a signal as window means.
 
-    `segment` [n] numbers the captures, `window` [n] their windows, `at` holds window means [n] of
-    what an error may depend on, NaN where a capture does not record it.
+    Attributes
+    ----------
+    signal
+        Reported name of the signal.
+    error, sigma
+        Errors and their noise [n, unit of the signal].
+    segment, window
+        Number of the segment and of the window [n].
+    at
+        Window means of what an error may depend on [n], NaN where a capture does not record it.
+
     """
 
     signal: str
@@ -51,7 +60,21 @@ class Errors:
 
 
 def window_errors(system: LinearSystem, whitened: Array) -> tuple[Errors, ...]:
-    """Every signal's errors in the plain windows of all captures, from whitened residuals [R]."""
+    """The errors of every signal in the plain windows of all captures.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    whitened
+        Residual over the noise [R].
+
+    Returns
+    -------
+    tuple of Errors
+        Sorted by signal.
+
+    """
     found = system.segments
     parts: dict[str, list[tuple[int, NDArray[np.bool_]]]] = {}
     for place, (number, channel, order) in enumerate(system.labels):
@@ -92,7 +115,19 @@ def _errors_of(
 
 
 def window_variables(segment: Segment) -> dict[str, Array]:
-    """Window means [W] of what an error may depend on; the speed from the angle's ends."""
+    """Window means of what an error may depend on.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+
+    Returns
+    -------
+    dict of array [W]
+        By glossary name; the speed is from the ends of the angle. Empty for a table.
+
+    """
     weak = segment.weak
     if weak is None:
         return {}
@@ -111,7 +146,21 @@ def window_variables(segment: Segment) -> dict[str, Array]:
 
 
 def speed_current_map(errors: Errors, policy: Validation) -> ErrorMap | None:
-    """Mean error over cells of speed and q current; None where a capture has only one."""
+    """Mean error over cells of speed and q current.
+
+    Parameters
+    ----------
+    errors
+        Errors of a signal.
+    policy
+        Number of cells.
+
+    Returns
+    -------
+    ErrorMap or None
+        None where no capture records both.
+
+    """
     if "iq_a" not in errors.at or "omega_mech_rad_s" not in errors.at:
         return None
     speed, current = errors.at["omega_mech_rad_s"], errors.at["iq_a"]
@@ -125,7 +174,23 @@ def speed_current_map(errors: Errors, policy: Validation) -> ErrorMap | None:
 
 
 def curve(errors: Errors, variable: str, policy: Validation) -> ErrorMap | None:
-    """Mean error over ranges of one variable that hold equal shares of the windows."""
+    """Mean error over ranges of one variable that hold equal shares of the windows.
+
+    Parameters
+    ----------
+    errors
+        Errors of a signal.
+    variable
+        Glossary name.
+    policy
+        Number of ranges.
+
+    Returns
+    -------
+    ErrorMap or None
+        None where the variable was not recorded or does not vary.
+
+    """
     value = errors.at.get(variable)
     if value is None:
         return None
@@ -138,7 +203,19 @@ def curve(errors: Errors, variable: str, policy: Validation) -> ErrorMap | None:
 
 
 def direction(errors: Errors) -> ErrorMap | None:
-    """Mean error by sense of rotation: cells of negative and positive sign of the speed."""
+    """Mean error by sense of rotation.
+
+    Parameters
+    ----------
+    errors
+        Errors of a signal.
+
+    Returns
+    -------
+    ErrorMap or None
+        Two cells; None where the shaft turns in one sense only.
+
+    """
     value = errors.at.get("omega_mech_rad_s")
     if value is None:
         return None
@@ -196,8 +273,21 @@ def _place(value: Array, bins: Bins) -> NDArray[np.int64]:
 def angle_maps(fit: Fit) -> tuple[ErrorMap, ...]:
     """Mean error over the electrical and the mechanical angle of a turn, sample by sample.
 
-    Each window's mean is taken off first: what is left is what turns with the shaft. A window is
-    one visit of every cell that it crosses.
+    Parameters
+    ----------
+    fit
+        The fit.
+
+    Returns
+    -------
+    tuple of ErrorMap
+        By signal and angle.
+
+    Notes
+    -----
+    The mean of each window is subtracted first: what is left turns with the shaft. A window is one
+    visit of every cell that it crosses.
+
     """
     parts: dict[tuple[str, str], list[tuple[Array, Array, Array, Array]]] = {}
     cells = {
@@ -264,7 +354,21 @@ def _by_angle(
 
 
 def disjoint(starts: NDArray[np.int64], length: int) -> NDArray[np.int64]:
-    """Those of rising window starts [W] whose windows of `length` samples share none."""
+    """Windows that share no samples.
+
+    Parameters
+    ----------
+    starts
+        First samples, ascending [W].
+    length
+        Samples a window.
+
+    Returns
+    -------
+    array of int
+        Those that are kept, the earliest first.
+
+    """
     kept: list[int] = []
     for start in starts.tolist():
         if not kept or start >= kept[-1] + length:
@@ -273,7 +377,16 @@ def disjoint(starts: NDArray[np.int64], length: int) -> NDArray[np.int64]:
 
 
 def histograms(errors: Sequence[Errors], policy: Validation) -> tuple[Histogram, ...]:
-    """How each signal's window errors, over their noise floor, are spread."""
+    """How the window errors of each signal, over their noise floor, are distributed.
+
+    Parameters
+    ----------
+    errors
+        Errors of each signal.
+    policy
+        Number of bins, and how far they reach.
+
+    """
     edges = np.linspace(-policy.histogram_reach, policy.histogram_reach, policy.histogram_cells + 1)
     made = []
     for one in errors:
@@ -284,7 +397,16 @@ def histograms(errors: Sequence[Errors], policy: Validation) -> tuple[Histogram,
 
 
 def all_maps(system: LinearSystem, residual_over_floor: Array) -> tuple[ErrorMap, ...]:
-    """Every map of every signal: speed and current, angles, and one curve a variable."""
+    """Every map of every signal: speed and current, angles, and one curve a variable.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    residual_over_floor
+        [R].
+
+    """
     made: list[ErrorMap | None] = []
     policy = system.policy.validation
     for errors in window_errors(system, residual_over_floor):

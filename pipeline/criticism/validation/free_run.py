@@ -38,11 +38,22 @@ _SEED = 20261121
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Simulated beside recorded signals [W, N] of one capture's windows, on `t_s` [W, N].
+    """Simulated beside recorded signals of the windows of one capture.
 
-    `signals` are `id_a` and `iq_a` of a capture under current and, where load and angle are
-    recorded or the shaft coasts, `omega_mech_rad_s`. `floor` is the noise floor of each one's
-    window means, `drift` [K, W] how they move with each sensor's offset, of its prior size.
+    Attributes
+    ----------
+    capture
+        The capture.
+    t_s
+        Instants [W, N].
+    recorded, simulated
+        `id_a` and `iq_a` of a capture under current; `omega_mech_rad_s` where load and angle are
+        recorded or the shaft coasts [W, N].
+    floor
+        Noise floor of the window means of each signal.
+    drift
+        How they move with the offset of each sensor, of its prior size [K, W].
+
     """
 
     capture: str

@@ -27,7 +27,20 @@ Split = Literal["fit", "held_out"]
 
 @dataclass(frozen=True, slots=True)
 class Simulated:
-    """One capture's free run, and whether its parameters were fitted without that capture."""
+    """The free run of one capture.
+
+    Attributes
+    ----------
+    number
+        Of the segment.
+    split
+        `held_out` where its parameters were fitted without that capture.
+    values
+        Parameters by full name.
+    run
+        The free run.
+
+    """
 
     number: int
     split: Split
@@ -62,7 +75,16 @@ def values_without(
 
 
 def simulate(system: LinearSystem, held: HeldOut) -> tuple[Simulated, ...]:
-    """Free runs of every capture that allows one."""
+    """Free runs of every capture that allows one.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    held
+        Its held-out residual, with the parameters that each capture is predicted by.
+
+    """
     made = []
     for number, segment in enumerate(system.segments):
         values, split = values_without(number, system, held)
@@ -73,7 +95,14 @@ def simulate(system: LinearSystem, held: HeldOut) -> tuple[Simulated, ...]:
 
 
 def run_errors(simulated: Sequence[Simulated]) -> Iterator[SignalError]:
-    """Errors of the simulated signals as window means beside their noise floor."""
+    """Errors of simulated signals as window means beside their noise floor.
+
+    Parameters
+    ----------
+    simulated
+        Free runs.
+
+    """
     for one in simulated:
         for signal in one.run.signals:
             error = one.run.errors(signal)
@@ -123,7 +152,22 @@ def effective(residual: Array) -> float:
 
 
 def traces(fit: Fit, simulated: Sequence[Simulated]) -> Iterator[Trace]:
-    """Recorded and predicted signals of the simulated captures, window by window."""
+    """Recorded and predicted signals of simulated captures, window by window.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    simulated
+        Free runs.
+
+    Yields
+    ------
+    Trace
+        Signals of the free runs, and of captures under current those of the equations too, averaged
+        over a millisecond.
+
+    """
     for one in simulated:
         segment, run = fit.segments[one.number], one.run
         if equation_of(segment).use.currents:

@@ -37,11 +37,22 @@ radians: small against what bends the equations, large against rounding."""
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Windows cut out of a segment, with their surroundings: [W] stretches of `pad + N + pad`, and
-    the model at the values whose trajectories are sought.
+    """Windows cut out of a segment with their surroundings, and the model that they are simulated
+    with.
 
-    Where stretches meet the angle jumps; `pad` is wider than what smooths the speed. `allowed`
-    [C, W] is what each channel's equation may miss by in a window, in its unit.
+    Attributes
+    ----------
+    segment
+        Stretches of `pad + N + pad` samples; the angle jumps where they meet.
+    model, values
+        Whose trajectories are sought.
+    windows, length, pad
+        Windows W, samples N of each, and samples on either side.
+    shaft
+        Whether the motion is simulated.
+    allowed
+        What the equation of each channel may miss by in a window [C, W, its unit].
+
     """
 
     segment: Segment
@@ -59,17 +70,61 @@ class Batch:
         return bool(equation_of(self.segment).use.currents)
 
     def folded(self, column: Any) -> Any:
-        """A column [n], real or complex, by window [W, n / W]."""
+        """A column [n], real or complex, by window [W, n / W].
+
+        Parameters
+        ----------
+        column
+            [n], real or complex.
+
+        Attributes
+        ----------
+        column by window.
+
+        Returns
+        -------
+        array [W, n / W]
+            A view.
+
+        """
         return column.reshape(self.windows, -1)
 
     def inside(self, column: Array) -> Array:
-        """A column's part [W, N] inside the windows."""
+        """The part of a column inside the windows.
+
+        Parameters
+        ----------
+        column
+            [n].
+
+        Returns
+        -------
+        array [W, N]
+            Without the surroundings.
+
+        """
         block: Array = self.folded(column)[:, self.pad : self.pad + self.length]
         return block
 
 
 def batch_of(segment: Segment, model: Model, values: Values) -> Batch | None:
-    """The windows of a segment that have their surroundings and share no samples; None for none."""
+    """The windows of a segment that have their surroundings and share no samples.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    model
+        The model.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    Batch or None
+        None for a table, and where no window is left or windows are too short.
+
+    """
     weak = segment.weak
     if weak is None:
         return None
@@ -92,10 +147,19 @@ def batch_of(segment: Segment, model: Model, values: Values) -> Batch | None:
 
 @dataclass(frozen=True, slots=True)
 class Jacobian:
-    """The equations linearised along the measured trajectory, time first: [..., n, W] each.
+    """The equations linearised along a trajectory, time first: [..., n, W] each.
 
-    `ahead` and `behind` [2, 2]: one trapezoidal step of current, rows d and q; `emf` (complex):
-    voltage a rad/s; `pull` [2]: torque an ampere; `damping` and `spring`: drag a rad/s and a rad.
+    Attributes
+    ----------
+    ahead, behind
+        One trapezoidal step of the current, rows and columns d and q [2, 2].
+    emf
+        Voltage a rad/s, complex.
+    pull
+        Torque an ampere of d and q current [2].
+    damping, spring
+        Drag a rad/s and a rad.
+
     """
 
     ahead: Array
@@ -107,7 +171,14 @@ class Jacobian:
 
 
 def jacobian_of(batch: Batch) -> Jacobian:
-    """Linearises the equations along the recorded trajectory, by differences."""
+    """Linearises the equations along the recorded trajectory, by finite differences.
+
+    Parameters
+    ----------
+    batch
+        The windows.
+
+    """
     model, values = batch.model, batch.values
     x = operate(batch.segment, batch.segment.recorded, model, values)
     shape = (batch.segment.size // batch.windows, batch.windows)
@@ -210,10 +281,30 @@ def settle(
     rounds: int,
     extra: tuple[Complex, Array] | None = None,
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """Signals [n] whose currents and angle obey the equations under `given` voltage and load.
+    """Trajectories that obey the equations, by Newton's method.
 
-    `extra` adds to each window's voltage [W] and torque [W]. Also returns which windows [W]
-    settled: those whose last correction was below what drives are modelled to.
+    Parameters
+    ----------
+    batch
+        The windows.
+    jacobian
+        The equations linearised.
+    start
+        Signals where the iteration begins [n].
+    given
+        Signals with the voltage and load that are obeyed, and the state at the start of each window
+        [n].
+    rounds
+        Most iterations.
+    extra
+        Voltage [W] and torque [W] that are added in each window.
+
+    Returns
+    -------
+    tuple of dict and array [W]
+        Signals [n], and which windows settled: their last correction was below what drives are
+        modelled to.
+
     """
     model, policy = batch.model, batch.model.policy
     names = [name for name in _STATE if name in given]
