@@ -20,10 +20,10 @@ help:
 	@echo "make lock      resolve requirements.lock anew (needs uv)"
 	@echo "make clean     remove .venv and caches"
 
-# One motor of the demo has a poor joint: its check fails, and `run` says so by exit code 1.
-# Any other check that fails, and that one holding, is an error.
+# One motor of the demo has a poor joint: its check fails, and `run` says so by exit code 1. Another
+# has a dry bearing, which its model verdict names. Anything else that is found, or not, is an error.
 demo: $(READY)
-	@$(PY) -m pipeline run input=data/demo output=reports/demo || [ $$? -eq 1 ]
+	@$(PY) -m pipeline run input=data/demo output=reports/demo 'model.effects=[cogging]' || [ $$? -eq 1 ]
 	@$(PY) -m tests.demo reports/demo
 
 # A browser with an empty profile that asks nothing of the network.

@@ -12,6 +12,7 @@ from typing import TextIO
 from pipeline.cli.commands import COMMANDS, Command, overview, program, usage
 from pipeline.cli.flags import Flags, parted
 from pipeline.records.errors import PipelineError, UsageError, meant
+from pipeline.records.naming import printable
 from pipeline.records.outcome import INTERRUPTED, Outcome, first_that_applies
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -126,7 +127,7 @@ def _print_outcome(outcome: Outcome) -> None:
     if outcome.wrote:
         _print(f"wrote {outcome.wrote}", sys.stdout)
     if outcome.next:
-        _print(f"next: {program()} {outcome.next}", sys.stdout)
+        _print(f"next: {program()} {printable(outcome.next)}", sys.stdout)
     if outcome.timings:
         rows = [f"  {name:<12} {seconds:8.3f} s" for name, seconds in outcome.timings]
         _print("\n".join(["timings", *rows]), sys.stdout)

@@ -225,7 +225,8 @@ class RegistrySettings(Settings):
 
     action: str = key("", "list, show, diff, at, verify, approve, revoke, tag or untag")
     motor: str | None = key(None, "motor_id; for `at` the date may stand here")
-    registry: str = key("reports/demo/registry", "folder or URL of the registry", place=True)
+    output: str = key("reports/demo", "output folder of a run", place=True)
+    registry: str = key("auto", "folder or URL; auto is registry/ in output", place=True)
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL")
     revision: str | None = key(None, "1, 2, ... of the motor, for show, approve and revoke")
     version: str | None = key(None, "beginning of the version's digest, instead of a revision")

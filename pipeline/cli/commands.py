@@ -138,9 +138,9 @@ COMMANDS = _index(
         s.RegistrySettings,
         "every datasheet version: list, show, diff, at, verify, approve, revoke, tag",
         positional=("action", "motor"),
-        common=("action", "motor", "registry"),
+        common=("action", "motor", "output"),
         examples=(
-            "registry list registry=reports/demo/registry",
+            "registry list output=reports/demo",
             "registry approve G52-0601 revision=1 by=ada why='seen on the bench'",
             "registry diff G52-0601 from=1 to=2",
             "registry at 2026-03-01",

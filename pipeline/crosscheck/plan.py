@@ -396,6 +396,8 @@ def _checks_in_doubt(
             kind, words = "not_evaluated", f"the check could not be made: {check.meaning}"
             tests = _tests_named(check.meaning, known, ways)
             tests = tests or frozenset(set(rests_on) - known.tests) or frozenset(rests_on)
+            if not tests:
+                continue  # it rests on what a user states, and nothing was stated
         doubts.append(Doubt(kind, check.name, words, tests, WEIGHTS[kind]))
     return doubts
 

@@ -150,6 +150,14 @@ class ModelVerdict(PlainRecord):
         words += f" with {' and '.join(more)}" if more else ""
         return words + (f" without {' and '.join(less)}" if less else "")
 
+    @property
+    def errors(self) -> str:
+        """The error of captures predicted without themselves, and with the effects found, in noise
+        floors: `15 → 0.61`; empty where no model was fitted.
+        """
+        found = [one for one in (self.held_out, self.held_out_with) if one is not None]
+        return " → ".join(map(number, found))
+
     def command(self, motor_id: str, folder: str = "FOLDER") -> str:
         """The command that diagnoses the captures of a folder.
 
@@ -179,7 +187,7 @@ class ModelVerdict(PlainRecord):
 
     def _asked(self, effects: Sequence[str]) -> str:
         model = "" if self.model == "standard" else f" model={self.model}"
-        return model + (f" model.effects=[{','.join(effects)}]" if effects else "")
+        return model + effects_key(effects)
 
     def headline(self) -> str:
         """What the test came to, in one sentence without a full stop."""
@@ -269,6 +277,11 @@ class ModelVerdict(PlainRecord):
             "fitted": {one["effect"]: one["parameters"] for one in fitted},
         }
         return record_of(cls, {**document, **changed})
+
+
+def effects_key(effects: Sequence[str]) -> str:
+    """The key that gives a model its effects, quoted as every shell takes it; empty for none."""
+    return " " + shlex.quote(f"model.effects=[{','.join(effects)}]") if effects else ""
 
 
 def number(floors: float) -> str:

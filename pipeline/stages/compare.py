@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 from pipeline.execution.outputs.page_links import links_of, relink
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.comparison import Comparison
 from pipeline.records.comparison_history import Earlier, document_of, history_of, with_latest
+from pipeline.records.model_verdict import effects_key
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
 from pipeline.report.text.comparison_text import comparison_text
@@ -41,7 +43,23 @@ def _judge(task: Task) -> Judged:
             write_comparison_recording(result, path)
     with task.watch.stage("page"):
         _write_page(output, result)
-    return Judged(comparison_text(result), not result.errors, document)
+    return Judged(comparison_text(result), not result.errors, document, _next(task, result))
+
+
+def _next(task: Task, result: Comparison) -> str:
+    """A diagnosis where the model is off; a run with what was added, where that explains it."""
+    if not result.errors:
+        return ""
+    asked = shlex.quote
+    model = "" if task.spec.name == "standard" else f" model={task.spec.name}"
+    model += effects_key(task.spec.effects)
+    where = f"input={asked(task.folder)} motor={asked(task.campaign.motor_id)}"
+    output = f" output={asked(str(task.output))}"
+    if result.held_out is None or result.held_out > 1.0:
+        return f"diagnose {where}{model}{output}"
+    if task.spec.effects:
+        return f"run input={asked(task.folder)}{model}{output}"
+    return f"review motor={asked(task.campaign.motor_id)}{output}"
 
 
 def _write_page(output: Path, result: Comparison) -> None:

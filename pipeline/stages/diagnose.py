@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 from pipeline.execution.outputs.page_links import links_of, relink
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.naming import file_stem
@@ -9,6 +11,7 @@ from pipeline.records.outcome import Outcome
 from pipeline.report.text.ladder_text import ladder_text
 from pipeline.settings import DiagnoseSettings
 from pipeline.stages.steps.criticism import Judged, Task, each_motor
+from pipeline.views.ladder import ladder_view
 
 
 def main(settings: DiagnoseSettings) -> Outcome:
@@ -44,4 +47,8 @@ def _judge(task: Task) -> Judged:
         page = render_ladder(result, task.folder, links)
         write_whole(output / "diagnosis" / f"{stem}.html", page.encode())
         relink(output, result.motor_id)
-    return Judged(ladder_text(result, task.folder), result.verdict == "insufficient", document)
+    undecided = result.verdict == "insufficient"
+    next_ = ladder_view(result, task.folder).compare
+    if next_:
+        next_ = f"{next_.removeprefix('motor-datasheets ')} output={shlex.quote(str(output))}"
+    return Judged(ladder_text(result), undecided, document, next_)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 from pipeline.criticism.library.effect_tables import effect_tables
@@ -89,20 +90,22 @@ def _version(registry: Registry, settings: ExportSettings) -> tuple[Version, tup
     if settings.revision is None and settings.version is None:
         found, last = in_force(history), history[-1]
         if found is None:
-            raise _unreleased(last)
+            raise _unreleased(last, settings)
         newer = f"note: {not_exported(last)}"
         return found, (newer,) * (last.revision > found.revision)
     wanted = Selection(settings.motor, revision=_whole(settings.revision), version=settings.version)
     version = one_of([v for v in history if wanted.takes(v)], wanted, registry.place)
     if version.status != "released":
-        raise _unreleased(version)
+        raise _unreleased(version, settings)
     return version, ()
 
 
-def _unreleased(version: Version) -> UsageError:
+def _unreleased(version: Version, settings: ExportSettings) -> UsageError:
     name = f"motor {version.motor_id!r} revision {version.revision}"
     points = "; ".join(version.open_points[:3])
-    remedy = "complete it first" if points else "`registry approve` releases it"
+    approve = f"registry approve {shlex.quote(version.motor_id)} revision={version.revision} "
+    approve += f"by=NAME why=REASON output={shlex.quote(settings.output)}"
+    remedy = "complete it first" if points else f"`{approve}` releases it"
     why = f": {points}" if points else ""
     return UsageError(f"{name} is {version.status}, not released{why}", remedy)
 

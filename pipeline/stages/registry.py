@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime, time
+from pathlib import Path
 from typing import Literal
 
 from pipeline.execution.outputs.statuses import show_decision
@@ -36,7 +38,14 @@ def main(settings: RegistrySettings) -> Outcome:
         problem = f"no action {settings.action!r}" if settings.action else "the action is missing"
         raise UsageError(f"registry: {problem}", f"one of {', '.join(ACTIONS)}")
     options = {name: str(value) for name, value in settings.registry_options.items()}
-    return ACTIONS[settings.action](Registry(settings.registry, options), settings)
+    return ACTIONS[settings.action](Registry(place_of(settings), options), settings)
+
+
+def place_of(settings: RegistrySettings) -> str:
+    """Folder or URL of the registry that the keys name."""
+    if settings.registry in ("", "auto"):
+        return (Path(settings.output) / "registry").as_posix()
+    return settings.registry
 
 
 def _list(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -47,13 +56,27 @@ def _list(registry: Registry, settings: RegistrySettings) -> Outcome:
     motors = len({version.motor_id for version in found})
     lines = [versions_table(found), ""] if found else []
     count = f"{counted(motors, 'motor')}, {counted(len(found), 'version')}"
-    return Outcome(text="\n".join([*lines, count]), result=found)
+    next_ = f"registry show {shlex.quote(found[0].motor_id)}{_where(settings)}" if found else ""
+    return Outcome(text="\n".join([*lines, count]), result=found, next=next_)
 
 
 def _show(registry: Registry, settings: RegistrySettings) -> Outcome:
     version = _version(registry, settings, newest=True)
     (sheet,) = registry.datasheets([version])
-    return Outcome(text=datasheet_text(version, sheet), result=sheet.document())
+    text, motor = datasheet_text(version, sheet), shlex.quote(version.motor_id)
+    next_ = f"registry approve {motor} revision={version.revision} by=NAME why=REASON"
+    if version.status == "released":
+        next_ = f"export json {motor} revision={version.revision}"
+    elif version.status != "provisional":
+        return Outcome(text=text, result=sheet.document())
+    return Outcome(text=text, result=sheet.document(), next=next_ + _where(settings))
+
+
+def _where(settings: RegistrySettings) -> str:
+    """The keys that name the same registry in another command; none where they are the default's."""
+    places = (("output", settings.output), ("registry", settings.registry))
+    usual = {"output": RegistrySettings().output, "registry": "auto"}
+    return "".join(f" {name}={shlex.quote(is_)}" for name, is_ in places if is_ != usual[name])
 
 
 def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -97,9 +120,8 @@ def _verify(registry: Registry, settings: RegistrySettings) -> Outcome:
     faults = counted(len(found.faults), "mismatch")
     verdict = faults if found.faults else "all of it as published"
     errors = (*(f"mismatch: {line}" for line in found.faults), *(f"note: {n}" for n in found.notes))
-    return Outcome(
-        1 if found.faults else 0, f"{settings.registry}: {count}, {verdict}", errors, result=found
-    )
+    text = f"{place_of(settings)}: {count}, {verdict}"
+    return Outcome(1 if found.faults else 0, text, errors, result=found)
 
 
 def _approve(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -126,7 +148,14 @@ def _decide(
     except PipelineError as error:
         failed = f"error: decided, but not shown: {error}; `run` again shows it"
         return Outcome(error.exit_code, "\n".join(lines), (failed,))
-    return Outcome(text="\n".join(lines), result=version)
+    motor = shlex.quote(version.motor_id)
+    return Outcome(
+        text="\n".join(lines),
+        result=version,
+        next=f"export json {motor} revision={version.revision}{_where(settings)}"
+        if version.status == "released"
+        else "",
+    )
 
 
 def _tag(registry: Registry, settings: RegistrySettings) -> Outcome:

@@ -173,6 +173,7 @@ def _run(
             *(f"error: {e}" for e in died),
         ),
         watch.table(),
+        next=outcome.next,
     )
 
 

@@ -131,28 +131,32 @@ def pooled(errors: Sequence[SignalError], name: str) -> float:
 
 
 def _signals(result: Comparison) -> list[ErrorRow]:
+    """Equations before trajectories, the signal farthest over its noise floor first."""
     rows = []
     for signal, kind in dict.fromkeys((e.signal, e.kind) for e in result.errors):
         own = [e for e in result.errors if (e.signal, e.kind) == (signal, kind)]
         old = [e for e in result.before if (e.signal, e.kind) == (signal, kind)]
         worst = max(own, key=ratio_of)
         rows.append(
-            ErrorRow(
-                signal,
-                kind,
-                quantity(pooled(own, "rmse"), worst.unit, 3),
-                quantity(pooled(own, "noise_floor"), worst.unit, 3),
-                _pooled_ratio(own),
-                _pooled_ratio(old) if old else "",
-                f"{sum(e.split == 'held_out' for e in own)} of {len(own)} held out",
-                f"{worst.capture} ({significant(ratio_of(worst), 2)})",
+            (
+                (kind != "equation", -_pooled_ratio(own)),
+                ErrorRow(
+                    signal,
+                    kind,
+                    quantity(pooled(own, "rmse"), worst.unit, 3),
+                    quantity(pooled(own, "noise_floor"), worst.unit, 3),
+                    significant(_pooled_ratio(own), 2),
+                    significant(_pooled_ratio(old), 2) if old else "",
+                    f"{sum(e.split == 'held_out' for e in own)} of {len(own)} held out",
+                    f"{worst.capture} ({significant(ratio_of(worst), 2)})",
+                ),
             )
         )
-    return rows
+    return [row for _, row in sorted(rows, key=lambda one: one[0])]
 
 
-def _pooled_ratio(errors: Sequence[SignalError]) -> str:
-    return significant(pooled(errors, "rmse") / max(pooled(errors, "noise_floor"), 1e-300), 2)
+def _pooled_ratio(errors: Sequence[SignalError]) -> float:
+    return pooled(errors, "rmse") / max(pooled(errors, "noise_floor"), 1e-300)
 
 
 def _capture(one: SignalError) -> CaptureRow:

@@ -156,16 +156,40 @@ def kind_of_reason(sheet: Datasheet, reason: str) -> str:
     return f"{model.name} misses {quantity_words(model.worst.signal)}{order}"
 
 
+def lacking_alike(datasheets: Sequence[Datasheet]) -> list[list[Datasheet]]:
+    """The motors whose model was tested and not passed, by what it lacks; the largest group first,
+    in it the motor with the largest error.
+    """
+    groups: dict[str, list[Datasheet]] = {}
+    for sheet in datasheets:
+        model = sheet.model
+        if model is not None and model.tested and not model.passed:
+            kind = kind_of_reason(sheet, f"{MODEL_REASON}{model.headline()}")
+            groups.setdefault(kind, []).append(sheet)
+    ordered = sorted(groups.values(), key=lambda group: -len(group))
+    return [sorted(group, key=_error, reverse=True) for group in ordered]
+
+
+def _error(sheet: Datasheet) -> float:
+    return 0.0 if sheet.model is None else sheet.model.held_out or sheet.model.residual or 0.0
+
+
 def floors_of(reason: Reason, rows: Sequence[MotorRow]) -> str:
-    """`252 to 364 noise floors` where a reason is a model's; empty for any other."""
+    """The error of models that lack the same effects, or how far the same signal is over its floor;
+    empty for a reason that is not a model's.
+    """
     own = [row for row in rows if row.sheet.motor_id in reason.members]
-    sizes = [
-        row.sheet.model.worst.floors
+    models = [
+        row.sheet.model
         for row in own
-        if row.sheet.model is not None
-        and row.sheet.model.worst is not None
-        and reason.text.startswith(row.sheet.model.name)
+        if row.sheet.model is not None and reason.text.startswith(row.sheet.model.name)
     ]
-    if len(sizes) < len(own):
+    named = all(model.missing for model in models)
+    sizes = [
+        model.held_out if named else model.worst.floors if model.worst else None for model in models
+    ]
+    known = [number(size) for size in sorted(size for size in sizes if size is not None)]
+    if not own or len(known) < len(own):
         return ""
-    return f"{number(min(sizes))} to {number(max(sizes))} noise floors"
+    span = " to ".join(dict.fromkeys((known[0], known[-1])))
+    return f"{'with an error of' if named else 'by'} {span} noise floors"

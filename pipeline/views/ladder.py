@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import MINUS, number_text, quantity, significant
 from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Signature
-from pipeline.records.model_verdict import number
+from pipeline.records.model_verdict import effects_key, number
 from pipeline.views.constants import sentence
 from pipeline.views.names import quantity_words
 
@@ -84,9 +84,8 @@ def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
     signals = shown_signals(result)
     ranked = {one.effect: one for one in result.ranking}
     words = f"input={shlex.quote(folder)} motor={shlex.quote(result.motor_id)}"
-    effects = ",".join((*result.asked, *result.missing))
     model = "" if result.model == "standard" else f" model={result.model}"
-    model += f" model.effects=[{effects}]"
+    model += effects_key((*result.asked, *result.missing))
     quiet = result.verdict in ("adequate", "missing")
     return LadderView(
         TONES.get(result.verdict, "not_evaluated"),

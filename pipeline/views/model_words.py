@@ -21,7 +21,7 @@ OLD = ModelVerdict("not_tested", note="the datasheet is older than the residual 
 
 @dataclass(frozen=True, slots=True)
 class ModelWords:
-    """Verdict and residual in `short`, and each by itself; one sentence without a full stop; what
+    """Verdict and error in `short`, and each by itself; one sentence without a full stop; what
     the two numbers of noise floors are `over`, where they differ; the
     command that shows more and the one that adds what was found (empty where there is none);
     `rows` of name and text; a number to `sort` by.
@@ -44,7 +44,7 @@ def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER
     """What the residual test of a motor came to; None is a datasheet of before there was one."""
     model = model or OLD
     verdict = " ".join((model.verdict.replace("_", " "), *_names(model)))
-    floors = "" if model.residual is None else f"worst {number(model.residual)} floors"
+    floors = f"error {model.errors} floors" if model.errors else ""
     return ModelWords(
         short=", ".join(filter(None, (verdict, floors))),
         verdict=verdict,
@@ -55,7 +55,7 @@ def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER
         command=model.command(motor_id, folder) if model.tested and not model.passed else "",
         add=model.adding(folder),
         rows=tuple(_rows(model)),
-        sort=repr(model.residual or 0.0),
+        sort=repr(model.held_out or 0.0),
         passed=model.passed,
     )
 
@@ -65,8 +65,8 @@ def _over(model: ModelVerdict) -> str:
     if model.residual is None or model.held_out is None or not model.missing:
         return ""
     return (
-        f"{number(model.held_out)} floors are over all signals of captures held out; the worst "
-        f"signal alone is at {number(model.residual)}."
+        f"{number(model.held_out)} floors are over all signals of captures held out; one signal "
+        f"alone reaches {number(model.residual)}."
     )
 
 
@@ -83,11 +83,11 @@ def _rows(model: ModelVerdict) -> list[tuple[str, str]]:
     if model.residual is None or model.held_out is None:
         return []
     rows = [
-        ("worst signal alone", f"{number(model.residual)} noise floors"),
-        ("all signals of captures held out", f"{number(model.held_out)} noise floors"),
+        ("error, all signals of captures held out", f"{number(model.held_out)} noise floors"),
     ]
     if model.held_out_with is not None:
         rows.append(("the same with what was found", f"{number(model.held_out_with)} noise floors"))
+    rows.append(("largest residual of one signal", f"{number(model.residual)} noise floors"))
     if model.worst is not None:
         size = quantity(model.worst.size, model.worst.unit, 2)
         rows.append(("where", f"{model.worst.description}, {size} beyond the noise"))

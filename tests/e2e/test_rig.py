@@ -112,7 +112,7 @@ def test_a_motor_with_hidden_effects_names_them_with_their_sizes(
     (said,) = [one for one in why if one.startswith("model: ")]
     size = re.search(r"cogging torque of ([\d.]+) ± [\d.]+ mN·m", said)
     assert size is not None and float(size[1]) == pytest.approx(6.0, rel=0.002)
-    assert "`run input=FOLDER model.effects=[dead_time,cogging]` adds them" in said
+    assert "`run input=FOLDER 'model.effects=[dead_time,cogging]'` adds them" in said
 
 
 @pytest.mark.slow

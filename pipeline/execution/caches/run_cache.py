@@ -147,7 +147,9 @@ class RunCache:
             return None
         if not all(self._outputs.holds(name, sha256) for name, sha256 in entry["files"]):
             return None
-        outcome = Outcome(entry["exit_code"], entry["text"], tuple(entry["errors"]))
+        outcome = Outcome(
+            entry["exit_code"], entry["text"], tuple(entry["errors"]), next=entry.get("next", "")
+        )
         contents = (((motor, version), sha256) for motor, version, sha256 in entry["contents"])
         return Batch(outcome, tuple(contents))
 
@@ -161,6 +163,7 @@ class RunCache:
             "exit_code": batch.outcome.exit_code,
             "text": batch.outcome.text,
             "errors": list(batch.outcome.errors),
+            "next": batch.outcome.next,
             "files": [list(file) for file in files],
             "contents": [[*key, sha256] for key, sha256 in batch.contents],
         }

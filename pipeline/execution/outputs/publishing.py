@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shlex
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from pipeline.records.finding import Finding, lines_of
 from pipeline.records.naming import counted, printable
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.text.console import nothing_usable, summary
+from pipeline.report.text.next_command import next_command
 from pipeline.settings import RunSettings
 from pipeline.views.constants import KEY_CONSTANTS
 
@@ -229,14 +231,25 @@ def outcome_of(
         lines = (*lines, nothing_usable(INPUT, refused=refused))
     if found.note:
         lines = (*lines, f"note: {found.note}")
-    text = summary(datasheets, findings, OUTPUT, report=report, folder=INPUT, statuses=statuses)
-    return Outcome(code, text, lines)
+    text = summary(datasheets, findings, OUTPUT, report=report, statuses=statuses)
+    return Outcome(code, text, lines, next=next_command(datasheets, INPUT, OUTPUT, statuses))
 
 
 def with_folder_names(outcome: Outcome, settings: RunSettings) -> Outcome:
-    """The outcome with the names of the folders, which the cache does not hold."""
+    """The outcome with the names of the folders, which the cache does not hold.
+
+    In a command a name stands quoted where a shell asks for it.
+    """
 
     def name(text: str) -> str:
-        return text.replace(INPUT, settings.input).replace(OUTPUT, settings.output)
+        for placeholder, folder in ((INPUT, settings.input), (OUTPUT, settings.output)):
+            text = text.replace(shlex.quote(placeholder), shlex.quote(folder))
+            text = text.replace(placeholder, folder)
+        return text
 
-    return Outcome(outcome.exit_code, name(outcome.text), tuple(map(name, outcome.errors)))
+    return replace(
+        outcome,
+        text=name(outcome.text),
+        errors=tuple(map(name, outcome.errors)),
+        next=name(outcome.next),
+    )

@@ -27,7 +27,7 @@ def comparison_text(result: Comparison) -> str:
 
 def _errors(view: ComparisonView) -> list[str]:
     rows: list[Sequence[str]] = [
-        ("  error", "rms", "noise floor", "ratio", "before", "captures", "worst in")
+        ("  error", "rms", "noise floor", "ratio", "before", "held out", "worst in")
     ]
     rows += [
         (
@@ -36,14 +36,14 @@ def _errors(view: ComparisonView) -> list[str]:
             row.floor,
             row.ratio,
             row.before or NONE,
-            row.held_out,
+            row.held_out.removesuffix(" held out"),
             row.worst,
         )
         for row in view.signals
     ]
     if not any(row.before for row in view.signals):
         rows = [(*row[:4], *row[5:]) for row in rows]
-    return blocks(rows, right=range(1, len(rows[0]) - 2))
+    return blocks(rows, right=range(1, len(rows[0]) - 1))
 
 
 def _moves(view: ComparisonView) -> list[str]:

@@ -9,11 +9,13 @@ from pipeline.records.current_status import CurrentStatus
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted, printable
-from pipeline.views.fleet import Column, FleetView, MotorRow, fleet_view
+from pipeline.views.fleet import Column, FleetView, MotorRow, fleet_view, lacking_alike
 from pipeline.views.model_words import model_words
 from pipeline.views.status_text import status_lines
 from pipeline.views.table_text import NONE, blocks
 
+MOST_GROUPS = 5
+"""So many lines say what models lack."""
 FEW = 20
 """So many motors are shown with all their key constants; of more, those that fit one table."""
 LONGEST = 20
@@ -26,13 +28,11 @@ def summary(
     output: str,
     *,
     report: bool,
-    folder: str = "FOLDER",
     statuses: Mapping[str, CurrentStatus] | None = None,
 ) -> str:
     """The text for a terminal: a table of motors, the failed checks, the counts, the way in.
 
-    `statuses` are the current ones, by motor; what a datasheet says of itself without. `folder` is
-    where the captures lie.
+    `statuses` are the current ones, by motor; what a datasheet says of itself without.
     """
     view = fleet_view(datasheets, statuses)
     lines: list[str] = []
@@ -45,7 +45,7 @@ def summary(
             for c in sheet.checks
             if c.status in ("fail", "marginal")
         ]
-    lines += _unexplained(datasheets, folder)
+    lines += _unexplained(datasheets)
     lines += [
         f"{printable(row.sheet.motor_id)}: {printable(line)}"
         for row in view.rows
@@ -66,22 +66,17 @@ def summary(
     return "\n".join(lines)
 
 
-def _unexplained(datasheets: Sequence[Datasheet], folder: str) -> list[str]:
-    """A line on the motors whose model misses something, with the one it misses most of."""
-    unexplained = [
-        s for s in datasheets if s.model is not None and s.model.tested and not s.model.passed
-    ]
-    if not unexplained:
-        return []
-    worst = max(unexplained, key=lambda sheet: (sheet.model and sheet.model.residual) or 0.0)
-    words = model_words(worst.model, worst.motor_id, folder)
-    who = printable(worst.motor_id)
-    if len(unexplained) > 1:
-        who = f"{len(unexplained)} motors are not explained down to the noise, {who} least"
-    text, does = (words.add, "adds what is missing") if words.add else (words.command, "tells more")
-    # the folder's name is put in last and may stand for another until then
-    command = folder.join(printable(part) for part in text.split(folder))
-    return [f"{who}: {printable(words.sentence)}; `{command}` {does}"]
+def _unexplained(datasheets: Sequence[Datasheet]) -> list[str]:
+    """A line for all motors whose models lack the same, with the one that lacks most of it."""
+    lines = []
+    for group in lacking_alike(datasheets):
+        who = printable(group[0].motor_id)
+        if len(group) > 1:
+            who = f"{counted(len(group), 'motor')}, {who} most"
+        sentence = model_words(group[0].model, group[0].motor_id).sentence
+        lines.append(f"{who}: {printable(sentence)}")
+    more = len(lines) - MOST_GROUPS
+    return lines if more <= 0 else [*lines[:MOST_GROUPS], f"{more} more on the page"]
 
 
 def nothing_usable(folder: str, *, refused: bool) -> str:
@@ -97,7 +92,13 @@ def _tables(view: FleetView) -> list[str]:
     of many motors one table of values alone.
     """
     head = ["motor", "lot", "status", "model", *map(_heading, view.columns)]
-    units = ["", "", "", "[worst floors]", *(f"[{c.unit}]" if c.unit else "" for c in view.columns)]
+    units = [
+        "",
+        "",
+        "",
+        "[error, floors]",
+        *(f"[{c.unit}]" if c.unit else "" for c in view.columns),
+    ]
     few = len(view.rows) <= FEW
     lines = [line for row in view.rows for line in (_row(row), _spreads(row))[: 2 if few else 1]]
     found = blocks([head, units, *lines], right=range(3, len(head)))
@@ -116,7 +117,7 @@ def _row(row: MotorRow) -> list[str]:
         _short(printable(sheet.motor_id)),
         _short(printable(sheet.lot or NONE)),
         row.current.status,
-        row.model.short.replace("worst ", "").removesuffix(" floors"),
+        row.model.short.replace("error ", "").removesuffix(" floors"),
         *(cell.reading.value if cell.reading else NONE for cell in row.cells),
     ]
 

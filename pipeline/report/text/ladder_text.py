@@ -1,4 +1,4 @@
-"""What `diagnose` prints: what is missing with sizes, the ladder, and what to do next."""
+"""What `diagnose` prints: what is missing with sizes, the ladder, and what else it could be."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pipeline.views.ladder import ladder_view
 from pipeline.views.notes import shown_and_folded
 
 
-def ladder_text(result: Diagnosis, folder: str = "FOLDER") -> str:
-    """Verdict, ladder and what to do next in a few lines; the captures lie in `folder`."""
-    view = ladder_view(result, folder)
+def ladder_text(result: Diagnosis) -> str:
+    """Verdict, ladder and doubts in a few lines."""
+    view = ladder_view(result)
     missing = ", ".join(result.missing)
     text_lines = [f"{result.motor_id}: {result.verdict}" + (f": {missing}" if missing else "")]
     text_lines.append(f"  {view.headline}")
@@ -26,6 +26,4 @@ def ladder_text(result: Diagnosis, folder: str = "FOLDER") -> str:
             text_lines.append(f"  {unknown.expression}")
             text_lines.append(f"  an effect to start from: diagnosis/effects/{unknown.effect}.py")
     text_lines += [f"  {note}" for note in shown_and_folded(result)[0]]
-    if view.compare:
-        text_lines.append(f"next: {view.compare}")
     return "\n".join(text_lines)

@@ -29,12 +29,13 @@ from pipeline.stages.steps.campaigns import campaigns, outcome_of
 @dataclass(frozen=True, slots=True)
 class Judged:
     """One motor's result: the text to print, whether the captures were too few to decide, the
-    document that was written.
+    document that was written, and the command that follows, without the program.
     """
 
     text: str
     undecided: bool
     document: Mapping[str, Any]
+    next: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,4 +96,5 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str)
         timings=watch.table(),
         result=[result.document for result in results],
         wrote=f"{output}/{folder}" if results else "",
+        next=next((result.next for result in results if result.next), ""),
     )

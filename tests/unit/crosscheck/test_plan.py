@@ -63,7 +63,7 @@ def test_the_plan_follows_what_the_model_lacks() -> None:
     ]
     first, second = plan.model
     assert "lacks friction below 7 rad/s; with it, the error falls from 76 to 0.5" in first
-    assert first.endswith("`run input=FOLDER model.effects=[stribeck]` adds it")
+    assert first.endswith("`run input=FOLDER 'model.effects=[stribeck]'` adds it")
     assert second == "stribeck could as well be presliding: reverse it slowly"
     assert plan.text().splitlines()[0] == f"m-1: {first}"
     passed = replace(nothing_else, model=ModelVerdict("adequate", residual=1.0, held_out=0.5))

@@ -54,7 +54,8 @@ def test_the_page_leads_with_words_the_command_and_what_shows_it() -> None:
         html.index(words)
         for words in (
             "Voltage lost in the inverter, 179.90 ± 0.24 mV a phase. With it, the error falls",
-            "motor-datasheets compare input=captures motor=joint-P1 model.effects=[dead_time]",
+            "motor-datasheets compare input=captures motor=joint-P1 "
+            "&#39;model.effects=[dead_time]&#39;",
             "could as well be <b>phase_imbalance</b>",
             "v_q over i_q, drive_0.mcap",
             "<summary>Formula</summary><p>each phase loses V; offset at small current",
@@ -260,7 +261,7 @@ def test_the_comparison_in_words_names_errors_places_and_moves() -> None:
     rows = text.splitlines()
     assert "held-out error 3.5" in rows[0]
     assert "without what was added: 20" in text
-    assert re.search(r"vq_v +35.4 mV +10.0 mV +3.5 +1 of 2 held out +b.mcap \(4.0\)", text)
+    assert re.search(r"vq_v +35.4 mV +10.0 mV +3.5 +1 of 2 +b.mcap \(4.0\)", text)
     assert "iq_a, on its own" in text
     assert "vq_v depends on iq_a (80 %); worst at 100 to 200 rad/s, -15 to -5 A: −210 mV" in text
     assert "vd_v depends" not in text, "it is below its floor"

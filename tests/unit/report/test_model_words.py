@@ -31,7 +31,7 @@ def sheet_with(datasheet: Datasheet, model: ModelVerdict | None, motor_id: str =
 @pytest.mark.parametrize(
     ("model", "said"),
     [
-        (OVER, "missing, worst 76 floors"),
+        (OVER, "missing, error 31 floors"),
         (None, "older than the residual test"),
         (ModelVerdict("not_tested", note="residual_test=false"), "residual_test=false"),
         (ModelVerdict("insufficient", note="record a torque map"), "Record a torque map"),
@@ -49,7 +49,7 @@ def test_nothing_was_found_wrong_is_not_said(
 def test_nothing_was_found_wrong_is_said_of_a_test_that_was_passed(datasheet: Datasheet) -> None:
     sheet = sheet_with(datasheet, SOUND)
     assert WRONG in render_motor(sheet, (), ())
-    assert "adequate, worst 1.1 floors" in render_motor(sheet, (), ())
+    assert "adequate, error 0.5 floors" in render_motor(sheet, (), ())
     doubted = replace(sheet, checks=datasheet.checks)
     assert WRONG not in render_motor(doubted, (), ()), "a check failed"
 
@@ -73,30 +73,26 @@ def test_above_the_fold_the_model_is_said_once_and_both_numbers_are_told_apart(
     assert fold.count("cogging torque of 7 mN·m") == 1
     assert '<a href="#model">model: missing cogging</a>' in fold
     assert "31 floors are over all signals of captures held out" in fold
-    assert "the worst signal alone is at 76." in fold
+    assert "one signal alone reaches 76." in fold
 
 
 def test_the_terminal_names_the_one_that_misses_most(datasheet: Datasheet) -> None:
-    less = replace(OVER, residual=20.0, worst=replace(WORST, floors=20.0))
+    less = replace(OVER, held_out=20.0)
     sheets = [sheet_with(datasheet, less, "one"), sheet_with(datasheet, OVER, "two")]
     text = summary([*sheets, sheet_with(datasheet, SOUND, "three")], (), "out", report=False)
-    assert "2 motors are not explained down to the noise, two least" in text
-    assert "`diagnose input=FOLDER motor=two` tells more" in text
-    # a stand-in for the folder, which the stage replaces, goes through as it is
-    kept = summary(sheets, (), "out", report=False, folder="\ue000")
-    assert "`diagnose input='\ue000' motor=two` tells more" in kept
+    assert "2 motors, two most: The standard model misses vd_v of drive_0.mcap" in text
     rows = {line.split()[0]: line.split()[3:5] for line in text.splitlines()[2:8:2]}
     assert rows == {
         "one": ["missing,", "20"],
-        "three": ["adequate,", "1.1"],
-        "two": ["missing,", "76"],
+        "three": ["adequate,", "0.5"],
+        "two": ["missing,", "31"],
     }
 
 
 def test_the_table_of_motors_shows_verdict_and_floors(datasheet: Datasheet) -> None:
     html = render_fleet([sheet_with(datasheet, OVER), sheet_with(datasheet, None, "old")], ())
     assert '<span class="badge marginal">missing</span>' in html
-    assert "76 floors" in html
+    assert "error 31 floors" in html
     assert '<span class="badge not_evaluated">not tested</span>' in html
 
 

@@ -53,9 +53,10 @@ def test_list(place: str, capsys: pytest.CaptureFixture[str]) -> None:
         ["joint/7\\x1b[31m", "2", "provisional"],
         ["joint/7\\x1b[31m", "3", "refused"],
     ]
-    assert lines[-1] == "2 motors, 4 versions"
+    assert lines[-2] == "2 motors, 4 versions"
+    assert lines[-1].endswith(f"registry show 00123 registry={place}")
     assert "\x1b" not in out
-    assert told(capsys, place, "list", "00123")[1].splitlines()[-1] == "1 motor, 1 version"
+    assert told(capsys, place, "list", "00123")[1].splitlines()[-2] == "1 motor, 1 version"
 
 
 def test_show_takes_the_newest_or_the_one_named(

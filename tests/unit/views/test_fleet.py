@@ -14,6 +14,7 @@ from pipeline.records.estimate import not_identifiable
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 from pipeline.report.pages.fleet_page import render_fleet
 from pipeline.report.text.console import summary
+from pipeline.report.text.next_command import next_command
 from pipeline.views.fleet import fleet_view, floors_of
 from pipeline.views.table_text import blocks, table
 from pipeline.views.tables import constants_frame, fleet_files
@@ -44,7 +45,7 @@ def test_equal_reasons_are_told_once_with_their_motors_and_sizes() -> None:
     ]
     assert [floors_of(reason, view.rows) for reason in view.reasons] == [
         "",
-        "252 to 364 noise floors",
+        "by 252 to 364 noise floors",
     ]
     rows = {row.sheet.motor_id: row for row in view.rows}
     assert (rows["a"].why, rows["a"].shared) == ("ld_h is not measured", (1, 2))
@@ -157,7 +158,25 @@ def test_motors_that_lack_the_same_effect_have_one_reason() -> None:
     assert [(one.text, one.members) for one in view.reasons] == [
         ("the standard model lacks cogging", ("a", "b"))
     ]
-    assert [row.model.short for row in view.rows] == ["missing cogging, worst 76 floors"] * 2
-    text = summary([lacking("a", "7 mN·m")], (), "out", report=False, folder="in")
+    assert [row.model.short for row in view.rows] == ["missing cogging, error 15 → 0.6 floors"] * 2
+    assert floors_of(view.reasons[0], view.rows) == "with an error of 15 noise floors"
+    alike = [lacking("a", "7 mN·m"), lacking("b", "9 mN·m")]
+    text = summary(alike, (), "out", report=False)
+    assert "2 motors, a most: The standard model lacks cogging torque of 7 mN·m" in text
     assert "with it, the error falls from 15 to 0.6 noise floors" in text
-    assert "`run input=in model.effects=[cogging]` adds what is missing" in text
+    assert next_command(alike, "in", "out") == "run input=in 'model.effects=[cogging]' output=out"
+
+
+def test_the_next_command_is_what_most_motors_need() -> None:
+    """Effects before a diagnosis before a decision; one that a check has refused comes last."""
+    sound = ModelVerdict("adequate", held_out=0.5, residual=1.0)
+    fine = replace(make_datasheet("fine"), model=sound)
+    unclear = replace(make_datasheet("un clear"), model=misses(76.0, "un clear"))
+    refused = replace(unclear, motor_id="refused", status="refused")
+    diagnosis = "diagnose input=in motor='un clear' output=out"
+    assert next_command([fine, unclear, refused], "in", "out") == diagnosis
+    assert next_command([fine, refused], "in", "out") == "registry show fine output=out"
+    released = replace(fine, status="released")
+    assert next_command([released, refused], "in", "out") == "export json fine output=out"
+    assert next_command([refused], "in", "out") == "plan output=out"
+    assert next_command([], "in", "out") == ""

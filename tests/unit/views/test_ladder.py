@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
-
 from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Separation
 from pipeline.report.text.ladder_text import ladder_text
 from pipeline.views.ladder import headline, ladder_view, mapped_signals, shown_signals
@@ -52,7 +50,7 @@ def test_other_verdicts_in_words() -> None:
 def test_the_commands_name_folder_motor_and_all_effects() -> None:
     asked = replace(two(), asked=("cogging", "-coulomb_friction"))
     view = ladder_view(asked, "my captures")
-    effects = "model.effects=[cogging,-coulomb_friction,angle_eccentricity,stribeck]"
+    effects = "'model.effects=[cogging,-coulomb_friction,angle_eccentricity,stribeck]'"
     assert view.compare == (
         f"motor-datasheets compare input='my captures' motor=joint-P1 {effects}"
     )
@@ -93,6 +91,5 @@ def test_the_signal_farthest_over_its_floor_comes_first_and_one_without_map_last
     assert shown_signals(replace(make_diagnosis(), ladder=())) == ()
 
 
-@pytest.mark.parametrize("words", ["Encoder disc off-centre", "next: motor-datasheets compare"])
-def test_a_terminal_says_the_same(words: str) -> None:
-    assert words in ladder_text(two(), "captures")
+def test_a_terminal_says_the_same() -> None:
+    assert "Encoder disc off-centre" in ladder_text(two())

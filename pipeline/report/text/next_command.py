@@ -1,0 +1,55 @@
+"""The command that a run's user would sensibly give next."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+
+from pipeline.records.current_status import CurrentStatus
+from pipeline.records.datasheet import Datasheet
+from pipeline.views.fleet import lacking_alike
+
+
+def next_command(
+    datasheets: Sequence[Datasheet],
+    folder: str,
+    output: str,
+    statuses: Mapping[str, CurrentStatus] | None = None,
+) -> str:
+    """What most motors need: the missing effects added, a diagnosis, an approval, an export.
+
+    Parameters
+    ----------
+    datasheets
+        Of the run.
+    folder
+        Where the captures lie.
+    output
+        Of the run.
+    statuses
+        The current ones by motor; what a datasheet says of itself without.
+
+    Returns
+    -------
+    str
+        Command and keys without the program; empty where no datasheet came out.
+
+    """
+    where = f" output={shlex.quote(output)}"
+    states = {
+        sheet.motor_id: sheet.status
+        if statuses is None or sheet.motor_id not in statuses
+        else statuses[sheet.motor_id].status
+        for sheet in datasheets
+    }
+    # a motor that awaits nothing but a person goes before one that a check has refused
+    for group in lacking_alike(datasheets):
+        useful = [sheet for sheet in group if states[sheet.motor_id] != "refused"]
+        if useful and (model := useful[0].model) is not None:
+            found = model.adding(folder) or model.command(useful[0].motor_id, folder)
+            return found + where
+    for status, command in (("provisional", "registry show {}"), ("released", "export json {}")):
+        for motor_id, state in states.items():
+            if state == status:
+                return command.format(shlex.quote(motor_id)) + where
+    return f"plan{where}" if datasheets else ""
