@@ -73,7 +73,7 @@ def _show(registry: Registry, settings: RegistrySettings) -> Outcome:
 
 
 def _where(settings: RegistrySettings) -> str:
-    """The keys that name the same registry in another command; none where they are the default's."""
+    """The keys that name the same registry in another command, but for those of the default."""
     places = (("output", settings.output), ("registry", settings.registry))
     usual = {"output": RegistrySettings().output, "registry": "auto"}
     return "".join(f" {name}={shlex.quote(is_)}" for name, is_ in places if is_ != usual[name])
