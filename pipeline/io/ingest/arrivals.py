@@ -19,8 +19,20 @@ Snapshot = frozenset[tuple[str, int, int, int]]
 def snapshot(folder: Path) -> Snapshot:
     """Every file below a folder as it lies there now; hidden ones are left out, as in a run.
 
-    Raises:
-        MachineError: The folder itself is not there any more.
+    Parameters
+    ----------
+    folder
+        The watched folder.
+
+    Returns
+    -------
+    frozenset
+        Path, size, time of change and inode of each file.
+
+    Raises
+    ------
+    MachineError
+        The folder itself is not there any more.
 
     """
     if not folder.is_dir():

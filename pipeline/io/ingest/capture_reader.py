@@ -28,7 +28,28 @@ __all__ = ["Entry", "Survey", "read_capture", "survey"]
 
 
 def read_capture(folder: Path, entry: Entry) -> Capture:
-    """Decode one capture; raises CaptureError with what is wrong, and MachineError for the disk."""
+    """Decodes one capture.
+
+    Parameters
+    ----------
+    folder
+        The input folder.
+    entry
+        What `survey` found of the file.
+
+    Returns
+    -------
+    Capture
+        Columns by their glossary names, in SI units.
+
+    Raises
+    ------
+    CaptureError
+        The file is not what it should be; the message says where.
+    MachineError
+        The disk failed.
+
+    """
     with refusing():
         return _read_capture(folder, entry)
 
@@ -97,6 +118,21 @@ def _sorted(frames: list[pl.DataFrame]) -> list[pl.DataFrame]:
 
 
 def wanted(source: SourceMap | None, name: str) -> bool:
+    """Whether a column of a file is needed.
+
+    Parameters
+    ----------
+    source
+        The source map that it is read by; None for the contract's own form.
+    name
+        Name of the column in the file.
+
+    Returns
+    -------
+    bool
+        Of the contract's form, every column of the glossary, in another unit too.
+
+    """
     if source is None:
         return last_part(name) in COLUMNS or foreign_unit(name) is not None
     return any(is_field(part.field, name) for part in source.fields)

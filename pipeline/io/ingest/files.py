@@ -37,17 +37,45 @@ class Listing:
 
 
 def input_folder(name: str) -> Path:
-    """The folder of captures; raises UsageError where it is none."""
+    """The folder of captures.
+
+    Parameters
+    ----------
+    name
+        As the user wrote it.
+
+    Raises
+    ------
+    UsageError
+        It is no folder.
+
+    """
     if not Path(name).is_dir():
         raise UsageError(f"input={name} is no folder", "name the folder of captures")
     return Path(name)
 
 
 def list_files(folder: Path) -> Listing:
-    """All regular files below a folder; hidden ones are left out.
+    """All regular files below a folder.
 
-    A folder below it that cannot be listed is a finding. Raises UsageError where the folder is
-    not there, MachineError where it cannot be listed itself.
+    Parameters
+    ----------
+    folder
+        The folder; hidden files and folders in it are left out.
+
+    Returns
+    -------
+    Listing
+        Relative paths, sorted. What cannot be used, such as a link that leaves the folder or a
+        subfolder that cannot be listed, is a finding.
+
+    Raises
+    ------
+    UsageError
+        There is no such folder.
+    MachineError
+        The folder itself cannot be listed.
+
     """
     if not folder.is_dir():
         raise UsageError(f"there is no folder {folder}", "give input= a folder of captures")
@@ -118,7 +146,19 @@ def _fault(path: Path, root: Path, relative: str) -> CaptureError | None:
 
 
 def size_bytes(path: Path) -> int:
-    """The size of a file [bytes]; 0 where it is gone, which reading it will say."""
+    """The size of a file.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    int
+        In bytes; 0 where it is gone, which reading it will report.
+
+    """
     try:
         return path.stat().st_size
     except OSError:
@@ -126,7 +166,21 @@ def size_bytes(path: Path) -> int:
 
 
 def read_whole(path: Path, most_bytes: int = MAX_FILE_BYTES) -> bytes:
-    """All bytes of a regular file; raises CaptureError for anything else or for too many."""
+    """All bytes of a regular file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    most_bytes
+        Largest size that is read.
+
+    Raises
+    ------
+    CaptureError
+        It is no regular file, is larger, or cannot be read.
+
+    """
     with _opened(path) as stream:
         size = os.fstat(stream.fileno()).st_size
         if size > most_bytes:
@@ -139,7 +193,21 @@ def read_whole(path: Path, most_bytes: int = MAX_FILE_BYTES) -> bytes:
 
 
 def read_head(path: Path, count: int) -> bytes:
-    """The first bytes of a regular file; raises CaptureError for anything else."""
+    """The first bytes of a regular file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    count
+        How many at most.
+
+    Raises
+    ------
+    CaptureError
+        It is no regular file, or cannot be read.
+
+    """
     with _opened(path) as stream:
         try:
             return stream.read(count)

@@ -66,11 +66,35 @@ class ReadLimits:
             raise UsageError(message, "1024 is usual")
 
     def time_s(self, size_bytes: int) -> float:
-        """Longest time for a file of that size [s]."""
+        """Longest time that reading a file may take.
+
+        Parameters
+        ----------
+        size_bytes
+            Size of the file.
+
+        Returns
+        -------
+        float
+            `seconds`, and one second a MB [s].
+
+        """
         return self.seconds + size_bytes / _MB
 
     def memory_bytes(self, size_bytes: int) -> int:
-        """Most memory for a file of that size [bytes]."""
+        """Most memory that reading a file may take.
+
+        Parameters
+        ----------
+        size_bytes
+            Size of the file.
+
+        Returns
+        -------
+        int
+            `memory_mb`, and 16 times the size [bytes].
+
+        """
         return self.memory_mb * _MB + 16 * size_bytes
 
 
@@ -86,7 +110,15 @@ _PROGRESS = _Progress()
 
 @contextmanager
 def progress_file(path: Path | None) -> Iterator[None]:
-    """Writes to a file what is being read inside the block; a normal end removes the file."""
+    """Writes to a file what is being read inside the block.
+
+    Parameters
+    ----------
+    path
+        The file; None writes none. A normal end removes it, so one that is left names what killed
+        the process.
+
+    """
     if path is None:
         yield
         return
@@ -102,10 +134,23 @@ def progress_file(path: Path | None) -> Iterator[None]:
 
 @contextmanager
 def reading(path: str, size_bytes: int, limits: ReadLimits) -> Iterator[None]:
-    """Bounds the memory and, where there is a progress file, the time of the block.
+    """Bounds the memory, and with a progress file the time, of reading one file inside the block.
 
-    Raises CaptureError where Python itself runs out of memory, beyond which the process ends, and
-    for whatever else the bytes make a reader raise.
+    Parameters
+    ----------
+    path
+        The file, as findings name it.
+    size_bytes
+        Its size.
+    limits
+        Time and memory.
+
+    Raises
+    ------
+    CaptureError
+        Python runs out of memory, or the bytes make a reader raise. Beyond the limits of the
+        operating system the process ends.
+
     """
     progress = _PROGRESS.descriptor
     if progress is not None:
@@ -131,11 +176,24 @@ def reading(path: str, size_bytes: int, limits: ReadLimits) -> Iterator[None]:
 
 @contextmanager
 def refusing(what: str = "its reader") -> Iterator[None]:
-    """Turns what a reader raises on bytes that it was not made for into the file's refusal.
+    """Turns what a reader raises on bytes that it was not made for into the refusal of the file.
 
-    Every conversion of `records.parse` says itself what is wrong; this is the border behind them,
-    so that one file costs itself and not its batch. The refusal names the error and its place, for
-    it is a fault of the reader too. OSError passes, being the machine's; so do the project's own.
+    Parameters
+    ----------
+    what
+        What was reading, for the message.
+
+    Raises
+    ------
+    CaptureError
+        In place of any error but the project's own, those of the operating system and interrupts.
+
+    Notes
+    -----
+    Every conversion of `records.parse` reports itself what is wrong; this is the border behind
+    them, so that one file costs itself and not its batch. The refusal names the error and its
+    place, since it is a fault of the reader too.
+
     """
     try:
         yield
@@ -203,7 +261,19 @@ class CrashReport:
 
 
 def crash_report(path: Path) -> CrashReport:
-    """Reads and removes the progress file of a dead process."""
+    """Reads and removes the progress file of a dead process.
+
+    Parameters
+    ----------
+    path
+        Its progress file.
+
+    Returns
+    -------
+    CrashReport
+        What it was reading; not begun where there is no such file.
+
+    """
     try:
         content = path.read_bytes()
     except FileNotFoundError:
@@ -216,7 +286,14 @@ def crash_report(path: Path) -> CrashReport:
 
 
 def died(reason: str) -> CaptureError:
-    """The refusal of a file that kills whoever reads it."""
+    """The refusal of a file that kills whoever reads it.
+
+    Parameters
+    ----------
+    reason
+        How the process ended.
+
+    """
     return CaptureError(
         "reader_died", reason, "leave the file out and report it; a sound recording does not do so"
     )

@@ -208,7 +208,19 @@ def capture_meta(values: Mapping[str, str]) -> CaptureMeta:
 
 
 def check_texts(values: Mapping[str, str]) -> None:
-    """Raises CaptureError for a key or value that no output can hold, or that is no metadata."""
+    """Refuses metadata that no output can hold.
+
+    Parameters
+    ----------
+    values
+        Texts by key.
+
+    Raises
+    ------
+    CaptureError
+        A text holds half of a surrogate pair, or a key or value is too long.
+
+    """
     for key, value in values.items():
         if not (is_text(key) and is_text(value)):
             words = f"the text of {key[:60]!r} holds half of a surrogate pair, which is no text"
@@ -220,7 +232,19 @@ def check_texts(values: Mapping[str, str]) -> None:
 
 
 def belongs(values: Mapping[str, str]) -> None:
-    """Raises what `capture_meta` would where no motor is named: such a file is in no campaign."""
+    """Refuses metadata that name no motor: such a file is in no campaign.
+
+    Parameters
+    ----------
+    values
+        Texts by key.
+
+    Raises
+    ------
+    CaptureError
+        As `capture_meta` raises it.
+
+    """
     if not values.get("motor_id", "").strip():
         capture_meta(values)
 

@@ -52,6 +52,26 @@ class Entry:
     `source` is None for the contract's own form. `path` is relative with forward slashes.
     `recovered` is a file that is cut off, of which the good part is to be used. `part` are the
     rows of it that are this capture.
+
+    Attributes
+    ----------
+    file that is a capture
+        where it is, what it is, and all that is stated of it.
+    path
+        Relative to the input folder, with forward slashes.
+    sha256
+        Digest of its bytes.
+    form
+        MCAP, text, or a foreign form.
+    source
+        The source map that it is read by; None for the contract's own form.
+    metadata
+        Merged metadata as pairs of texts.
+    recovered
+        Whether it is cut off, and its good part is used.
+    part
+        The rows of it that are this capture.
+
     """
 
     path: str
@@ -126,11 +146,31 @@ def survey(
     *,
     recover: bool = False,
 ) -> Survey:
-    """Every file of a folder looked at once, in the order of its path.
+    """Looks at every file of a folder once, in the order of its path.
 
-    `ask` answers the questions, in their order; without it they are answered here. `recover` takes
-    the good part of an MCAP file that is cut off. Raises UsageError where the folder is not there;
-    a bad file becomes a finding.
+    Parameters
+    ----------
+    folder
+        The input folder.
+    sources
+        Source maps by name.
+    ask
+        Answers the questions in their order, such as in a pool of workers; without it they are
+        answered in this process.
+    recover
+        Whether the good part of an MCAP file that is cut off is used.
+
+    Returns
+    -------
+    Survey
+        Captures, findings, and files that are no captures; a bad file is a finding. Of files with
+        the same bytes, one is used.
+
+    Raises
+    ------
+    UsageError
+        There is no such folder.
+
     """
     listing = list_files(folder)
     findings = list(listing.findings)
@@ -183,14 +223,37 @@ def _preferred(folder: Path, first: Entry, second: Entry) -> tuple[Entry, Entry]
 
 
 def question_of(path: Path) -> Question:
-    """The question of one file by itself, with the sidecar and the manifest that lie beside it."""
+    """The question of one file by itself, with the sidecar and the manifest that lie beside it.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    """
     there = frozenset(other.name for other in path.parent.iterdir() if other.is_file())
     listed = _manifests(path.parent, sorted(there & {MANIFEST}), []).get(path.name, {})
     return Question(path.name, _sidecar(path.name, there), tuple(listed.items()))
 
 
 def settled(folder: Path, question: Question, sources: Mapping[str, SourceMap]) -> Answer | None:
-    """The answer where name and first bytes say that a file is no capture, else None."""
+    """The answer where name and first bytes show that a file is no capture.
+
+    Parameters
+    ----------
+    folder
+        The input folder.
+    question
+        The file.
+    sources
+        Source maps by name.
+
+    Returns
+    -------
+    Answer or None
+        None where it must be looked into.
+
+    """
     if question.sidecar is not None or question.listed:
         return None
     try:
@@ -204,7 +267,25 @@ def settled(folder: Path, question: Question, sources: Mapping[str, SourceMap]) 
 def look(
     folder: Path, question: Question, sources: Mapping[str, SourceMap], *, recover: bool = False
 ) -> Answer:
-    """Looks at one file without decoding its samples; what is wrong with it is in the answer."""
+    """Looks at one file without decoding its samples.
+
+    Parameters
+    ----------
+    folder
+        The input folder.
+    question
+        The file, its sidecar and its row of a manifest.
+    sources
+        Source maps by name.
+    recover
+        Whether the good part of an MCAP file that is cut off is used.
+
+    Returns
+    -------
+    Answer
+        What is wrong with the file is in its findings.
+
+    """
     findings: list[Finding] = []
     digest: str | None = None
     entry: Entry | None = None

@@ -59,5 +59,17 @@ def _table() -> dict[str, str]:
 
 
 def alias(key: str) -> str | None:
-    """The column that goes by a name of small letters and digits without its unit, or None."""
+    """The column that goes by a name.
+
+    Parameters
+    ----------
+    key
+        Small letters and digits, without the unit.
+
+    Returns
+    -------
+    str or None
+        A column of the glossary.
+
+    """
     return _table().get(key)

@@ -104,10 +104,29 @@ def describe(
     sources: Mapping[str, SourceMap],
     answers: Mapping[str, str] | None = None,
 ) -> InspectReport:
-    """Look into any file; raises CaptureError only where it cannot be opened at all.
+    """Looks into any file, whether or not it is a capture.
 
-    `answers` settle what the file does not say: `unit.NAME`, `column.NAME`, metadata. Raises
-    UsageError for one that cannot be.
+    Parameters
+    ----------
+    path
+        The file.
+    sources
+        Source maps by name.
+    answers
+        What the file does not say: `unit.NAME`, `column.NAME`, metadata.
+
+    Returns
+    -------
+    InspectReport
+        What it holds, what prevents a run, and a source map to start from where it lacks one.
+
+    Raises
+    ------
+    CaptureError
+        The file cannot be opened at all.
+    UsageError
+        An answer cannot be meant.
+
     """
     data = read_whole(path)
     look_at = _Look(path.name, data, sources, answers or {})

@@ -51,10 +51,21 @@ class Evidence:
 
 
 def gather(fields: Mapping[str, NDArray[Any]], clock: str | None = None) -> Evidence:
-    """The evidence in a table [rows]; `clock` is the field that is the time, if it is known.
+    """The evidence in the numbers of a table: clocks, fields that wrap, integrals and multiples.
 
-    An angle is held against the integral of a speed, which noise hardly touches, not a speed
-    against the differences of an angle.
+    Parameters
+    ----------
+    fields
+        Columns by name [rows].
+    clock
+        The field that is the time, if it is known.
+
+    Returns
+    -------
+    Evidence
+        An angle is compared with the integral of a speed, which noise hardly touches, not a speed
+        with the differences of an angle.
+
     """
     numbers = _whole_rows(fields)
     wraps = {name: span for name, values in numbers.items() if (span := span_of(values))}
@@ -78,12 +89,25 @@ def _whole_rows(fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
 
 
 def span_of(values: Array) -> float | None:
-    """The span [values' unit] after which a counter or an angle starts again, or None.
+    """The span after which a counter or an angle starts again.
 
-    Nearly the whole range is fallen through (or, turning back, climbed) in one row, at least
-    once, and nowhere is another step longer than a third of it. A span that is a power of two, a
-    turn or a round number and fits within one usual step is taken for it; what goes to and fro
-    wraps at a turn or a power of two alone.
+    Parameters
+    ----------
+    values
+        Readings [rows].
+
+    Returns
+    -------
+    float or None
+        In the unit of the values; None where it does not start again.
+
+    Notes
+    -----
+    Nearly the whole range is passed in one row, downwards or (turning back) upwards, at least once,
+    and no other step is longer than a third of it. A span that is a power of two, a turn or a round
+    number and fits within one usual step is taken for it; what goes to and fro wraps at a turn or a
+    power of two alone.
+
     """
     steps = np.diff(values)
     reach = float(np.ptp(values))

@@ -30,10 +30,25 @@ class NamePatterns:
 
 
 def name_patterns(paths: Sequence[str], stated: frozenset[str] = frozenset()) -> NamePatterns:
-    """The patterns that paths of one bench have in common, for keys that are not `stated`.
+    """The patterns that paths of one bench have in common.
 
+    Parameters
+    ----------
+    paths
+        Paths of files.
+    stated
+        Metadata keys that the files state themselves.
+
+    Returns
+    -------
+    NamePatterns
+        Regular expressions with named groups, for the keys that are not stated.
+
+    Notes
+    -----
     The motor is the first part with a figure that is in every path at the same place of the words
     and is neither a test, a pair nor a date.
+
     """
     ways = dict.fromkeys(DIRECTIONS.split(), "")
     words_by_key = {

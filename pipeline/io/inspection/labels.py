@@ -36,11 +36,26 @@ class Label:
 
 
 def read_label(name: str, unit_row: str | None = None) -> Label:
-    """What a field's name and the units row say of it.
+    """What the name of a field and the units row say of it.
 
-    The unit comes from the units row, from brackets (`Speed [rpm]`), behind a stroke
-    (`Drehzahl / 1/min`) or from the name's end (`time_ms`). A column whose unit cannot be had from
-    the unit written is none that the name means: `T_Wicklung [C]` is no time.
+    Parameters
+    ----------
+    name
+        Name of the field.
+    unit_row
+        What the units row says of it; None without such a row.
+
+    Returns
+    -------
+    Label
+        Columns that it may be, and its unit.
+
+    Notes
+    -----
+    The unit comes from the units row, from brackets (`Speed [rpm]`), behind a stroke (`Drehzahl /
+    1/min`) or from the end of the name (`time_ms`). A column whose unit cannot be had from the unit
+    that is written is not meant: `T_Wicklung [C]` is no time.
+
     """
     if last_part(name) in COLUMNS and not unit_row:
         return Label((last_part(name),), None, None, exact=True)
@@ -64,6 +79,24 @@ def known_unit(target: str, text: str) -> str | None:
     """The unit as the table of units knows it, whatever its capitals, or None.
 
     Capitals count where the table has both (`mohm` and `Mohm`).
+
+    Parameters
+    ----------
+    target
+        Unit of the glossary that it converts to.
+    text
+        The unit as it is written.
+
+    Attributes
+    ----------
+    unit as the table of units spells it, whatever its capitals.
+
+    Returns
+    -------
+    str or None
+        None where there is no such unit. Capitals count where the table has both (`mohm` and
+        `Mohm`).
+
     """
     known = FOREIGN_UNITS.get(target, {})
     unit = normal_unit(text)
@@ -73,19 +106,42 @@ def known_unit(target: str, text: str) -> str | None:
 
 
 def words_of(text: str) -> tuple[str, ...]:
-    """The words of a name in small letters without accents, compounds of digits parted."""
+    """The words of a name in small letters without accents; compounds are separated at capitals.
+
+    Parameters
+    ----------
+    text
+        The name.
+
+    """
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
     return tuple(re.findall(r"[^\W_]+", plain(parted)))
 
 
 def plain(text: str) -> str:
-    """Small letters without accents; `ß` is `ss`."""
+    """Small letters without accents; `ß` is `ss`.
+
+    Parameters
+    ----------
+    text
+        Any text.
+
+    """
     flat = unicodedata.normalize("NFKD", text.casefold())
     return unicodedata.normalize("NFC", "".join(c for c in flat if unicodedata.category(c) != "Mn"))
 
 
 def matches(words: tuple[str, ...], stems: tuple[str, ...]) -> bool:
-    """Whether a word is one of the stems, or holds one that is long or not Latin."""
+    """Whether a word is one of some stems, or contains one that is long or not Latin.
+
+    Parameters
+    ----------
+    words
+        Words of a name.
+    stems
+        Stems to find in them.
+
+    """
     long = [stem for stem in stems if len(stem) >= _LEAST_STEM or not stem.isascii()]
     return any(word in stems or any(stem in word for stem in long) for word in words)
 

@@ -15,9 +15,25 @@ _UNANSWERED = {"motor_id": "unknown", "test": "drive"}
 
 
 def preview(folder: Path, file: str, map_text: str, rows: int) -> list[str]:
-    """Lines with the columns and first `rows` of each table, or why there are none.
+    """The first rows of a file as a source map would convert them.
 
-    Metadata that is not answered yet stands in the way of a run, not of a preview.
+    Parameters
+    ----------
+    folder
+        The input folder.
+    file
+        Path of the file in it.
+    map_text
+        The source map as YAML.
+    rows
+        How many rows of each table.
+
+    Returns
+    -------
+    list of str
+        Lines of text, or why there are none. Metadata that is not answered yet prevents a run, not
+        a preview.
+
     """
     maps = {
         name: replace(one, metadata=tuple((_UNANSWERED | dict(one.metadata)).items()))

@@ -60,14 +60,37 @@ class StreamSeen:
 
 
 def answer_key(name: str) -> str:
-    """The name of a field as it is written in an answer: `unit.Motor_Strom=A`."""
+    """The name of a field as it is written in an answer, such as `unit.Motor_Strom=A`.
+
+    Parameters
+    ----------
+    name
+        Name of the field.
+
+    """
     return re.sub(r"\W+", "_", name).strip("_")
 
 
 def propose(table: RawTable, answers: Mapping[str, str]) -> tuple[FieldSeen, ...]:
-    """The fields of a table, each with the column it probably is or what must be asked.
+    """The fields of a table, each with the column that it probably is or what must be asked.
 
-    `answers` are `column.NAME` and `unit.NAME`. Raises UsageError for one that cannot be.
+    Parameters
+    ----------
+    table
+        The table; its first rows are examined.
+    answers
+        `column.NAME` and `unit.NAME`.
+
+    Returns
+    -------
+    tuple of FieldSeen
+        One a numeric field.
+
+    Raises
+    ------
+    UsageError
+        An answer cannot be meant.
+
     """
     rows = {name: values[:ROWS_LOOKED_AT] for name, values in table.fields.items()}
     numeric = {name: values for name, values in rows.items() if values.dtype.kind in "fiub"}

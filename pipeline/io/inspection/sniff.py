@@ -19,12 +19,26 @@ _LOOK_AT_LINES = 200
 
 
 def sniff(text: str) -> tuple[CsvDialect, str | None] | None:
-    """The dialect of a text table and its header line, or None where no rows of numbers are found.
+    """The layout of a text table, and its header line.
 
-    The separator is the one that parts the rows into the most numbers and fewest texts; the header
-    is the last line of as many texts before the first such row, a second one taken for the units
-    row. Three lines of one number each are a table of one column. Between numbers that are parted
-    by blanks any number of blanks is one.
+    Parameters
+    ----------
+    text
+        The beginning of the file.
+
+    Returns
+    -------
+    tuple of CsvDialect and str or None
+        The header is None for a table without one; None in place of the tuple where no rows of
+        numbers are found.
+
+    Notes
+    -----
+    The separator is the one that separates the rows into the most numbers and fewest texts; the
+    header is the last line of as many texts before the first such row, a second one is the units
+    row. Three lines of one number each are a table of one column. Any number of blanks between
+    numbers is one separator.
+
     """
     lines = text.replace("\r\n", "\n").split("\n")[:_LOOK_AT_LINES]
     lines, row_end = _without_ends(lines)
@@ -112,7 +126,19 @@ def _is_header(line: str, separator: str, width: int) -> bool:
 
 
 def encoding_of(head: bytes) -> str:
-    """UTF-8 where the bytes are, else Latin-1, in which every byte is a letter."""
+    """The encoding of a text.
+
+    Parameters
+    ----------
+    head
+        First bytes of the file.
+
+    Returns
+    -------
+    str
+        UTF-8 where the bytes are, else Latin-1, in which every byte is a letter.
+
+    """
     try:
         getincrementaldecoder("utf-8")().decode(head)
     except UnicodeDecodeError:
@@ -121,7 +147,25 @@ def encoding_of(head: bytes) -> str:
 
 
 def numeric_columns(body: bytes, dialect: CsvDialect) -> Callable[[str], bool]:
-    """A filter for the columns whose first rows hold numbers."""
+    """A filter for the columns whose first rows hold numbers.
+
+    Parameters
+    ----------
+    body
+        Bytes of the table.
+    dialect
+        Its layout.
+
+    Attributes
+    ----------
+    filter for the columns whose first rows hold numbers.
+
+    Returns
+    -------
+    callable
+        Name of a column -> whether it holds numbers.
+
+    """
     lines = (
         body[:MAX_HEAD_BYTES].decode(dialect.encoding, "replace").replace("\r\n", "\n").split("\n")
     )

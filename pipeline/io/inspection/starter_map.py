@@ -37,7 +37,14 @@ class Shape:
         return tuple(field for stream in self.streams for field in stream.fields)
 
     def joined(self, other: Shape) -> Shape:
-        """This shape with what another file of it shows besides: wraps, units, suffixes."""
+        """This shape with what another file of it shows: wraps, units, suffixes.
+
+        Parameters
+        ----------
+        other
+            The shape of the other file.
+
+        """
         streams = tuple(
             replace(one, fields=tuple(map(_clearer, one.fields, two.fields)))
             for one, two in zip(self.streams, other.streams, strict=True)
@@ -71,6 +78,27 @@ def map_text(
 
     `answers` are metadata and `increment_s`. `by_name`: the file says `contract` and so has to
     name the map that it is to be read by.
+
+    Parameters
+    ----------
+    shapes
+        At least one; several become variants.
+    names
+        Patterns of their file names.
+    answers
+        Metadata, and `increment_s`.
+    by_name
+        Whether the file states `contract`, so that it must name the map that it is read by.
+
+    Attributes
+    ----------
+    source map in YAML for files of some shapes.
+
+    Returns
+    -------
+    str
+        What must be asked is a comment.
+
     """
     given = dict(answers or {})
     increment = given.pop("increment_s", None)
@@ -136,7 +164,20 @@ def _recognise(shape: Shape) -> str:
 
 
 def header_pattern(header: str, *, marked: bool = False) -> str:
-    """A regular expression of a header line, whatever the encoding of what is not ASCII in it."""
+    """A regular expression of a header line, whatever the encoding of what is not ASCII in it.
+
+    Parameters
+    ----------
+    header
+        The line.
+    marked
+        Whether a mark may stand before it, such as of the byte order.
+
+    Attributes
+    ----------
+    regular expression for a header line, whatever the encoding of what is not ASCII in it.
+
+    """
     text = header.strip()
     whole = len(re.escape(text)) <= _LONGEST_HEADER
     pattern = re.escape(text if whole else text[: _LONGEST_HEADER // 2])

@@ -6,7 +6,14 @@ from pipeline.io.inspection.proposals import FieldSeen
 
 
 def field_line(seen: FieldSeen) -> str:
-    """What a field is, probably is, or what must be asked of it, and the evidence."""
+    """What a field is, probably is, or what must be asked of it, with the evidence.
+
+    Parameters
+    ----------
+    seen
+        The field.
+
+    """
     first = "" if seen.first is None else f" (first {seen.first:.6g})"
     why = f"; {seen.why}" if seen.why else ""
     name = f"{seen.name}{first}"

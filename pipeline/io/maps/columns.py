@@ -28,12 +28,31 @@ _NANOSECONDS_A_SECOND = 1e9
 
 
 def last_part(name: str) -> str:
-    """A field's name without the messages it is nested in."""
+    """The name of a field without the messages that it is nested in.
+
+    Parameters
+    ----------
+    name
+        Such as `state.motor.ia_a`.
+
+    """
     return name.rsplit(".", 1)[-1]
 
 
 def foreign_unit(name: str) -> str | None:
-    """The contract column that a name means but for its unit (`ia_ma` means `ia_a`), or None."""
+    """The contract column that a name means except for its unit.
+
+    Parameters
+    ----------
+    name
+        Such as `ia_ma`, which means `ia_a`.
+
+    Returns
+    -------
+    str or None
+        None where it means none.
+
+    """
     bare = last_part(name).lower()
     bracket = _BRACKET.match(bare)
     stem = bracket[1].strip() if bracket else bare.rpartition("_")[0]
@@ -45,9 +64,25 @@ def foreign_unit(name: str) -> str | None:
 
 
 def contract_fields(names: Sequence[str], joint_state: bool) -> list[FieldMap]:
-    """The contract's own columns among field names, nested ones by their last part.
+    """The contract's own columns among the fields of a table.
 
-    A column that carries a foreign unit, or that two fields claim, is a CaptureError.
+    Parameters
+    ----------
+    names
+        Names of the fields; nested ones count by their last part.
+    joint_state
+        Whether they are of a ROS JointState, whose fields have names of their own.
+
+    Returns
+    -------
+    list of FieldMap
+        In the order of the names.
+
+    Raises
+    ------
+    CaptureError
+        A column has a foreign unit, or two fields claim it.
+
     """
     found: dict[str, FieldMap] = {}
     for name in names:
@@ -122,7 +157,16 @@ def mapped_fields(names: Sequence[str], source: SourceMap) -> list[FieldMap]:
 
 
 def is_field(field: str, name: str) -> bool:
-    """Whether a name in a file is the field that a map names, `*` being any text."""
+    """Whether a name in a file is the field that a map names.
+
+    Parameters
+    ----------
+    field
+        As in the map; `*` is any text.
+    name
+        In the file.
+
+    """
     if field in (name, last_part(name)):
         return True
     return "*" in field and fnmatchcase(name, re.sub(r"[\[?]", "[\\g<0>]", field))
@@ -131,10 +175,27 @@ def is_field(field: str, name: str) -> bool:
 def to_frame(
     table: RawTable, source: SourceMap | None, pole_pairs: int | None = None
 ) -> pl.DataFrame | None:
-    """The contract's columns of one table, t_s first, float64; None if it holds none.
+    """The contract's columns of one table.
 
-    `pole_pairs` are the nameplate's, for fields that a drive logs in electrical terms.
-    Raises CaptureError for units, times and duplicate columns that cannot be settled.
+    Parameters
+    ----------
+    table
+        Fields by their own names.
+    source
+        The source map; None for the contract's own form.
+    pole_pairs
+        Of the nameplate, for fields that a drive logs in electrical terms.
+
+    Returns
+    -------
+    DataFrame or None
+        `t_s` first, float64, in SI units; None where it holds no column.
+
+    Raises
+    ------
+    CaptureError
+        A unit, the time, or a duplicate column cannot be settled.
+
     """
     names = list(table.fields)
     if source is None:

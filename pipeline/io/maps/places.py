@@ -18,8 +18,18 @@ AUTO = "auto"
 
 
 def map_folders(config_dir: str | None = None) -> tuple[Path, ...]:
-    """Folders of source maps, the weakest first: the package's, the user's, the current one's,
-    and that of a configuration folder that the user names.
+    """Folders of source maps, the weakest first.
+
+    Parameters
+    ----------
+    config_dir
+        Configuration folder that the user names; it takes precedence.
+
+    Returns
+    -------
+    tuple of Path
+        The package's, the user's, the current folder's, and that of `config_dir`.
+
     """
     places = [configuration_folder() / "source", *_users(), Path("conf") / "source"]
     if config_dir is not None:
@@ -29,14 +39,20 @@ def map_folders(config_dir: str | None = None) -> tuple[Path, ...]:
 
 
 def source_maps(source: str = AUTO, config_dir: str | None = None) -> dict[str, SourceMap]:
-    """The maps to read foreign files by: those of a file, of a name, or with `auto` all.
+    """The maps to read foreign files by.
 
-    A map of the same name in a nearer folder takes the place of one farther away.
+    Parameters
+    ----------
+    source
+        A file, a name, or `auto` for all maps. A map of the same name in a nearer folder replaces
+        one farther away.
+    config_dir
+        Configuration folder that the user names.
 
     Raises
     ------
     UsageError
-        For a file or name that is not there, and for a map that cannot be read.
+        There is no such file or name, or a map cannot be read.
 
     """
     if source.endswith((".yaml", ".yml")):
@@ -50,7 +66,21 @@ def source_maps(source: str = AUTO, config_dir: str | None = None) -> dict[str, 
 
 
 def map_file(name: str, config_dir: str | None = None) -> Path:
-    """The file of a map that `source_maps` found by name, of the nearest folder that has it."""
+    """The file of a map that `source_maps` found by name.
+
+    Parameters
+    ----------
+    name
+        Name of the map.
+    config_dir
+        Configuration folder that the user names.
+
+    Returns
+    -------
+    Path
+        In the nearest folder that has it.
+
+    """
     places = [folder / f"{name}.yaml" for folder in map_folders(config_dir)]
     return [place for place in places if place.is_file()][-1]
 

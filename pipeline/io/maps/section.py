@@ -26,12 +26,30 @@ class Section:
         self.asked: list[str] = []
 
     def fault(self, key: str, what: str, remedy: str) -> UsageError:
-        """A UsageError that names the map and the key."""
+        """An error that names the map and the key.
+
+        Parameters
+        ----------
+        key
+            The key.
+        what
+            What is wrong with it.
+        remedy
+            What to write.
+
+        """
         place = ".".join(part for part in (self.where, key) if part) or "the top"
         return UsageError(f"source map {self.source}: {place}: {what}", remedy)
 
     def take(self, key: str) -> Any:
-        """The plain value of a key, None where it is not there."""
+        """The plain value of a key, None where it is not there.
+
+        Parameters
+        ----------
+        key
+            The key.
+
+        """
         self.asked.append(key)
         return self.left.pop(key, None)
 
@@ -43,19 +61,50 @@ class Section:
             raise self.fault(key, "is no key of a source map", hint)
 
     def section(self, key: str) -> Section:
-        """The map under a key, empty where it is not there."""
+        """The map under a key, empty where it is not there.
+
+        Parameters
+        ----------
+        key
+            The key.
+
+        """
         inner = self.take(key)
         return Section(self.source, f"{self.where}.{key}".strip("."), inner)
 
     def text(self, key: str) -> str | None:
-        """The text under a key."""
+        """The text under a key, None where it is not there.
+
+        Parameters
+        ----------
+        key
+            The key.
+
+        Raises
+        ------
+        UsageError
+            It is no single text.
+
+        """
         value = self.take(key)
         if value is not None and not isinstance(value, str):
             raise self.fault(key, "is not a single text", "write one value")
         return value
 
     def sections(self, key: str) -> list[Section]:
-        """The items of a list of maps."""
+        """The items of a list of maps.
+
+        Parameters
+        ----------
+        key
+            The key.
+
+        Raises
+        ------
+        UsageError
+            It is no list.
+
+        """
         items = self.take(key)
         items = items or []
         if not isinstance(items, list):
@@ -64,7 +113,23 @@ class Section:
         return [Section(self.source, f"{where}[{n}]", item) for n, item in enumerate(items)]
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """A list of texts, or one text."""
+        """A list of texts, or one text.
+
+        Parameters
+        ----------
+        key
+            The key.
+
+        Attributes
+        ----------
+        list of texts, or one text.
+
+        Raises
+        ------
+        UsageError
+            It is neither.
+
+        """
         value = self.take(key)
         value = [value] if isinstance(value, str) else value or []
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
@@ -72,12 +137,34 @@ class Section:
         return tuple(value)
 
     def pattern(self, key: str) -> str | None:
-        """A regular expression."""
+        """A regular expression.
+
+        Parameters
+        ----------
+        key
+            The key.
+
+        Attributes
+        ----------
+        regular expression, None where the key is not there.
+
+        """
         value = self.text(key)
         return None if value is None else self._expression(key, value)
 
     def patterns(self, key: str) -> tuple[str, ...]:
-        """A list of regular expressions."""
+        """A list of regular expressions.
+
+        Parameters
+        ----------
+        key
+            The key.
+
+        Attributes
+        ----------
+        list of regular expressions.
+
+        """
         return tuple(self._expression(key, value) for value in self.texts(key))
 
     def _expression(self, key: str, value: str) -> str:
@@ -90,7 +177,25 @@ class Section:
         return value
 
     def number(self, key: str, default: float | None) -> float | None:
-        """A finite number."""
+        """A finite number.
+
+        Parameters
+        ----------
+        key
+            The key.
+        default
+            Where the key is not there.
+
+        Attributes
+        ----------
+        finite number.
+
+        Raises
+        ------
+        UsageError
+            It is no number.
+
+        """
         value = self.text(key)
         if value is None:
             return default
@@ -100,7 +205,21 @@ class Section:
         return found
 
     def flag(self, key: str, default: bool) -> bool:
-        """The word true or false."""
+        """The word true or false.
+
+        Parameters
+        ----------
+        key
+            The key.
+        default
+            Where the key is not there.
+
+        Raises
+        ------
+        UsageError
+            It is neither word.
+
+        """
         value = self.text(key)
         if value is None:
             return default
@@ -109,7 +228,23 @@ class Section:
         return value == "true"
 
     def choice(self, key: str, known: tuple[str, ...], default: str) -> Any:
-        """One of `known`."""
+        """One of some known words.
+
+        Parameters
+        ----------
+        key
+            The key.
+        known
+            The words.
+        default
+            Where the key is not there.
+
+        Raises
+        ------
+        UsageError
+            It is none of them.
+
+        """
         value = self.text(key)
         if value is not None and value not in known:
             raise self.fault(key, f"{value!r} is unknown", f"use one of {', '.join(known)}")

@@ -23,13 +23,25 @@ MessageForm = Literal["auto", "row", "block"]
 
 @dataclass(frozen=True, slots=True)
 class FieldMap:
-    """One foreign field: column = sign * scale * (value in `unit`, converted) + offset.
+    """One foreign field: column = sign · scale · (value in `unit`, converted) + offset.
 
-    A `*` in its name is any text.
-    `unit` None is the column's own unit; `row` takes what the file's units row says.
-    `per_pole_pair` divides by the metadata's pole pairs, for a drive that logs electrical speed.
-    `wraps` is the span [the field's own numbers] after which a counter or an angle starts again;
-    a clock goes on forwards, anything else by the shorter way.
+    Attributes
+    ----------
+    field
+        Name in the file; `*` is any text.
+    column
+        Column of the glossary.
+    unit
+        Foreign unit; None for the column's own, `row` for what the units row says.
+    sign, scale, offset
+        Of the conversion; the offset is in the column's unit.
+    per_pole_pair
+        Whether it is divided by the pole pairs of the metadata, for a drive that logs electrical
+        speed.
+    wraps
+        Span after which a counter or an angle starts again [the field's own numbers]; a clock
+        continues forwards, anything else by the shorter way.
+
     """
 
     field: str
@@ -44,13 +56,20 @@ class FieldMap:
 
 @dataclass(frozen=True, slots=True)
 class TimeMap:
-    """Where t_s comes from: a mapped field, the log clock, or start + increment * row.
+    """Where `t_s` comes from.
 
-    `even` is a field whose digits do not part neighbouring samples: the rows are evenly spaced
-    along the straight line through it.
-    `wraps_at` is the value, in the field's unit, at which a clock starts again from zero.
-    `start_s` and `increment_s` [s] stand in where the layout does not find them in the file; an
-    increment with the log clock parts the rows of one block.
+    Attributes
+    ----------
+    origin
+        A mapped field, the log clock, or start + increment · row; `even` is a field whose digits do
+        not separate neighbouring samples, so that rows are evenly spaced along the straight line
+        through it.
+    wraps_at
+        Value at which a clock starts again from zero [the field's unit].
+    start_s, increment_s
+        Used where the layout does not find them in the file [s]; an increment with the log clock
+        separates the rows of one block.
+
     """
 
     origin: TimeFrom = "field"
@@ -67,9 +86,21 @@ Pairs = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Rows `first` to `last` of a file, counted from 0, as a capture; None is the file's end.
+    """Rows of a file that are one capture.
 
-    `fields` stand beside those that all parts have in common: those of one pair, or one motor.
+    Attributes
+    ----------
+    files
+        Patterns of the files that are cut so.
+    first, last
+        Rows, counted from 0; None is the end of the file.
+    metadata
+        Of this capture.
+    fields
+        Fields beside those that all parts have in common: those of one pair, or one motor.
+    number
+        Place among the parts.
+
     """
 
     files: tuple[str, ...]
@@ -94,11 +125,28 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class SourceMap:
-    """How to recognise a bench's files and turn them into the contract's columns.
+    """How to recognise the files of a bench and convert them into the contract's columns.
 
-    `reader` names the plug-in that reads a form that is neither MCAP nor a text table.
-    `file_names` are regular expressions whose named groups are metadata, `values` what a word of
-    a file name means, by metadata key; `captures` cut a file into several.
+    Attributes
+    ----------
+    name
+        Of the map.
+    files, header, topics
+        Criteria, which must all hold: patterns of names, a regular expression of the header,
+        patterns of topics.
+    layout, fields, time, messages, joint
+        How tables, columns and time are read.
+    reader
+        Plug-in for a form that is neither MCAP nor a text table.
+    metadata, per_file
+        Fixed metadata, of all files and by pattern of the name.
+    file_names
+        Regular expressions whose named groups are metadata.
+    values
+        What a word of a file name means, by metadata key.
+    captures
+        How a file is cut into several captures.
+
     """
 
     name: str
@@ -118,9 +166,22 @@ class SourceMap:
     captures: tuple[Part, ...] = ()
 
     def recognises(self, path: str, head: str | None, topics: Iterable[str]) -> bool:
-        """Whether a file is this bench's: every criterion that the map states must hold.
+        """Whether a file is of this bench.
 
-        `head` is the beginning of a text file, None for an MCAP file with `topics`.
+        Parameters
+        ----------
+        path
+            Path of the file.
+        head
+            Beginning of a text file; None for an MCAP file.
+        topics
+            Topics of an MCAP file.
+
+        Returns
+        -------
+        bool
+            Every criterion that the map states must hold, and it must state one.
+
         """
         if self.files and not self.recognises_name(path):
             return False
@@ -135,15 +196,41 @@ class SourceMap:
         return bool(self.files or self.header or self.topics)
 
     def recognises_name(self, path: str) -> bool:
-        """Whether the file's name is one of those the map lists."""
+        """Whether the name of a file is one of those that the map lists.
+
+        Parameters
+        ----------
+        path
+            Path of the file.
+
+        """
         return _is_named(path, self.files)
 
     def parts_of(self, path: str) -> tuple[Part, ...]:
-        """The captures that a file is cut into; none where it is one capture as a whole."""
+        """The captures that a file is cut into.
+
+        Parameters
+        ----------
+        path
+            Path of the file.
+
+        Returns
+        -------
+        tuple of Part
+            Empty where it is one capture as a whole.
+
+        """
         return tuple(p for p in self.captures if not p.files or _is_named(path, p.files))
 
     def metadata_for(self, path: str) -> dict[str, str]:
-        """Fixed metadata of one file; what is stated for its name takes precedence."""
+        """Fixed metadata of one file.
+
+        Parameters
+        ----------
+        path
+            Path of the file; what is stated for its name takes precedence.
+
+        """
         found = dict(self.metadata) | self._from_name(path)
         name = PurePosixPath(path).name
         for pattern, values in reversed(self.per_file):
@@ -169,7 +256,19 @@ def _is_named(path: str, patterns: Iterable[str]) -> bool:
 
 
 def load_source_maps(folder: Path) -> dict[str, SourceMap]:
-    """All maps of a folder by name; raises UsageError naming the file and the key at fault."""
+    """All maps of a folder by name.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+
+    Raises
+    ------
+    UsageError
+        There is no such folder, or a map is wrong; the message names file and key.
+
+    """
     if not folder.is_dir():
         raise UsageError(f"there is no folder of source maps {folder}", "check the configuration")
     found: dict[str, SourceMap] = {}
@@ -179,9 +278,23 @@ def load_source_maps(folder: Path) -> dict[str, SourceMap]:
 
 
 def load_source_file(path: Path) -> dict[str, SourceMap]:
-    """The map of a file under the file's name, or its variants as NAME/1, NAME/2, ...
+    """The maps of one file.
 
-    Raises UsageError.
+    Parameters
+    ----------
+    path
+        The YAML file.
+
+    Returns
+    -------
+    dict of SourceMap
+        Under the name of the file, or its variants as NAME/1, NAME/2, ...
+
+    Raises
+    ------
+    UsageError
+        It cannot be read, or is wrong.
+
     """
     try:
         data = path.read_bytes()
@@ -191,9 +304,26 @@ def load_source_file(path: Path) -> dict[str, SourceMap]:
 
 
 def parse_source_file(data: bytes, name: str) -> dict[str, SourceMap]:
-    """The maps of one YAML file by name. Raises UsageError.
+    """The maps of one YAML file by name.
 
-    Each item of `variants` is laid over the file's other keys, a map over a map key by key.
+    Parameters
+    ----------
+    data
+        Content of the file.
+    name
+        Name of the map.
+
+    Returns
+    -------
+    dict of SourceMap
+        Each item of `variants` is laid over the other keys of the file, a map over a map key by
+        key.
+
+    Raises
+    ------
+    UsageError
+        The file is wrong; the message names the key.
+
     """
     plain = _plain(data, name)
     variants = plain.pop("variants", None) if isinstance(plain, dict) else None
@@ -211,7 +341,16 @@ def parse_source_file(data: bytes, name: str) -> dict[str, SourceMap]:
 
 
 def laid_over(base: Mapping[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys of both, those of `top` first; a map over a map key by key."""
+    """The keys of two maps, those of the upper one first.
+
+    Parameters
+    ----------
+    base
+        The lower map.
+    top
+        The upper map; a map over a map is laid key by key.
+
+    """
     both = {
         key: {**base[key], **value}
         for key, value in top.items()
@@ -221,7 +360,20 @@ def laid_over(base: Mapping[str, Any], top: Mapping[str, Any]) -> dict[str, Any]
 
 
 def parse_source_map(data: bytes, name: str) -> SourceMap:
-    """A source map without variants from its YAML bytes. Raises UsageError."""
+    """A source map without variants from its YAML bytes. Raises UsageError.
+
+    Parameters
+    ----------
+    data
+        YAML bytes.
+    name
+        Name of the map.
+
+    Attributes
+    ----------
+    source map without variants.
+
+    """
     return _parsed(_plain(data, name), name)
 
 
@@ -377,7 +529,21 @@ def _part(section: Section, number: int) -> Part:
 
 
 def find_maps(maps: Mapping[str, SourceMap], name: str) -> dict[str, SourceMap]:
-    """The map of a name, or all its variants; raises UsageError naming the known ones."""
+    """The map of a name, or all its variants.
+
+    Parameters
+    ----------
+    maps
+        Maps by name.
+    name
+        Name of a map.
+
+    Raises
+    ------
+    UsageError
+        There is none; the message names those that there are.
+
+    """
     found = {key: one for key, one in maps.items() if key == name or key.startswith(f"{name}/")}
     if not found:
         known = dict.fromkeys(key.partition("/")[0] for key in maps)

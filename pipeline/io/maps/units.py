@@ -198,16 +198,43 @@ _SPELLINGS = {
 
 
 def normal_unit(text: str) -> str:
-    """A unit as the table spells it; brackets, spaces and the two micro signs are evened out."""
+    """A unit as the table spells it; brackets, spaces and the two micro signs are evened out.
+
+    Parameters
+    ----------
+    text
+        As it is written; brackets, spaces and the two micro signs are unified.
+
+    Attributes
+    ----------
+    unit as the table spells it.
+
+    """
     bare = text.strip().strip("()[]").strip()
     bare = bare.replace("µ", "u").replace("μ", "u").replace("Ω", "Ω")
     return _SPELLINGS.get(bare, bare)
 
 
 def scale_to(unit: str, target: str) -> Scale:
-    """The scale from a foreign unit to a glossary unit; CaptureError `unknown_unit` without one.
+    """The scale from a foreign unit to a unit of the glossary.
 
-    `counts` are of the unit that the map's own `scale` makes them.
+    Parameters
+    ----------
+    unit
+        As it is written; `counts` are of the unit that the map's own `scale` makes them.
+    target
+        Unit of the glossary.
+
+    Returns
+    -------
+    Scale
+        Factor and shift.
+
+    Raises
+    ------
+    CaptureError
+        There is no such unit of that dimension (`unknown_unit`).
+
     """
     if normal_unit(unit) == COUNTS:
         return Scale(1.0)

@@ -44,7 +44,26 @@ class CdrDecoder:
         self._trail: _Trail | None = None
 
     def decode(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf]:
-        """Numeric fields by dotted name; a string[] field gives the places of its strings."""
+        """Numeric fields of the messages of one type.
+
+        Parameters
+        ----------
+        batch
+            The messages.
+        wanted
+            Which fields are needed, by dotted name.
+
+        Returns
+        -------
+        dict of Leaf
+            By dotted name; a string[] field gives the places of its strings.
+
+        Raises
+        ------
+        CaptureError
+            A message does not fit its schema.
+
+        """
         raw: Bytes = np.frombuffer(batch.buffer, np.uint8)
         if batch.start.size == 0:
             return {}

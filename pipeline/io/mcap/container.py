@@ -40,7 +40,21 @@ class Definitions:
     channels: dict[int, rec.Channel] = field(default_factory=dict)
 
     def add(self, opcode: int, fields: Fields) -> None:
-        """Take a Schema or Channel record in; raises CaptureError for a changed meaning."""
+        """Takes in a Schema or Channel record.
+
+        Parameters
+        ----------
+        opcode
+            Of the record.
+        fields
+            Its fields.
+
+        Raises
+        ------
+        CaptureError
+            An id changes its meaning.
+
+        """
         if opcode == rec.SCHEMA:
             schema = rec.schema(fields)
             if self.schemas.setdefault(schema.id, schema) != schema:
@@ -51,7 +65,19 @@ class Definitions:
             raise corrupt(f"the channel id {channel.id} is defined twice, differently")
 
     def channel(self, number: int) -> rec.Channel:
-        """The channel of an id that messages use; it and its schema must be defined."""
+        """The channel of an id that messages use.
+
+        Parameters
+        ----------
+        number
+            The id.
+
+        Raises
+        ------
+        CaptureError
+            The channel or its schema is not defined.
+
+        """
         found = self.channels.get(number)
         if found is None:
             raise corrupt(f"messages of channel {number}, which is nowhere defined")
@@ -91,7 +117,19 @@ class Layout:
         return indexed + int(self.loose_start.size)
 
     def metadata_named(self, name: str) -> dict[str, str]:
-        """The merged metadata records of one name; contradictory ones are corrupt."""
+        """The merged metadata records of one name.
+
+        Parameters
+        ----------
+        name
+            Of the records.
+
+        Raises
+        ------
+        CaptureError
+            Two of them contradict each other.
+
+        """
         merged: dict[str, str] = {}
         for record in self.metadata:
             for key, value in record.entries if record.name == name else ():
@@ -314,7 +352,19 @@ def _check_size(layout: Layout) -> None:
 
 
 def check_definitions(layout: Layout) -> None:
-    """The summary repeats definitions of the data section (packed ones included), unchanged."""
+    """Refuses a file whose summary changes a definition of its data section.
+
+    Parameters
+    ----------
+    layout
+        The scanned file, with packed definitions read.
+
+    Raises
+    ------
+    CaptureError
+        A definition differs.
+
+    """
     for name in ("schemas", "channels"):
         known = getattr(layout.definitions, name)
         for number, stated in getattr(layout.summary_definitions, name).items():

@@ -54,7 +54,14 @@ class Column:
         self._append(leaf.values, batches)
 
     def skip(self, messages: int) -> None:
-        """Messages that do not hold the field: NaN, or no items."""
+        """Takes in messages that do not hold the field: NaN, or no items.
+
+        Parameters
+        ----------
+        messages
+            How many.
+
+        """
         if self.array:
             self._counts.append(np.zeros(messages, np.int64))
             self._append(np.empty(0), 1)
@@ -90,7 +97,18 @@ class Gathered:
         self._times = Column("log_time", topic)
 
     def add(self, leaves: dict[str, Leaf], times: NDArray[np.uint64], batches: int) -> None:
-        """Takes one batch; `batches` is how many may come in all."""
+        """Takes in one batch of messages.
+
+        Parameters
+        ----------
+        leaves
+            Its fields by name.
+        times
+            Log times of its messages [ns].
+        batches
+            How many batches may come in all, to reserve room.
+
+        """
         for name, leaf in leaves.items():
             if name not in self._columns:
                 column = Column(name, self.topic)

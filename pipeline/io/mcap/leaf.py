@@ -18,10 +18,18 @@ Wanted = Callable[[str], bool]
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """Values of one field in message order; `counts` [messages] for arrays, None for scalars.
+    """Values of one field of many messages.
 
-    `values` may be a view of the batch's buffer, and [messages, count] where all counts are equal.
-    `places` marks texts, whose values are [n, 2]: where each begins and how long it is.
+    Attributes
+    ----------
+    values
+        In the order of messages; [messages, count] where all counts are equal. May be a view of the
+        batch's buffer.
+    counts
+        Items of each message [messages]; None for scalars.
+    places
+        Whether it marks texts, whose values are where each begins and how long it is [n, 2].
+
     """
 
     values: NDArray[Any]
@@ -33,12 +41,37 @@ class Decoder(Protocol):
     """Decodes the payloads of one channel; raises CaptureError for payloads that do not fit."""
 
     def decode(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf]:
-        """Numeric fields by dotted name."""
+        """Numeric fields by dotted name.
+
+        Parameters
+        ----------
+        batch
+            The messages.
+        wanted
+            Which fields are needed, by dotted name.
+
+        """
         ...
 
 
 def spread(start: Integers, count: Integers, width: int) -> Integers:
-    """Byte positions of `count[i]` consecutive items of `width` bytes from `start[i]`."""
+    """Byte positions of consecutive items.
+
+    Parameters
+    ----------
+    start
+        Where each run begins [n].
+    count
+        Items of each run [n].
+    width
+        Bytes an item.
+
+    Returns
+    -------
+    array [sum of count]
+        In the order of the runs.
+
+    """
     total = int(count.sum())
     first = np.repeat(start - width * (np.cumsum(count) - count), count)
     positions: Integers = first + width * np.arange(total, dtype=np.int64)

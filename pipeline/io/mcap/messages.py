@@ -32,9 +32,21 @@ _HEADS = np.dtype(
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Messages [n] in one buffer: payload start and length, channel, log time [ns].
+    """Messages in one buffer.
 
-    `stride` is the distance between payloads where all have one length and one channel, else 0.
+    Attributes
+    ----------
+    buffer
+        The bytes.
+    start, length
+        Of each payload [n, bytes].
+    channel
+        Of each message [n].
+    log_time
+        Of each message [n, ns].
+    stride
+        Distance between payloads where all have one length and one channel, else 0.
+
     """
 
     buffer: bytes
@@ -45,12 +57,42 @@ class Batch:
     stride: int = 0
 
     def at(self, offset: int, dtype: str) -> NDArray[Any]:
-        """Values [n] at one offset of every payload, where there is a stride: a view."""
+        """Values at one offset of every payload, where there is a stride.
+
+        Parameters
+        ----------
+        offset
+            Bytes from the begin of the payload.
+        dtype
+            numpy's name of the type.
+
+        Returns
+        -------
+        array [n]
+            A view.
+
+        """
         first = int(self.start[0]) + offset
         return np.ndarray((self.start.size,), dtype, self.buffer, first, (self.stride,))
 
     def table(self, offset: int, dtype: str, count: int) -> NDArray[Any]:
-        """Arrays [n, count] at one offset of every payload, where there is a stride: a view."""
+        """Arrays at one offset of every payload, where there is a stride.
+
+        Parameters
+        ----------
+        offset
+            Bytes from the begin of the payload.
+        dtype
+            numpy's name of the type.
+        count
+            Items an array.
+
+        Returns
+        -------
+        array [n, count]
+            A view.
+
+        """
         first = int(self.start[0]) + offset
         strides = (self.stride, np.dtype(dtype).itemsize)
         return np.ndarray((self.start.size, count), dtype, self.buffer, first, strides)
@@ -63,7 +105,14 @@ class Batch:
         return dict(zip(channels.tolist(), counts.tolist(), strict=True))
 
     def of(self, channels: list[int]) -> Batch:
-        """The messages of some channels, in file order."""
+        """The messages of some channels, in file order.
+
+        Parameters
+        ----------
+        channels
+            Their ids.
+
+        """
         if self.stride and int(self.channel[0]) in channels:
             return self
         keep = np.isin(self.channel, channels)
@@ -106,7 +155,19 @@ def batches(layout: Layout) -> Iterator[Batch]:
 
 
 def count_messages(layout: Layout) -> int:
-    """How many messages a file holds, each unpacked and checked as when it is decoded."""
+    """How many messages a file holds.
+
+    Parameters
+    ----------
+    layout
+        The scanned file.
+
+    Returns
+    -------
+    int
+        Each message is unpacked and checked as when it is decoded.
+
+    """
     return sum(int(batch.start.size) for batch in batches(layout))
 
 

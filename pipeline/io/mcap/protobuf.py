@@ -62,7 +62,21 @@ class ProtobufDecoder:
         self.plan = plan
 
     def decode(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf]:
-        """Numeric fields by dotted name; omitted zeros are zero, absent optionals NaN."""
+        """Numeric fields of the messages of one type.
+
+        Parameters
+        ----------
+        batch
+            The messages.
+        wanted
+            Which fields are needed, by dotted name.
+
+        Returns
+        -------
+        dict of Leaf
+            By dotted name; omitted zeros are 0, absent optional fields NaN.
+
+        """
         if batch.stride and (found := self._evenly(batch, wanted)) is not None:
             return found
         pass_ = _Pass(batch.buffer, wanted)

@@ -53,7 +53,14 @@ class Message:
     fields: dict[int, Scalar | Message]
 
     def names(self, prefix: str = "") -> list[str]:
-        """Dotted names of all numeric fields below."""
+        """Dotted names of all numeric fields below.
+
+        Parameters
+        ----------
+        prefix
+            Before each name.
+
+        """
         found: list[str] = []
         for part in self.fields.values():
             if isinstance(part, Message):

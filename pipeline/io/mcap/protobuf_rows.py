@@ -44,7 +44,21 @@ def _varint(payload: bytes, at: int, most_bytes: int) -> tuple[int, int] | None:
 
 
 def shape_of(payload: bytes, plan: Message) -> Shape | None:
-    """The shape of a message of fixed-width scalars, single or packed, each once; else None."""
+    """Where tags and values of a message lie.
+
+    Parameters
+    ----------
+    payload
+        The message.
+    plan
+        Its fields.
+
+    Returns
+    -------
+    Shape or None
+        None unless it consists of fixed-width scalars, single or packed, each once.
+
+    """
     marks: list[tuple[int, int]] = []
     values: dict[int, int] = {}
     packed: dict[int, tuple[int, int]] = {}
@@ -80,9 +94,25 @@ def shape_of(payload: bytes, plan: Message) -> Shape | None:
 def shaped_rows(
     raw: Bytes, plan: Message, start: Integers, length: Integers
 ) -> tuple[dict[int, list[tuple[Integers, Integers]]], NDArray[np.bool_]]:
-    """Places of values in messages of the common shapes, and which messages [n] are left over.
+    """Places of values in messages of the common shapes.
 
-    For each field number: pairs of message numbers and byte positions of their values.
+    Parameters
+    ----------
+    raw
+        The buffer.
+    plan
+        Fields of the messages.
+    start
+        Where each message begins [n].
+    length
+        How long it is [n].
+
+    Returns
+    -------
+    tuple
+        For each field number pairs of message numbers and byte positions of their values; and which
+        messages [n] have another shape.
+
     """
     found: dict[int, list[tuple[Integers, Integers]]] = {}
     left = np.ones(start.size, bool)
@@ -109,7 +139,21 @@ def shaped_rows(
 
 
 def even_shape(batch: Batch, plan: Message) -> Shape | None:
-    """The shape of evenly spaced messages that all have the first one's; None for any others."""
+    """The shape of evenly spaced messages that all have the shape of the first.
+
+    Parameters
+    ----------
+    batch
+        The messages.
+    plan
+        Their fields.
+
+    Returns
+    -------
+    Shape or None
+        None for any other messages.
+
+    """
     first = int(batch.start[0])
     shape = shape_of(batch.buffer[first : first + int(batch.length[0])], plan)
     if shape is None or any((batch.at(at, "u1") != byte).any() for at, byte in shape.tags):

@@ -127,7 +127,19 @@ class Statistics:
 
 
 def schema(fields: Fields) -> Schema:
-    """Parse a Schema record; id 0 is not allowed."""
+    """Parses a Schema record.
+
+    Parameters
+    ----------
+    fields
+        Of the record.
+
+    Raises
+    ------
+    CaptureError
+        The id is 0, or the schema is too large.
+
+    """
     found = Schema(fields.u16(), fields.text(), fields.text(), fields.blob())
     if found.id == 0:
         raise corrupt("a schema has the id 0")
@@ -137,14 +149,42 @@ def schema(fields: Fields) -> Schema:
 
 
 def channel(fields: Fields) -> Channel:
-    """Parse a Channel record."""
+    """Parses a Channel record.
+
+    Parameters
+    ----------
+    fields
+        Of the record.
+
+    """
     number, schema_id = fields.u16(), fields.u16()
     topic, encoding = fields.text(), fields.text()
     return Channel(number, schema_id, topic, encoding, tuple(sorted(fields.text_map().items())))
 
 
 def chunk(fields: Fields, offset: int, length: int) -> Chunk:
-    """Parse a Chunk's head; its claims are checked against the limits before anyone unpacks it."""
+    """Parses the head of a Chunk record.
+
+    Parameters
+    ----------
+    fields
+        Of the record.
+    offset
+        Where it begins in the file [bytes].
+    length
+        Of the record [bytes].
+
+    Returns
+    -------
+    Chunk
+        Its claims are checked against the limits before it is unpacked.
+
+    Raises
+    ------
+    CaptureError
+        It claims to unpack to too much, or ends before it starts.
+
+    """
     start_time, end_time, size, crc = fields.u64(), fields.u64(), fields.u64(), fields.u32()
     compression = fields.text()
     begin, end = fields.span(fields.u64())
@@ -160,7 +200,18 @@ def chunk(fields: Fields, offset: int, length: int) -> Chunk:
 
 
 def message_index(fields: Fields, offset: int, length: int) -> MessageIndex:
-    """Parse a MessageIndex's head; its entries stay where they are."""
+    """Parses the head of a MessageIndex record; its entries stay where they are.
+
+    Parameters
+    ----------
+    fields
+        Of the record.
+    offset
+        Where it begins in the file [bytes].
+    length
+        Of the record [bytes].
+
+    """
     channel_id = fields.u16()
     begin, end = fields.span(fields.u32())
     if (end - begin) % 16:
@@ -169,7 +220,14 @@ def message_index(fields: Fields, offset: int, length: int) -> MessageIndex:
 
 
 def chunk_index(fields: Fields) -> ChunkIndex:
-    """Parse a ChunkIndex record."""
+    """Parses a ChunkIndex record.
+
+    Parameters
+    ----------
+    fields
+        Of the record.
+
+    """
     start_time, end_time, offset, length = (fields.u64() for _ in range(4))
     places = tuple(sorted(fields.counts()))
     index_length, compression = fields.u64(), fields.text()
@@ -187,7 +245,18 @@ def chunk_index(fields: Fields) -> ChunkIndex:
 
 
 def attachment(fields: Fields, offset: int, length: int) -> Located:
-    """Check an Attachment's CRC and keep what its index must repeat."""
+    """Checks the checksum of an Attachment and keeps what its index must repeat.
+
+    Parameters
+    ----------
+    fields
+        Of the record.
+    offset
+        Where it begins in the file [bytes].
+    length
+        Of the record [bytes].
+
+    """
     begin = fields.position
     log_time, create_time, name, media = fields.u64(), fields.u64(), fields.text(), fields.text()
     size = fields.u64()
@@ -200,23 +269,51 @@ def attachment(fields: Fields, offset: int, length: int) -> Located:
 
 
 def attachment_index(fields: Fields) -> Located:
-    """Parse an AttachmentIndex record."""
+    """Parses an AttachmentIndex record.
+
+    Parameters
+    ----------
+    fields
+        Of the record.
+
+    """
     offset, length, log_time, create_time, size = (fields.u64() for _ in range(5))
     return Located(offset, length, (log_time, create_time, size, fields.text(), fields.text()))
 
 
 def metadata(fields: Fields) -> Metadata:
-    """Parse a Metadata record."""
+    """Parses a Metadata record.
+
+    Parameters
+    ----------
+    fields
+        Of the record.
+
+    """
     return Metadata(fields.text(), tuple(fields.text_map().items()))
 
 
 def metadata_index(fields: Fields) -> Located:
-    """Parse a MetadataIndex record."""
+    """Parses a MetadataIndex record.
+
+    Parameters
+    ----------
+    fields
+        Of the record.
+
+    """
     return Located(fields.u64(), fields.u64(), (fields.text(),))
 
 
 def statistics(fields: Fields) -> Statistics:
-    """Parse a Statistics record."""
+    """Parses a Statistics record.
+
+    Parameters
+    ----------
+    fields
+        Of the record.
+
+    """
     messages, schemas = fields.u64(), fields.u16()
     channels, attachments, metadata_count, chunks = (fields.u32() for _ in range(4))
     start_time, end_time = fields.u64(), fields.u64()

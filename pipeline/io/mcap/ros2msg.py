@@ -51,7 +51,14 @@ class Field:
     array: int | None
 
     def names(self, prefix: str = "") -> list[str]:
-        """Dotted names of all fields below."""
+        """Dotted names of all fields below.
+
+        Parameters
+        ----------
+        prefix
+            Before each name.
+
+        """
         if self.dtype is not None:
             return [prefix + self.name]
         return [name for part in self.parts for name in part.names(f"{prefix}{self.name}.")]

@@ -35,7 +35,25 @@ class RecordSpans:
 
 
 def view_at_every_byte(data: Bytes | bytes, dtype: str) -> NDArray[np.generic]:
-    """Unaligned view whose element i is the `dtype` that begins at byte i."""
+    """Unaligned view whose element i is the `dtype` that begins at byte i.
+
+    Parameters
+    ----------
+    data
+        The bytes.
+    dtype
+        numpy's name of the type.
+
+    Attributes
+    ----------
+    view whose element i is the value that begins at byte i.
+
+    Returns
+    -------
+    array
+        Unaligned and overlapping, without a copy.
+
+    """
     width = np.dtype(dtype).itemsize
     raw = np.frombuffer(data, dtype=np.uint8)
     return np.ndarray((max(raw.size - width + 1, 0),), dtype, raw, 0, (1,))

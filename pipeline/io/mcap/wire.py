@@ -16,12 +16,30 @@ RECORD_AGAIN = "record the test again, or copy the file again from the bench"
 
 
 def corrupt(message: str, rows: tuple[int, int] | None = None) -> CaptureError:
-    """The refusal of bytes that contradict the format or a checksum."""
+    """The refusal of bytes that contradict the format or a checksum.
+
+    Parameters
+    ----------
+    message
+        What is wrong.
+    rows
+        First and last row concerned.
+
+    """
     return CaptureError("corrupt", message, RECORD_AGAIN, rows)
 
 
 def truncated(message: str, rows: tuple[int, int] | None = None) -> CaptureError:
-    """The refusal of a file that ends before its structure does."""
+    """The refusal of a file that ends before its structure does.
+
+    Parameters
+    ----------
+    message
+        What is missing.
+    rows
+        First and last row concerned.
+
+    """
     return CaptureError(
         "truncated",
         message,
@@ -31,7 +49,14 @@ def truncated(message: str, rows: tuple[int, int] | None = None) -> CaptureError
 
 
 def too_large(message: str) -> CaptureError:
-    """The refusal of a size that no bench produces."""
+    """The refusal of a size that no bench produces.
+
+    Parameters
+    ----------
+    message
+        What is too large.
+
+    """
     return CaptureError("limit", message, "record with chunks below 64 MiB, or split the file")
 
 
@@ -47,7 +72,19 @@ class Fields:
         self.what = what
 
     def skip(self, count: int) -> int:
-        """Move over `count` bytes and return where they begin."""
+        """Moves over some bytes and returns where they begin.
+
+        Parameters
+        ----------
+        count
+            How many.
+
+        Raises
+        ------
+        CaptureError
+            They run past the end of the record.
+
+        """
         begin = self.position
         if count > self.end - begin:
             raise corrupt(f"a length in {self.what} at byte {begin} runs past the record's end")
@@ -71,7 +108,14 @@ class Fields:
         return int(U64.unpack_from(self.data, self.skip(8))[0])
 
     def span(self, length: int) -> tuple[int, int]:
-        """Where the next `length` bytes begin and end."""
+        """Where the next bytes begin and end.
+
+        Parameters
+        ----------
+        length
+            How many.
+
+        """
         begin = self.skip(length)
         return begin, begin + length
 

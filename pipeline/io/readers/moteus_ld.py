@@ -72,7 +72,14 @@ def _number(value: Any) -> float | None:
 
 
 def metadata(data: bytes) -> Mapping[str, str]:
-    """Pole pairs, half the poles of `params`, where it states an even number."""
+    """Pole pairs: half the poles of `params`, where that states an even number.
+
+    Parameters
+    ----------
+    data
+        Content of the file.
+
+    """
     params = _document(data).get("params")
     poles = params.get("poles") if isinstance(params, dict) else None
     if isinstance(poles, int) and poles > 0 and poles % 2 == 0:

@@ -65,10 +65,26 @@ def write_recording(
     datasheet: Datasheet | None = None,
     findings: Sequence[Finding] = (),
 ) -> None:
-    """Writes one capture's .rrd, whole or not at all, with the layout that shows it.
+    """Writes the recording of one capture with its layout, whole or not at all.
 
-    `evidence` may be of the whole campaign; what was fitted to other captures is left out.
-    Raises MachineError where the disk refuses.
+    Parameters
+    ----------
+    capture
+        The capture.
+    evidence
+        Plots of the fits, of the whole campaign too: what was fitted to other captures is left out.
+    path
+        The .rrd file.
+    datasheet
+        Shown as a page; None without one.
+    findings
+        Shown as a log.
+
+    Raises
+    ------
+    MachineError
+        The disk refuses.
+
     """
     write_sealed(path, recording_bytes(capture, evidence, datasheet, findings))
 
@@ -79,7 +95,20 @@ def recording_bytes(
     datasheet: Datasheet | None = None,
     findings: Sequence[Finding] = (),
 ) -> bytes:
-    """One capture's .rrd, footer included."""
+    """The recording of one capture as bytes.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+    evidence
+        Plots of the fits.
+    datasheet
+        Shown as a page; None without one.
+    findings
+        Shown as a log.
+
+    """
     own = own_evidence(capture, evidence)
     traces, fits = list(capture_traces(capture)), list(fit_traces(own))
     drawn = (residual_maps(capture, one) for one in first_of_each(own))
@@ -105,12 +134,28 @@ def recording_bytes(
 
 
 def identity(capture: Capture, datasheet: Datasheet | None) -> tuple[str, str, str]:
-    """What makes the id of a recording: the same work, the same id."""
+    """What the id of a recording is made of: the same work has the same id.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+    datasheet
+        Its version counts.
+
+    """
     return capture.path, capture.sha256, "" if datasheet is None else datasheet.version
 
 
 def has_lanes(capture: Capture) -> tuple[str, ...]:
-    """Entities of the lanes that this capture has."""
+    """Entities of the lanes that a capture has.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+
+    """
     from pipeline.io.recordings.capture_lanes import ASIDE, REGIME, capture_regimes, rows_aside
 
     lanes = ((REGIME, capture_regimes(capture)), (ASIDE, rows_aside(capture)))

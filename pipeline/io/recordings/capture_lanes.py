@@ -44,7 +44,19 @@ Line = tuple[str, str, int]
 
 
 def capture_regimes(capture: Capture) -> tuple[Stretch, ...]:
-    """What the machine did over the rows of the capture's main table; empty where unknown."""
+    """What the machine did over the rows of the main table of a capture.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+
+    Returns
+    -------
+    tuple of Stretch
+        Empty without a clock, or without speed and current.
+
+    """
     if not capture.tables or "t_s" not in capture.tables[0].columns:
         return ()
     table = capture.tables[0]
@@ -60,7 +72,19 @@ def capture_regimes(capture: Capture) -> tuple[Stretch, ...]:
 
 
 def rows_aside(capture: Capture) -> tuple[Stretch, ...]:
-    """Rows of the main table that gates set aside, by the gate's name; empty where none are."""
+    """Rows of the main table that gates set aside, by the name of the gate.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+
+    Returns
+    -------
+    tuple of Stretch
+        Empty where none are.
+
+    """
     masks = [mask for mask in capture.masks if mask.table == 0 and mask.dropped]
     if not masks or "t_s" not in capture.tables[0].columns:
         return ()
@@ -73,7 +97,23 @@ def rows_aside(capture: Capture) -> tuple[Stretch, ...]:
 def lines_of(
     capture: Capture, evidence: Sequence[Evidence], findings: Sequence[Finding]
 ) -> list[Line]:
-    """(level, words, row) of findings, rows set aside and largest residuals, the worst first."""
+    """Findings, rows set aside and largest residuals as lines of a log, the worst first.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+    evidence
+        What was fitted to it.
+    findings
+        On its file.
+
+    Returns
+    -------
+    list of tuple
+        Level, text and row.
+
+    """
     messages: list[Line] = []
     for one in sorted(findings):
         level = "ERROR" if one.severity == "refused" else "WARN"
@@ -88,7 +128,16 @@ def lines_of(
 
 
 def send_lanes(stream: RecordingStream, capture: Capture) -> tuple[str, ...]:
-    """Sends the lanes that have something to say; returns their entities."""
+    """Sends the lanes that hold something; returns their entities.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    capture
+        The capture.
+
+    """
     sent = []
     for entity, lane in ((REGIME, capture_regimes(capture)), (ASIDE, rows_aside(capture))):
         if lane:
@@ -98,7 +147,18 @@ def send_lanes(stream: RecordingStream, capture: Capture) -> tuple[str, ...]:
 
 
 def send_lines(stream: RecordingStream, capture: Capture, lines: Sequence[Line]) -> None:
-    """One log line each, at its row; no wall clock is written."""
+    """Sends lines of a log, each at its row; no wall clock is written.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    capture
+        Its clock.
+    lines
+        Level, text and row.
+
+    """
     import rerun as rr
 
     rr.send_columns(

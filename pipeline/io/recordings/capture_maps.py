@@ -46,7 +46,21 @@ class ResidualMaps:
 
 
 def residual_maps(capture: Capture, evidence: Evidence) -> ResidualMaps | None:
-    """Maps of one series fitted over time; None where neither speed nor angle is recorded."""
+    """Maps of the residual of one series that was fitted over time.
+
+    Parameters
+    ----------
+    capture
+        Holds speed, current and angle.
+    evidence
+        The fit.
+
+    Returns
+    -------
+    ResidualMaps or None
+        None where neither speed nor angle is recorded.
+
+    """
     series = evidence.series[0]
     error = series.measured - series.fitted
     at = dict(_variables(capture, series.x))
@@ -65,23 +79,61 @@ def residual_maps(capture: Capture, evidence: Evidence) -> ResidualMaps | None:
 
 
 def angle_of(signal: str) -> str:
-    """The angle that a signal's error is drawn over: torque ripples with the shaft."""
+    """The angle that the error of a signal is drawn over.
+
+    Parameters
+    ----------
+    signal
+        Glossary name; torque ripples with the shaft, voltages with the electrical angle.
+
+    """
     return "theta_mech_rad" if signal == "torque_shaft_nm" else "theta_elec_rad"
 
 
 def angle_words(signal: str) -> str:
-    """Which turn a signal's residual is drawn over."""
+    """Which turn the residual of a signal is drawn over, in a word.
+
+    Parameters
+    ----------
+    signal
+        Glossary name.
+
+    """
     return "mechanical" if angle_of(signal) == "theta_mech_rad" else "electrical"
 
 
 def signal_floor(measured: Array) -> float:
-    """1 % of the largest value of a signal [its unit]; 1 where it has none."""
+    """Smallest value of full colour for the residual of a signal.
+
+    Parameters
+    ----------
+    measured
+        The signal [n].
+
+    Returns
+    -------
+    float
+        1 % of its largest value; 1 where it has none.
+
+    """
     finite = np.abs(measured[np.isfinite(measured)])
     return FULL_COLOUR_SHARE * float(finite.max(initial=0.0)) or 1.0
 
 
 def order_amplitudes(mean: Array) -> Array:
-    """Amplitudes of orders 1.. of a mean over one turn [c]; empty where cells are missing."""
+    """Amplitudes of the orders of a mean over one turn.
+
+    Parameters
+    ----------
+    mean
+        Mean of each cell of the turn [c].
+
+    Returns
+    -------
+    array
+        From order 1 on, in the unit of the mean; empty where cells are missing.
+
+    """
     if mean.size < 4 or not np.isfinite(mean).all():
         return np.zeros(0)
     amplitude: Array = 2.0 * np.abs(np.fft.rfft(mean)) / mean.size

@@ -32,7 +32,14 @@ class FitTrace:
 
 
 def capture_traces(capture: Capture) -> Iterator[Trace]:
-    """Every table of a capture that has rows and columns to show."""
+    """Every table of a capture that has rows and columns to show.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+
+    """
     for number, table in enumerate(capture.tables):
         entity = "/measured" if number == 0 else f"/measured_{number}"
         values = table.drop("t_s", strict=False).select(pl.all().cast(pl.Float32).fill_null(np.nan))
@@ -48,9 +55,18 @@ def capture_traces(capture: Capture) -> Iterator[Trace]:
 
 
 def sample_table(traces: Sequence[Trace]) -> tuple[Trace, int] | None:
-    """What the table of samples shows, and that it is one row in how many.
+    """What the table of samples shows.
 
-    It is the first table itself; of a packed one evenly spaced rows, column by column.
+    Parameters
+    ----------
+    traces
+        Tables of the capture.
+
+    Returns
+    -------
+    tuple of Trace and int or None
+        The first table, of a packed one evenly spaced rows; and that it is one row in how many.
+
     """
     if not traces:
         return None
@@ -62,7 +78,16 @@ def sample_table(traces: Sequence[Trace]) -> tuple[Trace, int] | None:
 
 
 def own_evidence(capture: Capture, evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
-    """What was fitted to this capture over time."""
+    """What was fitted to a capture over time.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+    evidence
+        Plots of the fits of a campaign.
+
+    """
     return tuple(
         one
         for one in evidence
@@ -73,7 +98,14 @@ def own_evidence(capture: Capture, evidence: Sequence[Evidence]) -> tuple[Eviden
 
 
 def first_of_each(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
-    """The first evidence of each quantity that has a single series."""
+    """The first plot of each quantity that has a single series.
+
+    Parameters
+    ----------
+    evidence
+        Plots of the fits.
+
+    """
     first: dict[str, Evidence] = {}
     for one in evidence:
         if len(one.series) == 1:
@@ -82,7 +114,14 @@ def first_of_each(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
 
 
 def fit_traces(evidence: Sequence[Evidence]) -> Iterator[FitTrace]:
-    """The series of a capture's own evidence."""
+    """The series of a capture's own plots.
+
+    Parameters
+    ----------
+    evidence
+        As `own_evidence` gives it.
+
+    """
     for number, one in enumerate(evidence):
         for place, series in enumerate(one.series):
             if series.fitted.size == 0 or series.x.size == 0:

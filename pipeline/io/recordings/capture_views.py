@@ -56,7 +56,15 @@ class Shown:
 
 
 def capture_layout(shown: Shown) -> Blueprint:
-    """Tabs: traces with loupe, lanes and findings; maps; all signals; datasheet and samples."""
+    """The layout of a capture: traces with magnifier, lanes and findings; maps; all signals;
+    datasheet.
+
+    Parameters
+    ----------
+    shown
+        What the recording holds.
+
+    """
     main = main_views(shown.traces, shown.fits)
     tabs = [_traces_tab(shown, main)]
     if shown.maps:
@@ -69,20 +77,47 @@ def capture_layout(shown: Shown) -> Blueprint:
 
 
 def main_views(traces: Sequence[Trace], fits: Sequence[FitTrace]) -> tuple[ViewPlan, ...]:
-    """The first fitted quantities with their residuals, then speed, currents and the like."""
+    """The first fitted quantities with their residuals, then speed, currents and the like.
+
+    Parameters
+    ----------
+    traces
+        Tables of the capture.
+    fits
+        What was fitted to them.
+
+    """
     return _views(traces, fits, MOST_FITS, MOST_GROUPS)
 
 
 def further_views(
     traces: Sequence[Trace], fits: Sequence[FitTrace], main: Sequence[ViewPlan]
 ) -> tuple[ViewPlan, ...]:
-    """Every fitted quantity and every column that the main views leave out."""
+    """Every fitted quantity and every column that the main views leave out.
+
+    Parameters
+    ----------
+    traces
+        Tables of the capture.
+    fits
+        What was fitted to them.
+    main
+        The main views.
+
+    """
     every = _views(traces, fits, len(fits), MOST_UNITS)
     return tuple(plan for plan in every if plan not in main)
 
 
 def loupe_views(fits: Sequence[FitTrace]) -> tuple[ViewPlan, ...]:
-    """Measured over model, and what is left, close to the cursor."""
+    """Measured over model, and the residual, close to the cursor.
+
+    Parameters
+    ----------
+    fits
+        What was fitted; without any over time there are no such views.
+
+    """
     timed = [fit for fit in fits if fit.trace.index == TIME]
     if not timed:
         return ()

@@ -51,12 +51,33 @@ MOST_POINTS = 4000
 
 
 def write_comparison_recording(result: Comparison, path: Path) -> None:
-    """Writes one motor's comparison as .rrd; MachineError where the disk refuses."""
+    """Writes the comparison of one motor as a recording.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+    path
+        The .rrd file.
+
+    Raises
+    ------
+    MachineError
+        The disk refuses.
+
+    """
     write_sealed(path, comparison_bytes(result))
 
 
 def comparison_bytes(result: Comparison) -> bytes:
-    """The .rrd of one comparison, made in memory."""
+    """The recording of one comparison as bytes.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    """
     identity = canonical_json(result.document()).decode()
     with recording(f"{result.motor_id} comparison", (identity,), _layout(result)) as made:
         for trace in result.traces:
@@ -73,7 +94,14 @@ def comparison_bytes(result: Comparison) -> bytes:
 
 
 def entity_of(trace: Trace) -> str:
-    """Where a trace lies; the capture's path is one part of the address."""
+    """Where a trace lies in a recording; the path of its capture is one part of the address.
+
+    Parameters
+    ----------
+    trace
+        The trace.
+
+    """
     safe = "".join(c if c.isalnum() or c in "._-" else "_" for c in trace.capture)
     return f"/{safe}/{trace.kind}/{trace.signal}"
 
@@ -82,6 +110,16 @@ def table_of(trace: Trace) -> Table:
     """A trace as columns of float32; of a long one the rows that a screen could separate.
 
     Every stretch keeps the extremes of what was measured, of the model and of the residual.
+
+    Parameters
+    ----------
+    trace
+        The trace; extremes of measured, model and residual are kept in every stretch.
+
+    Attributes
+    ----------
+    trace as columns of float32, of a long one the rows that a screen can separate.
+
     """
     columns = {
         "measured": trace.measured,
@@ -94,7 +132,16 @@ def table_of(trace: Trace) -> Table:
 
 
 def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
-    """Views of one capture: each signal with its residual under it, on an axis that stays."""
+    """Views of one capture: each signal with its residual below, on an axis that stays.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+    capture
+        Path of the capture.
+
+    """
     plans: list[ViewPlan] = []
     for trace in result.traces:
         if trace.capture != capture:

@@ -16,9 +16,17 @@ _SPECIAL = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&])")
 
 
 def sheet_markdown(datasheet: Datasheet, path: str, first: Sequence[str] = ()) -> str:
-    """Status, checks and constants of a motor.
+    """Status, checks and constants of a motor as a page.
 
-    Those that rest on the capture `path` come first, or those of `first`.
+    Parameters
+    ----------
+    datasheet
+        The datasheet.
+    path
+        Constants that rest on this capture come first.
+    first
+        Constants that come first instead.
+
     """
     names = sorted(datasheet.constants)
     own = [name for name in names if path in datasheet.constants[name].captures]
@@ -37,7 +45,14 @@ def sheet_markdown(datasheet: Datasheet, path: str, first: Sequence[str] = ()) -
 
 
 def checks_markdown(datasheet: Datasheet) -> str:
-    """Every check with its value and limit, and the captures that the datasheet rests on."""
+    """Every check with its value and limit, and the captures that a datasheet rests on, as a page.
+
+    Parameters
+    ----------
+    datasheet
+        The datasheet.
+
+    """
     lines = [f"# {plain(datasheet.motor_id)}: checks", "", *_checks(datasheet), ""]
     lines += ["## Captures", "", "| capture | test | integrity |", "| --- | --- | --- |"]
     lines += [
@@ -82,5 +97,12 @@ def _text(value: float, u: float, unit: str) -> str:
 
 @lru_cache(1024)
 def plain(text: str) -> str:
-    """Text that markdown leaves alone, on one line."""
+    """Text that Markdown leaves unchanged, on one line.
+
+    Parameters
+    ----------
+    text
+        Any text.
+
+    """
     return _SPECIAL.sub(r"\\\1", " ".join(text.split()))

@@ -42,7 +42,19 @@ class Labels:
 
 
 def diverging(share: NDArray[np.float64]) -> Image:
-    """Colours [..., 3] of shares from −1 (blue) over 0 (white) to 1 (red)."""
+    """Colours of shares from −1 (blue) over 0 (white) to 1 (red).
+
+    Parameters
+    ----------
+    share
+        [...].
+
+    Returns
+    -------
+    array [..., 3]
+        RGB.
+
+    """
     strength = np.clip(np.abs(share), 0.0, 1.0)[..., None]
     end = np.where(share[..., None] < 0.0, _COLD, _WARM)
     colours: Image = np.rint(_NEUTRAL + (end - _NEUTRAL) * strength).astype(np.uint8)
@@ -50,7 +62,21 @@ def diverging(share: NDArray[np.float64]) -> Image:
 
 
 def map_picture(one: ErrorMap, reach: float) -> Image:
-    """RGB picture [height, width, 3] of a map of x and y; `reach` [unit] is full colour."""
+    """The picture of a map of two variables.
+
+    Parameters
+    ----------
+    one
+        The map.
+    reach
+        Mean error of full colour [unit].
+
+    Returns
+    -------
+    array [height, width, 3]
+        RGB; empty cells are hatched.
+
+    """
     rows, columns = one.mean.shape
     height, width = CELL * rows, CELL * columns
     known = np.isfinite(one.mean)[::-1]
@@ -64,15 +90,45 @@ def map_picture(one: ErrorMap, reach: float) -> Image:
 
 
 def bar_picture(rows: int) -> Image:
-    """RGB picture [height, width, 3] of the colours from +reach down to −reach."""
+    """The picture of a colour bar, from full colour downwards to its negative.
+
+    Parameters
+    ----------
+    rows
+        Cells that the bar is high.
+
+    Returns
+    -------
+    array [height, width, 3]
+        RGB.
+
+    """
     ramp = np.linspace(1.0, -1.0, CELL * rows)[:, None] * np.ones((1, BAR_WIDTH))
     return diverging(ramp)
 
 
 def map_labels(one: ErrorMap, reach: float, words: tuple[str, str]) -> Labels:
-    """Ticks of both axes and of the colour bar, and `words` for x and y, in picture pixels.
+    """Ticks of both axes and of the colour bar of a map.
 
-    Raises ValueError for a map of one variable.
+    Parameters
+    ----------
+    one
+        The map.
+    reach
+        Mean error of full colour [unit].
+    words
+        Names of x and y.
+
+    Returns
+    -------
+    Labels
+        Places in pixels of the picture.
+
+    Raises
+    ------
+    ValueError
+        The map is of one variable.
+
     """
     if one.y is None:
         raise ValueError("a picture needs a map of two variables")
@@ -110,7 +166,22 @@ def send_map(
     reach: float,
     at: tuple[str, int] | None = None,
 ) -> None:
-    """The picture of a map and its values [unit]; `at` is a timeline and a place on it."""
+    """Sends the picture of a map and its values.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    entity
+        Where it lies.
+    one
+        The map.
+    reach
+        Mean error of full colour [unit].
+    at
+        A timeline and a place on it; None for all times.
+
+    """
     import rerun as rr
 
     picture = map_picture(one, reach)
@@ -131,7 +202,22 @@ def send_map(
 def send_frame(
     stream: RecordingStream, entity: str, one: ErrorMap, reach: float, words: tuple[str, str]
 ) -> None:
-    """Ticks, words, colour bar and border of a map; they stand at every time."""
+    """Sends ticks, names, colour bar and border of a map, for all times.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    entity
+        Where the map lies.
+    one
+        The map.
+    reach
+        Mean error of full colour [unit].
+    words
+        Names of x and y.
+
+    """
     import rerun as rr
 
     labels = map_labels(one, reach, words)
@@ -151,7 +237,18 @@ def send_frame(
 
 
 def map_view(entity: str, one: ErrorMap, name: str) -> Spatial2DView:
-    """The view of a map with room for its labels."""
+    """The view of a map, with room for its labels.
+
+    Parameters
+    ----------
+    entity
+        Where the map lies.
+    one
+        The map.
+    name
+        Of the view.
+
+    """
     import rerun.blueprint as rrb
 
     rows, columns = one.mean.shape

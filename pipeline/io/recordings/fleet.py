@@ -33,7 +33,16 @@ MOTOR = "property:motor"
 
 
 def motor_layout(signals: Sequence[str], captures: int) -> Blueprint:
-    """Datasheet at the left; residuals of all captures, cogging and findings at the right."""
+    """The layout of one motor: datasheet at the left; residuals, cogging and findings at the right.
+
+    Parameters
+    ----------
+    signals
+        Quantities with residuals.
+    captures
+        How many captures there is room for.
+
+    """
     import rerun.blueprint as rrb
 
     colours = (RESIDUAL, *PALETTE[1:], MODEL, MEASURED)
@@ -74,7 +83,14 @@ def motor_layout(signals: Sequence[str], captures: int) -> Blueprint:
 
 
 def table_layout(captures: int) -> TableBlueprint:
-    """The table: verdict, lot, key constants, previews; refused motors first."""
+    """The layout of the fleet's table: verdict, lot, key constants, previews; refused motors first.
+
+    Parameters
+    ----------
+    captures
+        How many captures the previews have room for.
+
+    """
     import rerun.blueprint as rrb
 
     table = rrb.table
@@ -111,9 +127,22 @@ def table_layout(captures: int) -> TableBlueprint:
 
 
 def write_layouts(folder: Path, signals: Sequence[str], captures: int) -> tuple[Path, Path]:
-    """The table's and the motors' layout as .rbl files, for a server to register.
+    """Writes the layouts of table and motors as .rbl files, for a server to register.
 
-    `signals` are those that any motor has, `captures` the most that one has.
+    Parameters
+    ----------
+    folder
+        Where they are written.
+    signals
+        Quantities that any motor has.
+    captures
+        The most captures that a motor has.
+
+    Returns
+    -------
+    tuple of Path
+        The files of table and motor.
+
     """
     table, motor = folder / "table.rbl", folder / "motor.rbl"
     table_layout(captures).save(APPLICATION, table)

@@ -37,7 +37,19 @@ _DIGITS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")
 
 
 def in_headings(unit: str) -> str:
-    """A unit for the heading of a table, whose font has no superscript minus: ×10⁻⁶ as 1e-6."""
+    """A unit for the heading of a table, whose font has no superscript minus: ×10⁻⁶ as 1e-6.
+
+    Parameters
+    ----------
+    unit
+        As people write it.
+
+    Attributes
+    ----------
+    unit for the heading of a table, whose font has no superscript minus
+        ×10⁻⁶ as 1e-6.
+
+    """
 
     def plain(found: re.Match[str]) -> str:
         return ("1e-" if found[1] else "^-") + found[2].translate(_DIGITS)
@@ -46,5 +58,16 @@ def in_headings(unit: str) -> str:
 
 
 def drawable(text: str) -> str:
-    """The text with every character that the viewer cannot draw as its code point, ‹1F600›."""
+    """The text with every character that the viewer cannot draw as its code point, ‹1F600›.
+
+    Parameters
+    ----------
+    text
+        Any text.
+
+    Attributes
+    ----------
+    text with every character that the viewer cannot draw as its code point, ‹1F600›.
+
+    """
     return _OTHER.sub(lambda found: f"‹{ord(found.group()):X}›", text)

@@ -44,12 +44,33 @@ WORDS = ("speed [rad/s]", "iq [A]")
 
 
 def write_ladder_recording(result: Diagnosis, path: Path) -> None:
-    """Writes the ladder of one motor as .rrd; MachineError where the disk refuses."""
+    """Writes the search of one motor as a recording.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+    path
+        The .rrd file.
+
+    Raises
+    ------
+    MachineError
+        The disk refuses.
+
+    """
     write_sealed(path, ladder_bytes(result))
 
 
 def ladder_bytes(result: Diagnosis) -> bytes:
-    """The .rrd of one motor's ladder, made in memory."""
+    """The recording of the search of one motor as bytes.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+
+    """
     identity = canonical_json(result.document()).decode()
     name = f"{result.motor_id} ladder"
     with recording(name, (identity,), ladder_layout(result)) as made:

@@ -8,7 +8,16 @@ from pipeline.views.ladder import LadderView, ladder_view
 
 
 def rung_markdown(result: Diagnosis, place: int) -> str:
-    """One rung: what came, its parameters, all errors so far; the verdict on the last one."""
+    """One step of the search as a page: what was added, its parameters, all errors so far.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+    place
+        Number of the step; the last one has the verdict too.
+
+    """
     view = ladder_view(result)
     rung = view.rungs[place]
     lines = [f"# Rung {place}: {plain(rung.title)}", ""]

@@ -17,7 +17,14 @@ if TYPE_CHECKING:
 
 
 def ladder_layout(result: Diagnosis) -> Blueprint:
-    """A tab a signal: page and map above, bars below; a last tab with all rungs as lines."""
+    """The layout of a search: a tab a signal, and a last tab with all steps as lines.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+
+    """
     signals = mapped_signals(result)
     tabs = [_workspace(result, signal) for signal in signals]
     tabs = [*tabs, _overview(signals)] if tabs else [_page()]

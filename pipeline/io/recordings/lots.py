@@ -60,17 +60,45 @@ DIGITS = 5
 
 
 def lots_name(result: LotRegression) -> str:
-    """The file of a comparison, by what was held against what."""
+    """The file name of a comparison of lots, by what was compared with what.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    """
     return f"lots-{file_stem(f'{result.baseline.selector} {result.candidate.selector}')}.rrd"
 
 
 def write_lots_recording(result: LotRegression, path: Path) -> None:
-    """Writes one comparison of lots as .rrd and its seal; MachineError where the disk refuses."""
+    """Writes one comparison of lots as a recording with its checksum.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+    path
+        The .rrd file.
+
+    Raises
+    ------
+    MachineError
+        The disk refuses.
+
+    """
     write_sealed(path, lots_bytes(result))
 
 
 def lots_bytes(result: LotRegression) -> bytes:
-    """The .rrd of one comparison of lots, made in memory."""
+    """The recording of one comparison of lots as bytes.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    """
     identity = canonical_json(result.document()).decode()
     name = f"{result.baseline.selector} → {result.candidate.selector}"
     with recording(name, (identity,), lots_layout(result)) as made:

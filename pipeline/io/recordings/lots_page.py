@@ -10,7 +10,14 @@ MOST_OUTLIERS = 12
 
 
 def verdict_markdown(result: LotRegression) -> str:
-    """Verdict, headline, reasons, a line a constant, outliers and notes."""
+    """Verdict, headline, reasons, one line a constant, outliers and notes as a page.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    """
     before, after = result.baseline, result.candidate
     lines = [
         f"# {plain(before.selector)} → {plain(after.selector)}: {plain(result.verdict)}",

@@ -25,12 +25,31 @@ FILL = 8
 
 
 def constant_scale(one: ConstantResult) -> Scale:
-    """The unit in which a constant is shown."""
+    """The unit in which a constant is shown.
+
+    Parameters
+    ----------
+    one
+        Its result.
+
+    """
     return scale_for(max(abs(motor.value) for motor in one.motors), one.unit)
 
 
 def histogram(one: ConstantResult) -> tuple[Array, dict[Side, Array]]:
-    """Left edges of common bins in the shown unit [B + 1], and motors per bin of each side [B]."""
+    """Motors by value of a constant, of both sides in common bins.
+
+    Parameters
+    ----------
+    one
+        Its result.
+
+    Returns
+    -------
+    tuple of array and dict
+        Edges in the shown unit [B + 1], and motors a bin of each side [B].
+
+    """
     scale = constant_scale(one)
     shown = {s: np.array([scale.shown(m.value) for m in one.of(s)]) for s in SIDES}
     every = np.concatenate(list(shown.values()))
@@ -43,7 +62,23 @@ def histogram(one: ConstantResult) -> tuple[Array, dict[Side, Array]]:
 
 
 def drift(one: ConstantResult) -> pl.DataFrame | None:
-    """Lot by lot: mean, its ±U, EWMA and its control limits as change from the baseline [%]."""
+    """Lot by lot: mean, its ±U, EWMA and its control limits as change from the baseline [%].
+
+    Parameters
+    ----------
+    one
+        Its result.
+
+    Attributes
+    ----------
+    constant lot by lot, as change from the baseline.
+
+    Returns
+    -------
+    DataFrame or None
+        Mean, its ±U, EWMA and its control limits [%]; None without a baseline.
+
+    """
     before = [lot.mean for lot in one.lots if lot.side == "baseline"]
     centre = float(np.mean(before)) if before else 0.0
     if not before or centre == 0.0:
@@ -69,7 +104,23 @@ def drift(one: ConstantResult) -> pl.DataFrame | None:
 
 
 def band_trace(band: CoggingBand) -> Trace:
-    """A band of cogging torque [mN·m] over 0.1°, with lines between its edges that fill it."""
+    """A band of cogging torque [mN·m] over 0.1°, with lines between its edges that fill it.
+
+    Parameters
+    ----------
+    band
+        Mean and standard deviation over the motors of a side.
+
+    Attributes
+    ----------
+    band of cogging torque over the angle, with lines between its edges that fill it.
+
+    Returns
+    -------
+    Trace
+        In mN·m, over steps of 0.1°.
+
+    """
     low, high = 1e3 * np.array(band.low_nm), 1e3 * np.array(band.high_nm)
     columns = {"mean": 1e3 * np.array(band.mean_nm), "low": low, "high": high}
     for number in range(1, FILL):
@@ -82,5 +133,17 @@ def band_trace(band: CoggingBand) -> Trace:
 
 
 def leading_order(result: LotRegression) -> int:
-    """The order of the largest mean amplitude on either side; 1 where none is known."""
+    """The order of the largest mean amplitude on either side.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    Returns
+    -------
+    int
+        1 where none is known.
+
+    """
     return max(result.orders, key=lambda level: level.mean).order if result.orders else 1

@@ -41,7 +41,14 @@ FILL_ALPHA, FILL_WIDTH = 40, 3.0
 
 
 def lots_layout(result: LotRegression) -> Blueprint:
-    """Tabs: verdict with what changed most; all distributions; drift of every constant."""
+    """The layout of a comparison of lots: verdict; all distributions; drift of every constant.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    """
     import rerun.blueprint as rrb
 
     shown = compared(result)
@@ -58,14 +65,28 @@ def lots_layout(result: LotRegression) -> Blueprint:
 
 
 def histogram_view(one: ConstantResult) -> Any:
-    """Motors per bin, both sides over each other."""
+    """Motors a bin of one constant, both sides over each other.
+
+    Parameters
+    ----------
+    one
+        Its result.
+
+    """
     unit = constant_scale(one).unit or "1"
     name = f"{quantity_words(one.name)} [{unit}], motors per bin: {one.verdict}"
     return bar_view(name, *(f"/hist/{one.name}/{side}" for side in SIDES), legend=True)
 
 
 def drift_plan(one: ConstantResult) -> ViewPlan:
-    """Lot means with ±U, the candidate's in its own colour, and the chart's control limits."""
+    """Lot means with ±U, the candidate in its own colour, and the control limits of the chart.
+
+    Parameters
+    ----------
+    one
+        Its result.
+
+    """
     entity = f"/drift/{one.name}"
     lines = (
         Line(entity, "low", "mean ± U", (*BASELINE, 110)),
@@ -81,7 +102,19 @@ def drift_plan(one: ConstantResult) -> ViewPlan:
 
 
 def cogging_plan(result: LotRegression) -> ViewPlan | None:
-    """Both bands over the mechanical angle; None where no motor was turned without current."""
+    """Both bands of cogging torque over the mechanical angle.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    Returns
+    -------
+    ViewPlan or None
+        None where no motor was turned without current.
+
+    """
     lines: list[Line] = []
     for band in result.cogging:
         entity, colour = f"/cogging/{band.side}", COLOURS[band.side]

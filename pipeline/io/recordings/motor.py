@@ -77,7 +77,20 @@ def motor_bytes(
     evidence: Sequence[Evidence],
     findings: Sequence[Finding],
 ) -> bytes:
-    """The .rrd of one motor, made in memory."""
+    """The recording of one motor as bytes.
+
+    Parameters
+    ----------
+    campaign
+        Its captures.
+    datasheet
+        Its datasheet.
+    evidence
+        Plots of the fits.
+    findings
+        On its files.
+
+    """
     strips = tuple(overview(campaign, evidence))
     with recording(
         datasheet.motor_id,
@@ -100,14 +113,33 @@ def motor_bytes(
 
 
 def segment_id(datasheet: Datasheet) -> str:
-    """The id of a motor's recording, which names its row: one a motor, whatever its serial."""
+    """The id of a motor's recording, which names its row: one a motor, whatever its serial number.
+
+    Parameters
+    ----------
+    datasheet
+        Its datasheet.
+
+    """
     return file_stem(datasheet.motor_id)
 
 
 def overview(campaign: Campaign, evidence: Sequence[Evidence]) -> Iterator[Strip]:
-    """What every capture leaves over, all equally wide, against the signal's reach on this motor.
+    """Residuals of every capture, all equally wide, relative to the signal's range on this motor.
 
-    Against each capture's own reach, a torque of nothing but cogging would seem all wrong.
+    Parameters
+    ----------
+    campaign
+        Captures of the motor.
+    evidence
+        Plots of the fits.
+
+    Yields
+    ------
+    Strip
+        Relative to the range in its own capture, a torque of nothing but cogging would seem all
+        wrong.
+
     """
     found = [(c.path, first_of_each(own_evidence(c, evidence))) for c in campaign.captures]
     drawn = [(number, *one) for number, one in enumerate(one for one in found if one[1])]
@@ -133,7 +165,14 @@ def _ended(places: NDArray[np.int64], values: Array) -> tuple[NDArray[np.int64],
 
 
 def signals_of(strips: Sequence[Strip]) -> tuple[str, ...]:
-    """The quantities of an overview, in the order in which they first come."""
+    """The quantities of an overview, in the order in which they first appear.
+
+    Parameters
+    ----------
+    strips
+        Series of the overview.
+
+    """
     return tuple(dict.fromkeys(strip.signal for strip in strips))
 
 

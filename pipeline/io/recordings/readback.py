@@ -13,9 +13,27 @@ _OVERVIEW = "/overview/"
 
 
 def recording_property(path: Path, name: str, key: str) -> list[Any]:
-    """The values of a property that was sent to a recording; empty where it has none.
+    """The values of a property that was sent to a recording.
 
-    Raises RecordingError where the file cannot be read.
+    Parameters
+    ----------
+    path
+        The .rrd file.
+    name
+        Of the property.
+    key
+        Of the value.
+
+    Returns
+    -------
+    list
+        Empty where there is none.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be read.
+
     """
     from rerun.chunk import RrdReader
 
@@ -32,7 +50,14 @@ def recording_property(path: Path, name: str, key: str) -> list[Any]:
 
 
 def entities(path: Path) -> tuple[str, ...]:
-    """Addresses of everything in a recording but its properties, sorted."""
+    """Addresses of everything in a recording except its properties, sorted.
+
+    Parameters
+    ----------
+    path
+        The .rrd file.
+
+    """
     from rerun.chunk import RrdReader
 
     found = {str(chunk.entity_path) for chunk in RrdReader(str(path)).stream()}
@@ -48,7 +73,19 @@ class FleetShape:
 
 
 def fleet_shape(motors: Sequence[Path]) -> FleetShape:
-    """Quantities that the overview of any of these motors shows, and the most captures of one."""
+    """What a layout for many motors must have room for.
+
+    Parameters
+    ----------
+    motors
+        Their recordings.
+
+    Returns
+    -------
+    FleetShape
+        Quantities that any of them shows, and the most captures of one.
+
+    """
     overviews = {name for path in motors for name in entities(path) if name.startswith(_OVERVIEW)}
     counts = [recording_property(path, "motor", "captures") for path in motors]
     signals = tuple(sorted(name.removeprefix(_OVERVIEW) for name in overviews))

@@ -18,23 +18,65 @@ REMEDY = "run the command that wrote it again"
 
 
 def write_sealed(path: Path, content: bytes) -> None:
-    """Writes a recording and its seal, each whole or not at all; MachineError on a full disk."""
+    """Writes a recording and its checksum, each whole or not at all.
+
+    Parameters
+    ----------
+    path
+        The .rrd file.
+    content
+        Its bytes.
+
+    Raises
+    ------
+    MachineError
+        The disk refuses.
+
+    """
     write_whole(path, content)
     write_whole(seal_of(path), seal_line(path.name, hashlib.sha256(content).hexdigest()))
 
 
 def seal_line(name: str, sha256: str) -> bytes:
-    """What the seal of a recording of this name and digest says."""
+    """The content of the checksum file of a recording.
+
+    Parameters
+    ----------
+    name
+        Of the recording.
+    sha256
+        Its digest.
+
+    """
     return f"{sha256}  {name}\n".encode()
 
 
 def seal_of(path: Path) -> Path:
-    """Where the seal of a recording lies."""
+    """Where the checksum file of a recording lies.
+
+    Parameters
+    ----------
+    path
+        The .rrd file.
+
+    """
     return path.with_name(path.name + SEAL)
 
 
 def verify(path: Path) -> None:
-    """Raises RecordingError where a recording is not what was written, or cannot be known to be."""
+    """Refuses a recording that is not what was written, or cannot be known to be.
+
+    Parameters
+    ----------
+    path
+        The .rrd file.
+
+    Raises
+    ------
+    RecordingError
+        It is missing, is no recording, has no checksum file, or does not match it.
+
+    """
     if not path.is_file():
         raise RecordingError("the recording is not there", REMEDY)
     with path.open("rb") as stream:

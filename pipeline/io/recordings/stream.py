@@ -73,6 +73,29 @@ def recording(
     The layout is made active at once, since the web viewer lays out what comes first by itself.
     `ids` are application and recording where they mean something by themselves. Made in memory,
     since a stream onto a full disk may wait for its dead writer for ever.
+
+    Parameters
+    ----------
+    name
+        Shown in the viewer.
+    identity
+        What its id is made of: equal work has an equal id.
+    layout
+        Made active at once, since the web viewer lays out what comes first by itself; None for
+        none.
+    ids
+        Ids of application and recording, where they have a meaning by themselves.
+
+    Attributes
+    ----------
+    recording that is made in memory inside the block.
+
+    Yields
+    ------
+    Recording
+        Its content is there once the block is left. In memory, since a stream onto a full disk may
+        wait for ever.
+
     """
     import rerun as rr
 
@@ -121,21 +144,48 @@ def _has_nameless_files() -> bool:
 
 
 def application(name: str) -> str:
-    """The application id of a workspace, which the viewer takes as it stands.
+    """The application id of a workspace, which the viewer takes unchanged.
 
-    It would replace what is no ASCII letter, digit, space, `-` or `_`, and two names could meet.
+    Parameters
+    ----------
+    name
+        Any text. The viewer would replace what is no ASCII letter, digit, space, `-` or `_`, and
+        two names could become one; such a name gets a digest.
+
     """
     kept = "".join(c if c.isascii() and (c.isalnum() or c in " -_") else "-" for c in name)
     return kept if kept == name else f"{kept} {digest((name,))[:6]}"
 
 
 def digest(parts: Sequence[str]) -> str:
-    """32 hex digits that stand for some texts."""
+    """32 hexadecimal digits that stand for some texts.
+
+    Parameters
+    ----------
+    parts
+        The texts, in their order.
+
+    """
     return hashlib.sha256("\n".join(parts).encode("utf-8", "surrogatepass")).hexdigest()[:32]
 
 
 def timed(entity: str, t_s: NDArray[np.float64], values: pl.DataFrame) -> Trace:
-    """A trace on the time line; rows whose instant is not finite have no place there."""
+    """A trace on the time line; rows whose instant is not finite have no place there.
+
+    Parameters
+    ----------
+    entity
+        Where it lies.
+    t_s
+        Instants [n]; rows whose instant is not finite are left out.
+    values
+        Columns [n].
+
+    Attributes
+    ----------
+    table on the time line.
+
+    """
     finite = np.isfinite(t_s)
     index = pl.Series(TIME, nanoseconds(t_s[finite])).cast(pl.Duration("ns"))
     kept = values if finite.all() else values.filter(pl.Series(finite))
@@ -143,13 +193,34 @@ def timed(entity: str, t_s: NDArray[np.float64], values: pl.DataFrame) -> Trace:
 
 
 def nanoseconds(t_s: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Instants [n, s] as whole nanoseconds; a float of seconds would lose some."""
+    """Instants as whole nanoseconds; a float of seconds would lose some.
+
+    Parameters
+    ----------
+    t_s
+        [n].
+
+    Returns
+    -------
+    array [n] of int
+        In ns.
+
+    """
     whole: NDArray[np.int64] = np.rint(t_s * 1e9).astype(np.int64)
     return whole
 
 
 def send_trace(stream: RecordingStream, trace: Trace) -> None:
-    """Sends a table in slices of 4096 rows."""
+    """Sends a table in slices of `ROWS_A_CHUNK` rows.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    trace
+        The table.
+
+    """
     import rerun as rr
 
     frame = trace.frame
@@ -160,7 +231,18 @@ def send_trace(stream: RecordingStream, trace: Trace) -> None:
 
 
 def send_page(stream: RecordingStream, entity: str, markdown: str) -> None:
-    """A page of text that stands at every time."""
+    """Sends a page of text, for all times.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    entity
+        Where it lies.
+    markdown
+        The text.
+
+    """
     import rerun as rr
 
     page = rr.TextDocument(drawable(markdown), media_type=rr.MediaType.MARKDOWN)
@@ -168,7 +250,18 @@ def send_page(stream: RecordingStream, entity: str, markdown: str) -> None:
 
 
 def send_property(stream: RecordingStream, name: str, values: dict[str, Any]) -> None:
-    """Values that a table of recordings shows, one column each; None is left out."""
+    """Sends values that a table of recordings shows, one column each.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    name
+        Of the property.
+    values
+        By key; None is left out.
+
+    """
     import rerun as rr
 
     stated = {key: _drawable(value) for key, value in values.items() if value is not None}
@@ -185,7 +278,26 @@ def send_bars(
     colour: Colour,
     at: tuple[str, int] | None = None,
 ) -> None:
-    """Bars of one width from their left edges [B]; `at` is a timeline and a place on it."""
+    """Sends bars of one width.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    entity
+        Where they lie.
+    values
+        Heights [B].
+    left
+        Left edges [B].
+    width
+        Of each bar.
+    colour
+        Of all bars.
+    at
+        A timeline and a place on it; None for all times.
+
+    """
     import rerun as rr
 
     if at is None:
@@ -202,7 +314,20 @@ def send_bars(
 def send_axis_ends(
     stream: RecordingStream, entity: str, ends: Sequence[float], beyond: float
 ) -> None:
-    """Faint marks beyond the last bar that give a bar chart's axis its reach: it has no lock."""
+    """Sends faint marks beyond the last bar that fix the range of the axis of a bar chart.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    entity
+        Where the bars lie.
+    ends
+        Values that the axis must reach.
+    beyond
+        Right edge of the last bar.
+
+    """
     import rerun as rr
 
     step = 0.005 * abs(beyond) or 1.0
@@ -213,7 +338,14 @@ def send_axis_ends(
 
 
 def tensor(values: NDArray[np.float64]) -> Any:
-    """One row of a column of tensors; a bare list of arrays would become one of more axes."""
+    """One row of a column of tensors; a bare list of arrays would become one of more axes.
+
+    Parameters
+    ----------
+    values
+        The array.
+
+    """
     import rerun as rr
 
     return rr.encodings.TensorData(array=np.ascontiguousarray(values))

@@ -31,7 +31,19 @@ def free_port() -> int:
 
 
 def require_free(port: int) -> None:
-    """Raises MachineError where a port of loopback cannot be served."""
+    """Refuses a port of loopback that cannot be served.
+
+    Parameters
+    ----------
+    port
+        The port.
+
+    Raises
+    ------
+    MachineError
+        Another program has it, or it is not for this user.
+
+    """
     with socket.socket() as probe:
         # as servers bind: a connection that was just closed does not hold the port
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -43,16 +55,39 @@ def require_free(port: int) -> None:
 
 
 def cannot_serve(port: int, why: str) -> MachineError:
-    """The error for a port that another program has, or that is not for this user."""
+    """The error for a port that cannot be served.
+
+    Parameters
+    ----------
+    port
+        The port.
+    why
+        What the operating system says.
+
+    """
     return MachineError(
         f"port {port} cannot be served: {why}", "name another with port=, or leave it out"
     )
 
 
 def viewer_command(*words: str) -> list[str]:
-    """The viewer's own program; the `rerun` on the path would outlive its end as a child.
+    """The command line of the viewer's own program.
 
-    Raises MachineError where it is not installed.
+    Parameters
+    ----------
+    *words
+        Its arguments.
+
+    Returns
+    -------
+    list of str
+        The program itself, since the `rerun` on the path would outlive its end as a child.
+
+    Raises
+    ------
+    MachineError
+        It is not installed.
+
     """
     package = find_spec("rerun_cli")
     places = [] if package is None else list(package.submodule_search_locations or ())
@@ -76,22 +111,56 @@ def has_screen() -> bool:
 
 
 def window(sources: Sequence[str], port: int) -> int:
-    """Opens a window on files or addresses and waits until it is closed; its exit code."""
+    """Opens a window on files or addresses and waits until it is closed.
+
+    Parameters
+    ----------
+    sources
+        Files or addresses.
+    port
+        Port of loopback for the viewer.
+
+    Returns
+    -------
+    int
+        Exit code of the viewer.
+
+    """
     words = ["--bind", HERE, "--port", str(port), "--hide-welcome-screen", *sources]
     return _wait(viewer_command(*words))
 
 
 def page_address(page_port: int, sources: Sequence[str]) -> str:
-    """What to open in a browser."""
+    """What to open in a browser.
+
+    Parameters
+    ----------
+    page_port
+        Port of the page.
+    sources
+        Addresses of recordings.
+
+    """
     words = "&".join(f"url={quote(source, safe='')}" for source in sources)
     return f"http://{HERE}:{page_port}/?{words}"
 
 
 @contextmanager
 def catalogue(motors: Sequence[Path], port: int) -> Iterator[str]:
-    """Serves recordings of motors as a table, a row each; gives the address of the table.
+    """Serves recordings of motors as a table, one row each.
 
-    The layouts are handed over through a folder that lasts as long as the server.
+    Parameters
+    ----------
+    motors
+        Their recordings.
+    port
+        Port of loopback.
+
+    Yields
+    ------
+    str
+        Address of the table; the server ends with the block.
+
     """
     from rerun.catalog import CatalogClient
     from rerun.server import Server

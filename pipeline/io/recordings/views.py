@@ -61,7 +61,18 @@ class ViewPlan:
 
 
 def time_view(plan: ViewPlan) -> TimeSeriesView:
-    """A time series view of a plan; x axes of all but loupes move together."""
+    """A time series view of a plan; x axes of all but loupes move together.
+
+    Parameters
+    ----------
+    plan
+        What it shows.
+
+    Attributes
+    ----------
+    view over time; the x axes of all but magnifiers move together.
+
+    """
     import rerun.blueprint as rrb
     from rerun.blueprint.components import LinkAxis
 
@@ -92,7 +103,14 @@ def time_view(plan: ViewPlan) -> TimeSeriesView:
 
 
 def rows_axis(rows: int) -> Any:
-    """An x axis over all rows of a sequence; by itself the viewer shows those at the cursor."""
+    """An x axis over all rows of a sequence; by itself the viewer shows those at the cursor.
+
+    Parameters
+    ----------
+    rows
+        How many.
+
+    """
     import rerun as rr
     import rerun.blueprint as rrb
 
@@ -132,7 +150,18 @@ def _curve(line: Line) -> Any:
 
 
 def bar_view(name: str, *entities: str, legend: bool = False) -> BarChartView:
-    """Bars of some entities over one axis; a legend would show their addresses."""
+    """Bars of some entities over one axis.
+
+    Parameters
+    ----------
+    name
+        Of the view.
+    legend
+        Whether the addresses of the entities are shown.
+    *entities
+        Where the bars lie.
+
+    """
     import rerun.blueprint as rrb
 
     return rrb.BarChartView(
@@ -144,14 +173,40 @@ def bar_view(name: str, *entities: str, legend: bool = False) -> BarChartView:
 
 
 def page_view(entity: str, name: str) -> TextDocumentView:
-    """A page of text."""
+    """A page of text.
+
+    Parameters
+    ----------
+    entity
+        Where it lies.
+    name
+        Of the view.
+
+    Attributes
+    ----------
+    page of text.
+
+    """
     import rerun.blueprint as rrb
 
     return rrb.TextDocumentView(origin=entity, name=drawable(name))
 
 
 def findings_view(entity: str, name: str) -> Any:
-    """A log whose lines say what was found; a click on one moves the cursor to its row."""
+    """A log whose lines say what was found; a click on one moves the cursor to its row.
+
+    Parameters
+    ----------
+    entity
+        Where it lies.
+    name
+        Of the view.
+
+    Attributes
+    ----------
+    log of findings; a click on a line moves the cursor to its row.
+
+    """
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn
 
@@ -164,7 +219,18 @@ def findings_view(entity: str, name: str) -> Any:
 
 
 def workspace(*tabs: Any, timeline: str | None, panel: Panel = "collapsed") -> Blueprint:
-    """Tabs that fill the window, side panels hidden, the time line at the bottom."""
+    """Tabs that fill the window, side panels hidden, the time line at the bottom.
+
+    Parameters
+    ----------
+    timeline
+        The active one; None for the viewer's choice.
+    panel
+        State of the time line's panel.
+    *tabs
+        The tabs.
+
+    """
     import rerun.blueprint as rrb
 
     return rrb.Blueprint(
@@ -178,7 +244,16 @@ def workspace(*tabs: Any, timeline: str | None, panel: Panel = "collapsed") -> B
 
 
 def stacked(plans: Sequence[ViewPlan], **more: Any) -> Any:
-    """Time series views under each other, heights by their shares."""
+    """Views over time under each other, heights by their shares.
+
+    Parameters
+    ----------
+    plans
+        What they show.
+    **more
+        Further options of the container.
+
+    """
     import rerun.blueprint as rrb
 
     return rrb.Vertical(*map(time_view, plans), row_shares=[p.share for p in plans] or None, **more)

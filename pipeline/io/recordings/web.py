@@ -28,7 +28,19 @@ _PASSED_ON = ("content-type", "content-encoding", "content-length")
 
 
 def policy(further: Sequence[str]) -> str:
-    """Nothing is loaded from, or sent to, any other place than this page and `further` origins."""
+    """Nothing is loaded from, or sent to, any other place than this page and `further` origins.
+
+    Parameters
+    ----------
+    further
+        Origins that are allowed beside the page's own.
+
+    Attributes
+    ----------
+    content security policy
+        nothing is loaded from, or sent to, other origins.
+
+    """
     places = " ".join(["'self'", *further])
     return (
         "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' data: blob:; "
@@ -37,7 +49,18 @@ def policy(further: Sequence[str]) -> str:
 
 
 def recording_address(port: int, place: int, path: Path) -> str:
-    """Where the page finds a recording."""
+    """Where the page finds a recording.
+
+    Parameters
+    ----------
+    port
+        Of the page.
+    place
+        Number of the recording.
+    path
+        Its file.
+
+    """
     return f"http://{HERE}:{port}{PREFIX}{place}/{quote(path.name)}"
 
 
@@ -45,9 +68,27 @@ def recording_address(port: int, place: int, path: Path) -> str:
 def page_server(
     recordings: Sequence[Path], port: int, origins: Sequence[str] = ()
 ) -> Iterator[PageServer]:
-    """Serves the viewer's page and recordings on loopback; `origins` may be spoken to as well.
+    """Serves the viewer's page and recordings on loopback.
 
-    Raises MachineError where the port is taken or the viewer does not start.
+    Parameters
+    ----------
+    recordings
+        The .rrd files.
+    port
+        Port of loopback.
+    origins
+        Origins that the page may connect to as well.
+
+    Yields
+    ------
+    PageServer
+        It ends with the block.
+
+    Raises
+    ------
+    MachineError
+        The port is taken, or the viewer does not start.
+
     """
     inner, other = free_port(), free_port()
     words = ["--serve-web", "--bind", HERE, "--port", str(other), "--web-viewer-port", str(inner)]

@@ -38,13 +38,27 @@ class Exports:
         self.folder = None if "://" in place else Path(place)
 
     def prepare_all(self, contents: Mapping[Key, bytes]) -> None:
-        """Puts contents on the disk under pending names; an object store needs no such step."""
+        """Writes contents under pending names; an object store needs no such step.
+
+        Parameters
+        ----------
+        contents
+            Bytes of each version.
+
+        """
         if self.folder is not None and contents:
             owner = threading.get_native_id()
             _each(lambda key: self._prepare(key, contents[key], owner), contents)
 
     def settle_all(self, contents: Mapping[Key, bytes]) -> None:
-        """Gives versions their files, unless they are there: each is written once, never again."""
+        """Gives versions their files, unless they are there: each is written once, never again.
+
+        Parameters
+        ----------
+        contents
+            Bytes of each version.
+
+        """
         owner = threading.get_native_id()
         _each(lambda key: self._settle(key, contents[key], owner), contents)
 
@@ -79,13 +93,34 @@ class Exports:
             raise _failure(self.place, error) from error
 
     def discard(self, key: Key) -> None:
-        """Takes this writer's pending file away."""
+        """Removes the pending file of this writer.
+
+        Parameters
+        ----------
+        key
+            Motor and version.
+
+        """
         if self.folder is not None:
             with suppress(OSError):
                 self._pending(key, threading.get_native_id()).unlink()
 
     def finish(self, key: Key, sha256: str) -> bool:
-        """Whether the pending file of an interrupted writer had this digest and is the file now."""
+        """Gives the pending file of an interrupted writer its name.
+
+        Parameters
+        ----------
+        key
+            Motor and version.
+        sha256
+            Digest that it must have.
+
+        Returns
+        -------
+        bool
+            Whether there was one with that digest.
+
+        """
         if self.folder is None:
             return False
         final = self.folder / place_of(key)
@@ -97,7 +132,19 @@ class Exports:
         return False
 
     def read(self, key: Key) -> bytes | None:
-        """The bytes of a version's file; None where there is none. Raises OSError for a disk."""
+        """The bytes of a version's file.
+
+        Parameters
+        ----------
+        key
+            Motor and version.
+
+        Returns
+        -------
+        bytes or None
+            None where there is none.
+
+        """
         try:
             if self.folder is not None:
                 return (self.folder / place_of(key)).read_bytes()
@@ -149,7 +196,14 @@ def _each(work: Callable[[Key], None], keys: Iterable[Key]) -> None:
 
 
 def place_of(key: Key) -> str:
-    """Where a version's file is, below the registry: an escaped motor, then the version."""
+    """Where the file of a version is, below the registry: an escaped motor, then the version.
+
+    Parameters
+    ----------
+    key
+        Motor and version.
+
+    """
     motor_id, version = key
     return f"{FOLDER}/{file_stem(motor_id)}/{version}.json"
 
@@ -160,7 +214,14 @@ def _failure(place: str, error: OSError) -> MachineError:
 
 
 def one_line(error: Exception) -> str:
-    """One line of an error that object stores print as a coloured tree: its root and its cause."""
+    """One line of an error that object stores print as a coloured tree: its root and its cause.
+
+    Parameters
+    ----------
+    error
+        The error.
+
+    """
     lines = [TREE.sub("", line).strip() for line in str(error).strip().splitlines()]
     reasons = dict.fromkeys([lines[0], lines[-1]]) if lines else [type(error).__name__]
     return ": ".join(line[:LONGEST_REASON] for line in reasons)

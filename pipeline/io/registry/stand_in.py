@@ -29,7 +29,14 @@ LOG = "_delta_log"
 
 
 def unfit(folder: Path) -> bool:
-    """Whether Delta cannot work in a folder, for its name or that of one above it."""
+    """Whether Delta cannot work in a folder, for its name or that of a folder above it.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+
+    """
     return UNFIT.search(folder.resolve().as_posix()) is not None
 
 
@@ -57,7 +64,18 @@ class StandIn:
         return self.place
 
     def append(self, table: DeltaTable, rows: pl.DataFrame, properties: CommitProperties) -> None:
-        """Adds rows to the events that `table` was opened with; raises DeltaError as Delta does."""
+        """Adds rows to the events that a table was opened with.
+
+        Parameters
+        ----------
+        table
+            The table.
+        rows
+            Rows to add.
+        properties
+            Of the commit. Errors are raised as Delta raises them.
+
+        """
         from deltalake.transaction import AddAction
 
         name = f"part-00000-{uuid.uuid4()}.parquet"

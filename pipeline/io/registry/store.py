@@ -80,11 +80,28 @@ class Registry:
         self._exports = Exports(place, options)
 
     def publish(self, documents: Iterable[Mapping[str, Any] | bytes], now: datetime) -> Receipt:
-        """Registers datasheets (`contract/outputs.md`) in one commit, each version once.
+        """Registers datasheets in one commit, each version once.
 
-        A datasheet is a document, or the bytes of the file that a run wrote.
-        When it returns, the disk has the rows and the files. Safe to repeat after any failure and
-        beside other writers. Raises MachineError where the registry cannot be written.
+        Parameters
+        ----------
+        documents
+            Datasheets as documents, or as the bytes of the file that a run wrote.
+        now
+            Time of the commit, with its zone.
+
+        Returns
+        -------
+        Receipt
+            When it is returned, the disk has the rows and the files. Safe to repeat after any
+            failure, and beside other writers.
+
+        Raises
+        ------
+        MachineError
+            The registry cannot be written.
+        UsageError
+            A document is no datasheet.
+
         """
         sheets = {sheet.key: sheet for sheet in map(_sheet, documents)}
         if not sheets:
@@ -141,11 +158,33 @@ class Registry:
         why: str,
         now: datetime,
     ) -> tuple[Version, bool]:
-        """Appends a decision; (the version with it, whether it is new).
+        """Appends a decision of a person on one version.
 
-        Repeating the last decision adds nothing. Raises UsageError where `wanted` is not exactly
-        one version, where the version is refused, and for an approval where something other than
-        the approval is missing.
+        Parameters
+        ----------
+        kind
+            `approve` or `revoke`.
+        wanted
+            Selects exactly one version.
+        by
+            The person.
+        why
+            The reason.
+        now
+            Time of the commit, with its zone.
+
+        Returns
+        -------
+        tuple of Version and bool
+            The version with the decision, and whether it is new: repeating the last decision adds
+            nothing.
+
+        Raises
+        ------
+        UsageError
+            Not exactly one version is selected, the version is refused, or more than the approval
+            is missing.
+
         """
         found: list[Version] = []
 
@@ -175,7 +214,27 @@ class Registry:
         by: str,
         now: datetime,
     ) -> int:
-        """Gives versions a name, or takes it from them, in one commit; how many were changed."""
+        """Gives versions a name, or takes it from them, in one commit.
+
+        Parameters
+        ----------
+        kind
+            `tag` or `untag`.
+        versions
+            The versions.
+        name
+            The name.
+        by
+            The person.
+        now
+            Time of the commit, with its zone.
+
+        Returns
+        -------
+        int
+            How many versions were changed.
+
+        """
         wanted = {version.key: version.revision for version in versions}
 
         def append(events: Sequence[Event]) -> list[Row]:
@@ -205,7 +264,21 @@ class Registry:
         return events
 
     def history(self, motor_id: str, until: datetime | None = None) -> tuple[Version, ...]:
-        """A motor's versions, oldest first, as they stood at a moment; empty if unknown."""
+        """The versions of a motor, oldest first, as they stood at a moment.
+
+        Parameters
+        ----------
+        motor_id
+            The motor.
+        until
+            The moment; None for now.
+
+        Returns
+        -------
+        tuple of Version
+            Empty for an unknown motor.
+
+        """
         return histories(self.events(), until).get(motor_id, ())
 
     def revocations(self) -> Mapping[str, tuple[Revocation, ...]]:
@@ -219,9 +292,18 @@ class Registry:
         return self._table.last_commit()
 
     def has_files(self, contents: Iterable[tuple[Key, str]]) -> bool:
-        """Whether every version has its file, of this sha256 (disk only).
+        """Whether every version has its file.
 
-        A file gets its name when its row is safe.
+        Parameters
+        ----------
+        contents
+            Motor, version and digest of each.
+
+        Returns
+        -------
+        bool
+            A file gets its name when its row is safe; of a disk only.
+
         """
         return self._table_is_there() and all(
             (content := self._exports.read(key)) is not None and _digest(content) == sha256
@@ -233,23 +315,52 @@ class Registry:
         return folder is not None and (folder / "_delta_log").is_dir()
 
     def select(self, wanted: Selection) -> tuple[Version, ...]:
-        """Every version that is meant, by motor and revision; `newest` keeps one a motor."""
+        """Every version that is selected, by motor and revision; `newest` keeps one a motor.
+
+        Parameters
+        ----------
+        wanted
+            Which versions are meant.
+
+        """
         return select(self.events(), wanted)
 
     def documents(self, versions: Sequence[Version]) -> list[dict[str, Any]]:
-        """The datasheet documents of versions, in their order, as they were published."""
+        """The datasheet documents of versions, as they were published.
+
+        Parameters
+        ----------
+        versions
+            The versions; the order is kept.
+
+        """
         texts = dict(self._table.contents([v.published.sequence for v in versions]))
         return [json.loads(texts[v.published.sequence]) for v in versions]
 
     def datasheets(self, versions: Sequence[Version]) -> list[Datasheet]:
-        """The datasheets of versions, in their order."""
+        """The datasheets of versions.
+
+        Parameters
+        ----------
+        versions
+            The versions; the order is kept.
+
+        """
         return [datasheet_of(document) for document in self.documents(versions)]
 
     def verify(self) -> Verification:
-        """Holds rows against their chain, contents against digests, files against rows.
+        """Compares rows with their chain, contents with digests, and files with rows.
 
-        Raises UsageError where there is no registry. A file of an interrupted writer whose row
-        was committed is given its name, and noted.
+        Returns
+        -------
+        Verification
+            A file of an interrupted writer whose row was committed is given its name, and noted.
+
+        Raises
+        ------
+        UsageError
+            There is no registry.
+
         """
         gaps = [f"commit {n} is missing from the log" for n in self._table.missing_commits()]
         try:
@@ -300,7 +411,23 @@ class Registry:
 
 
 def one_of(versions: Sequence[Version], wanted: Selection, place: str) -> Version:
-    """The only version that is meant; raises UsageError for none or several."""
+    """The only version that is meant.
+
+    Parameters
+    ----------
+    versions
+        Versions that were selected.
+    wanted
+        How they were selected, for the message.
+    place
+        The registry, for the message.
+
+    Raises
+    ------
+    UsageError
+        There is none, or there are several.
+
+    """
     if len(versions) == 1:
         return versions[0]
     name = f"motor {wanted.motor_id!r}"

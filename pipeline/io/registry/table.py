@@ -113,7 +113,21 @@ class EventTable:
             return None if table is None else _events(table)
 
     def contents(self, sequences: Sequence[int], batch: int = 256) -> Iterator[tuple[int, str]]:
-        """(sequence, datasheet text) of the rows asked for, in that order, a batch at a time."""
+        """Texts of datasheets.
+
+        Parameters
+        ----------
+        sequences
+            Numbers of the rows.
+        batch
+            Rows that are read at a time.
+
+        Yields
+        ------
+        tuple of int and str
+            In the order of `sequences`; a row that is not there is left out.
+
+        """
         with self._failures():
             table = self._opened()
             if table is None:
@@ -126,10 +140,23 @@ class EventTable:
                 yield from ((number, found[number]) for number in wanted if number in found)
 
     def append(self, decide: Decide) -> tuple[list[Event], list[Event]]:
-        """Adds the rows that `decide` makes of the events so far; (events before, events added).
+        """Adds the rows that a function makes of the events so far.
 
-        `decide` is called again with the newer events whenever another writer was faster. Raises
-        MachineError where the table cannot be written; then nothing was added.
+        Parameters
+        ----------
+        decide
+            Called again with the newer events whenever another writer was faster.
+
+        Returns
+        -------
+        tuple of list of Event
+            Events before, and events added.
+
+        Raises
+        ------
+        MachineError
+            The table cannot be written; nothing was added then.
+
         """
         give_up = time.monotonic() + PATIENCE_S
         pauses = random.Random()  # noqa: S311 (only spreads the writers out; in no result)

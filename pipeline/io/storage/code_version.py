@@ -45,7 +45,16 @@ MOST_KEPT = 5000
 
 
 class Code:
-    """The sources of one package below `root`; what they say is kept in the file `notes`."""
+    """The sources of one package.
+
+    Parameters
+    ----------
+    root
+        Folder of the package.
+    notes
+        File that keeps what sources hold, so that the next start need not parse them.
+
+    """
 
     def __init__(self, root: Path, notes: Path | None = None) -> None:
         self.root = root
@@ -56,13 +65,32 @@ class Code:
         self._new: dict[str, Any] = {}
 
     def digest(self, *modules: str) -> str:
-        """sha256 of what modules compute; raises LookupError where one of them is not there."""
+        """sha256 of what some modules compute.
+
+        Parameters
+        ----------
+        *modules
+            Dotted names.
+
+        Returns
+        -------
+        str
+            Of syntax trees without docstrings and comments, independent of where a file lies.
+
+        """
         found = [self._digest(module) for module in modules]
         self._keep()
         return _sha256(found)
 
     def closure(self, *modules: str) -> frozenset[str]:
-        """The modules and all of the package that they import, directly or not."""
+        """Modules, and all of the package that they import, directly or not.
+
+        Parameters
+        ----------
+        *modules
+            Dotted names.
+
+        """
         left, found = list(modules), set[str]()
         while left:
             module = left.pop()
@@ -73,7 +101,14 @@ class Code:
         return frozenset(found)
 
     def libraries(self, *modules: str) -> tuple[str, ...]:
-        """Top names of what is imported, directly or not, of other packages than Python's own."""
+        """Top names of what is imported, directly or not, of packages other than Python's own.
+
+        Parameters
+        ----------
+        *modules
+            Dotted names.
+
+        """
         found = (self._source(module)[1].libraries for module in self.closure(*modules))
         return tuple(sorted({name for names in found for name in names}))
 
@@ -248,7 +283,14 @@ def own_code() -> Code:
 
 @cache
 def code_version(*modules: str) -> str:
-    """The release and a digest of what modules of the package compute: `0.1.0+1a2b3c4d5e6f`."""
+    """The release, and a digest of what modules of the package compute: `0.1.0+1a2b3c4d5e6f`.
+
+    Parameters
+    ----------
+    *modules
+        Dotted names.
+
+    """
     return f"{pipeline.__version__}+{own_code().digest(*modules)[:12]}"
 
 
@@ -256,15 +298,31 @@ def code_version(*modules: str) -> str:
 def closure_digest(module: str) -> str:
     """sha256 of what a module computes, with all of the package that it imports.
 
-    Modules of other packages have one digest for all: they count in `libraries_version`.
+    Parameters
+    ----------
+    module
+        Dotted name. Modules of other packages have one digest for all: they count in
+        `libraries_version`.
+
     """
     return own_code().digest(*_own(module))
 
 
 @cache
 def libraries_version(*modules: str) -> str:
-    """Versions of Python, the kind of machine, of all libraries that modules import, directly or
-    not (`-` for one that is not installed), and of plug-ins of other packages.
+    """Versions of what a result depends on beside this package.
+
+    Parameters
+    ----------
+    *modules
+        Dotted names.
+
+    Returns
+    -------
+    str
+        Python, the kind of machine, all libraries that are imported, directly or not (`-` for one
+        that is not installed), and plug-ins of other packages.
+
     """
     names = {DISTRIBUTIONS.get(name, name) for name in own_code().libraries(*_own(*modules))}
     versions = _versions({*names, *OPTIONAL})

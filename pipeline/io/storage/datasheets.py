@@ -23,7 +23,16 @@ MAX_BYTES = 1 << 26
 def read_datasheets(output: Path) -> tuple[Datasheet, ...]:
     """Every datasheet of an output folder, by motor.
 
-    Raises UsageError where the folder has none, or where a file is no datasheet of version 1.
+    Parameters
+    ----------
+    output
+        Folder of a run.
+
+    Raises
+    ------
+    UsageError
+        The folder has none, or a file is no datasheet of version 1.
+
     """
     paths = sorted((output / "datasheets").glob("*.json"))
     if not paths:
@@ -33,7 +42,19 @@ def read_datasheets(output: Path) -> tuple[Datasheet, ...]:
 
 
 def read_datasheet(path: Path) -> Datasheet:
-    """One datasheet; raises UsageError where the file is no datasheet of version 1."""
+    """One datasheet.
+
+    Parameters
+    ----------
+    path
+        Its JSON file.
+
+    Raises
+    ------
+    UsageError
+        The file is no datasheet of version 1.
+
+    """
     if path.stat().st_size > MAX_BYTES:
         raise UsageError(f"{path.name} is too large for a datasheet", "run again")
     try:
@@ -46,12 +67,24 @@ def read_datasheet(path: Path) -> Datasheet:
 
 
 def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
-    """The record that `Datasheet.document` wrote; the inverse of it.
+    """The record that `Datasheet.document` wrote.
 
-    A document of before contributions had degrees of freedom of their own gives those of type A
-    what makes the published total (GUM eq. G.2b); one of before the residual test has no model.
-    Raises LookupError, TypeError or ValueError
-    for anything else.
+    Parameters
+    ----------
+    document
+        Its JSON form.
+
+    Returns
+    -------
+    Datasheet
+        A document of before contributions had degrees of freedom of their own gives those of type A
+        what makes the published total (GUM eq. G.2b); one of before the residual test has no model.
+
+    Raises
+    ------
+    LookupError, TypeError, ValueError
+        The document has another form.
+
     """
     provenance, superseded = document["provenance"], document.get("supersedes")
     return Datasheet(

@@ -16,9 +16,23 @@ MAX_BYTES = 1 << 26
 
 
 def read_diagnoses(folders: Iterable[Path]) -> dict[str, DiagnosisSummary]:
-    """The diagnosis of each motor by motor_id; of folders that hold one motor, the last counts.
+    """The diagnosis of each motor, as far as lots are compared by them.
 
-    Folders that are not there hold none. Raises UsageError for a file that is no diagnosis.
+    Parameters
+    ----------
+    folders
+        Folders of diagnoses; those that are not there hold none.
+
+    Returns
+    -------
+    dict of DiagnosisSummary
+        By motor_id; of folders that hold one motor, the last counts.
+
+    Raises
+    ------
+    UsageError
+        A file is no diagnosis.
+
     """
     found: dict[str, DiagnosisSummary] = {}
     for folder in folders:

@@ -24,7 +24,19 @@ _MOST_FOLDERS = 200
 
 
 def identity(path: Path) -> Identity | None:
-    """Device, inode, size [bytes], times of content and of status [ns]; None where it is gone."""
+    """What changes when a file does.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    tuple or None
+        Device, inode, size [bytes], times of content and of status [ns]; None where it is gone.
+
+    """
     try:
         s = path.stat()
     except OSError:
@@ -43,7 +55,16 @@ def notes_folder() -> Path | None:
 
 
 class Identities:
-    """The known sha256 of the files of one folder, by relative path."""
+    """The known sha256 of the files of one folder, by relative path.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+    notes
+        Where they are kept between runs; None keeps none.
+
+    """
 
     def __init__(self, folder: Path, notes: Path | None) -> None:
         self.folder = folder
@@ -58,19 +79,46 @@ class Identities:
         self._changed = False
 
     def sha256(self, file: str) -> str | None:
-        """The digest of a file, if it is known to have kept its bytes."""
+        """The digest of a file, if it is known to have kept its bytes.
+
+        Parameters
+        ----------
+        file
+            Relative path.
+
+        """
         known = self._known.get(file)
         return known[1] if known is not None and known[0] == identity(self.folder / file) else None
 
     def note(self, file: str, found: Identity | None, sha256: str) -> None:
-        """Notes the digest of a file that had this identity before and after it was read."""
+        """Notes the digest of a file.
+
+        Parameters
+        ----------
+        file
+            Relative path.
+        found
+            Its identity before and after it was read; None notes nothing.
+        sha256
+            Its digest.
+
+        """
         if found is None or self._known.get(file) == (found, sha256):
             return
         self._known[file] = (found, sha256)
         self._changed = True
 
     def holds(self, file: str, sha256: str) -> bool:
-        """Whether a file has this digest; it is read where that is not known."""
+        """Whether a file has a digest; it is read where that is not known.
+
+        Parameters
+        ----------
+        file
+            Relative path.
+        sha256
+            The digest.
+
+        """
         if (known := self.sha256(file)) is not None:
             return known == sha256
         path = self.folder / file

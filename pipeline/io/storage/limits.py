@@ -37,21 +37,51 @@ WORDS = {"yes": True, "true": True, "no": False, "false": False}
 
 
 def limits_file(name: str, config_dir: str | None = None) -> Path:
-    """The limits file of a name, or at a path that ends in .yaml; raises UsageError for neither."""
+    """The limits file of a name, or at a path that ends in .yaml.
+
+    Parameters
+    ----------
+    name
+        As the user wrote it.
+    config_dir
+        Configuration folder that the user names.
+
+    """
     if name.endswith((".yaml", ".yml")) and Path(name).is_file():
         return Path(name)
     return named_file("limits", name, config_dir)
 
 
 def required_constants(path: Path) -> tuple[str, ...]:
-    """The constants that a release must hold, measured; raises UsageError for a bad file."""
+    """The constants that a release must hold, measured.
+
+    Parameters
+    ----------
+    path
+        The limits file.
+
+    """
     return _required(_document(path), path)
 
 
 def release_conditions(path: Path) -> tuple[tuple[str, ...], bool]:
-    """`required_constants`, and whether what the model leaves keeps a datasheet from its release.
+    """What a release of a datasheet depends on.
 
-    Raises UsageError for a bad file.
+    Parameters
+    ----------
+    path
+        The limits file.
+
+    Returns
+    -------
+    tuple
+        Constants that it must hold, and whether what the model leaves prevents it.
+
+    Raises
+    ------
+    UsageError
+        The file is wrong.
+
     """
     document = _document(path)
     given = str(document.get("model_gates", "yes")).lower()
@@ -74,6 +104,26 @@ def read_limits(path: Path) -> Limits:
     """A limits file as a record; raises UsageError for a key, a word or a number it cannot read.
 
     What the file means is judged by `lots.limits_lint`.
+
+    Parameters
+    ----------
+    path
+        The limits file.
+
+    Attributes
+    ----------
+    limits file as a record.
+
+    Returns
+    -------
+    Limits
+        What it means is judged by `lots.limits_lint`.
+
+    Raises
+    ------
+    UsageError
+        A key, a word or a number cannot be read.
+
     """
     document = _document(path)
     _only(document, KEYS, path.name)

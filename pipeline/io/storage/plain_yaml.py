@@ -25,7 +25,30 @@ Plain = Any
 
 
 def load_plain(data: bytes, what: str) -> Plain:
-    """The document as texts, lists and maps; None if it is empty. Raises CaptureError."""
+    """The document as texts, lists and maps; None if it is empty. Raises CaptureError.
+
+    Parameters
+    ----------
+    data
+        Content of the file.
+    what
+        Its name, for messages.
+
+    Attributes
+    ----------
+    YAML document as texts, lists and maps.
+
+    Returns
+    -------
+    object
+        None for an empty document.
+
+    Raises
+    ------
+    CaptureError
+        It is too large or deep, has tags, aliases or several documents, or is no YAML.
+
+    """
     if len(data) > _MAX_BYTES:
         raise _bad(what, f"is larger than {_MAX_BYTES} bytes")
     try:

@@ -18,9 +18,24 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def canonical_json(document: Any) -> bytes:
-    """JSON bytes [UTF-8] with sorted keys, shortest round-trip numbers and a last newline.
+    """JSON with sorted keys, shortest round-trip numbers and a last newline: the same bytes each
+    time.
 
-    Raises ValueError for NaN or infinity, which no output may hold.
+    Parameters
+    ----------
+    document
+        Plain data.
+
+    Returns
+    -------
+    bytes
+        UTF-8.
+
+    Raises
+    ------
+    ValueError
+        It holds NaN or infinity, which no output may.
+
     """
     text = json.dumps(document, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False)
     return (text + "\n").encode()
@@ -29,7 +44,18 @@ def canonical_json(document: Any) -> bytes:
 def write_whole(path: Path, content: bytes) -> None:
     """Writes a file under a temporary name, syncs and renames it, then syncs the folder.
 
-    Raises MachineError where the disk refuses; the old content, if any, is then untouched.
+    Parameters
+    ----------
+    path
+        The file; its folder is made if need be.
+    content
+        Its bytes.
+
+    Raises
+    ------
+    MachineError
+        The disk refuses; the old content, if any, is untouched.
+
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
@@ -46,10 +72,24 @@ def write_whole(path: Path, content: bytes) -> None:
 
 @contextmanager
 def together(folder: Path) -> Iterator[Callable[[str, bytes], None]]:
-    """Gives `write(name, content)`: files that get their names when all are on the disk, or never.
+    """Writes several files that get their names when all are on the disk, or never.
 
-    The first written is the last to get its name, so that who finds it finds the others.
-    Raises MachineError where the disk refuses; old contents, if any, are then untouched.
+    Parameters
+    ----------
+    folder
+        Where they are written.
+
+    Yields
+    ------
+    callable
+        `write(name, content)`. The first file written is the last to get its name, so that whoever
+        finds it finds the others.
+
+    Raises
+    ------
+    MachineError
+        The disk refuses; old contents, if any, are untouched.
+
     """
     waiting: list[tuple[Path, Path]] = []
 
@@ -86,9 +126,20 @@ def _refusals(path: Path) -> Iterator[None]:
 
 
 def output_folder(output: str) -> Path:
-    """The folder `output`, made if need be; called before the work, so that none is lost.
+    """The output folder, made if need be; called before the work, so that none is lost.
 
-    Raises UsageError where nothing can be written there, MachineError where the disk is full.
+    Parameters
+    ----------
+    output
+        As the user wrote it.
+
+    Raises
+    ------
+    UsageError
+        Nothing can be written there.
+    MachineError
+        The disk is full.
+
     """
     folder, remedy = Path(output), "name a folder to write to, output=DIR"
     if folder.exists() and not folder.is_dir():
@@ -105,7 +156,19 @@ def output_folder(output: str) -> Path:
 
 
 def partial_owner(path: Path) -> int | None:
-    """The process that was writing a file of a temporary name; None where the name is no such."""
+    """The process that was writing a file of a temporary name.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    int or None
+        None where the name is no such name.
+
+    """
     words = path.name.split(".")
     return whole(words[-2], 1, 2**31 - 1) if words[-1] == "partial" else None
 
@@ -117,7 +180,16 @@ def _remedy(error: OSError) -> str:
 
 
 def write_synced(path: Path, content: bytes) -> None:
-    """Writes a file and waits until the disk has it; its name in the folder may still be lost."""
+    """Writes a file and waits until the disk has it; its name in the folder may still be lost.
+
+    Parameters
+    ----------
+    path
+        The file.
+    content
+        Its bytes.
+
+    """
     with path.open("wb") as stream:
         stream.write(content)
         stream.flush()
@@ -125,12 +197,26 @@ def write_synced(path: Path, content: bytes) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Makes renames in a folder survive a power cut."""
+    """Makes renames in a folder survive a power cut.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+
+    """
     sync_file(folder)
 
 
 def sync_file(path: Path) -> None:
-    """Makes the content of a file that another library wrote survive a power cut."""
+    """Makes the content of a file that another library wrote survive a power cut.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    """
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

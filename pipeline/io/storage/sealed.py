@@ -14,13 +14,43 @@ _MAX_BYTES = 2**28
 
 
 def write_sealed(path: Path, document: Any) -> None:
-    """Writes a document under its sha256, whole or not at all; raises MachineError."""
+    """Writes a document under its sha256, whole or not at all.
+
+    Parameters
+    ----------
+    path
+        The file.
+    document
+        Plain data.
+
+    Raises
+    ------
+    MachineError
+        The disk refuses.
+
+    """
     body = canonical_json(document)
     write_whole(path, hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
 
 
 def read_sealed(path: Path) -> Any:
-    """The document, or None where there is none that is whole."""
+    """The document, or None where there is none that is whole.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Attributes
+    ----------
+    document whose digest holds.
+
+    Returns
+    -------
+    object or None
+        None where there is none that is whole.
+
+    """
     try:
         if path.stat().st_size > _MAX_BYTES:
             return None
@@ -36,7 +66,16 @@ def read_sealed(path: Path) -> Any:
 
 
 def keep_sealed(path: Path, document: Any) -> None:
-    """Writes a document that only saves time: a place that cannot be written is no failure."""
+    """Writes a document that only saves time: a place that cannot be written is no failure.
+
+    Parameters
+    ----------
+    path
+        The file.
+    document
+        Plain data.
+
+    """
     try:
         write_sealed(path, document)
     except PipelineError:

@@ -43,7 +43,22 @@ class Syntax:
 
 
 def syntax_of(content: bytes, package: str) -> Syntax:
-    """What the source of a module of `package` says; raises SyntaxError and ValueError."""
+    """What a Python source holds without comments, docstrings, layout and own imports.
+
+    Parameters
+    ----------
+    content
+        The source.
+    package
+        Name of the package that it is of.
+
+    Returns
+    -------
+    Syntax
+        Digest, imports of the package, and libraries. SyntaxError and ValueError of the parser
+        pass.
+
+    """
     tree = ast.parse(content)
     own: list[Import] = []
     tops: set[str] = set()

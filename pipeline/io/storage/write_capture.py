@@ -47,10 +47,31 @@ Payloads = Iterator[tuple[int, bytes]]
 def write_capture(
     folder: Path, stem: str, meta: Mapping[str, str], tables: Sequence[Table], form: Format
 ) -> Path:
-    """Writes one capture and returns its path; an MCAP topic a table, a CSV holds one table.
+    """Writes one capture in an encoding of the contract.
 
-    Every byte of samples and metadata is under a checksum. Raises ValueError for a CSV of several
-    tables and for columns of unequal length.
+    Parameters
+    ----------
+    folder
+        Where it is written.
+    stem
+        File name without extension.
+    meta
+        Metadata as texts.
+    tables
+        Columns by name [n each]; an MCAP topic each, a CSV holds one.
+    form
+        Encoding, compression and blocks.
+
+    Returns
+    -------
+    Path
+        The file; every byte of samples and metadata is under a checksum.
+
+    Raises
+    ------
+    ValueError
+        A CSV is to hold several tables, or columns are of unequal length.
+
     """
     for table in tables:
         if len({column.size for column in table.values()}) != 1:
@@ -66,7 +87,26 @@ def write_capture(
 
 
 def csv_bytes(meta: Mapping[str, str], table: Table) -> bytes:
-    """Metadata lines, header and rows; NaN is an empty field, `sha256_rows` covers the rest."""
+    """Metadata lines, header and rows; NaN is an empty field, `sha256_rows` covers the rest.
+
+    Parameters
+    ----------
+    meta
+        Metadata as texts.
+    table
+        Columns by name [n each]; NaN is an empty field.
+
+    Attributes
+    ----------
+    capture as CSV
+        metadata lines, header and rows.
+
+    Returns
+    -------
+    bytes
+        `sha256_rows` covers header and rows.
+
+    """
     columns = [column.tolist() for column in table.values()]
     rows = [",".join(table)]
     rows += [",".join(map(_csv_number, row)) for row in zip(*columns, strict=True)]
@@ -82,7 +122,22 @@ def _csv_number(value: float) -> str:
 
 
 def mcap_bytes(meta: Mapping[str, str], tables: Sequence[Table], form: Format) -> bytes:
-    """One MCAP file with the metadata record `capture` and all checksums the format has."""
+    """One MCAP file with the metadata record `capture` and all checksums the format has.
+
+    Parameters
+    ----------
+    meta
+        Metadata as texts.
+    tables
+        Columns by name [n each].
+    form
+        Encoding, compression and blocks.
+
+    Attributes
+    ----------
+    capture as MCAP, with the metadata record `capture` and all checksums that the format has.
+
+    """
     from mcap.writer import CompressionType, Writer
 
     stream = io.BytesIO()

@@ -7,19 +7,32 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class CsvDialect:
-    """The layout of a text table. The defaults are the contract's own.
+    """The layout of a text table; the defaults are the contract's own.
 
-    `comment_lines`: leading lines with `#` hold metadata and are not the header.
-    `header_match`: regular expression that the header line begins with; without it the header is
-    the first line after `skip_lines`.
-    `names`: stand in for the header of a table without one, or (with `header_match`) of one whose
-    header names units only; an empty name leaves a column out.
-    `skip_after_header`: lines between header and rows, the first a units row if `units_row`.
-    `fewer_columns`: rows may end before the header does, all of them at the same column.
-    `time_start`, `time_increment`: regular expressions whose one group is a number [s] in the text
-    before the rows.
-    `row_end`: what stands behind the last field of a row, such as `;`, and is no field.
-    `whole_last_line`: the last row must end in a line break; a cut number looks whole.
+    Attributes
+    ----------
+    separator, decimal, encoding
+        Of the text.
+    comment_lines
+        Whether leading lines with `#` hold metadata and are not the header.
+    skip_lines, header_match
+        Lines before the header, or a regular expression that it begins with.
+    names
+        Stand in for the header of a table without one, or (with `header_match`) of one whose header
+        names units only; an empty name leaves a column out.
+    units_row, skip_after_header
+        Whether a units row follows the header, and lines between header and rows.
+    fewer_columns
+        Whether rows may end before the header does, all of them at the same column.
+    missing
+        Texts that stand for a missing value.
+    time_start, time_increment
+        Regular expressions whose one group is a number [s] in the text before the rows.
+    row_end
+        What stands behind the last field of a row, such as `;`, and is no field.
+    whole_last_line
+        Whether the last row must end in a line break; a number that is cut off looks whole.
+
     """
 
     separator: str = ","

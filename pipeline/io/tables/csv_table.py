@@ -50,7 +50,19 @@ def _refuse(
 
 
 def check_text(data: bytes) -> None:
-    """Refuse bytes that are no plain text table: packed, UTF-16, NUL, or CR line ends."""
+    """Refuses bytes that are no plain text table.
+
+    Parameters
+    ----------
+    data
+        Content of the file.
+
+    Raises
+    ------
+    CaptureError
+        It is packed, UTF-16 or binary, or lines end in a bare carriage return.
+
+    """
     if data.startswith(PACKED):
         raise _refuse("encoding", "the file is packed", "unpack it first")
     if data.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in data:

@@ -33,7 +33,21 @@ class Reader:
 
 
 def library(module: str, extra: str) -> ModuleType:
-    """An optional library; raises CaptureError that names the extra to install."""
+    """An optional library.
+
+    Parameters
+    ----------
+    module
+        Its name.
+    extra
+        The extra of this package that brings it.
+
+    Raises
+    ------
+    CaptureError
+        It is not installed; the remedy names the extra.
+
+    """
     try:
         return importlib.import_module(module)
     except ImportError:
@@ -51,7 +65,19 @@ def readers() -> dict[str, Reader]:
 
 
 def find_reader(name: str) -> Reader:
-    """The reader of a name; raises UsageError naming the known ones."""
+    """The reader of a name.
+
+    Parameters
+    ----------
+    name
+        Name of the plug-in.
+
+    Raises
+    ------
+    UsageError
+        There is none; the message names those that there are.
+
+    """
     known = readers()
     if name not in known:
         raise UsageError(f"there is no reader {name!r}", f"use one of {', '.join(known)}")
@@ -59,6 +85,20 @@ def find_reader(name: str) -> Reader:
 
 
 def table_names(readers_named: Iterable[str | None], data: bytes) -> list[str]:
-    """Names of a file's tables by the first reader that is named; none where none is."""
+    """Names of a file's tables.
+
+    Parameters
+    ----------
+    readers_named
+        Names of readers; the first that is not None is used.
+    data
+        Content of the file.
+
+    Returns
+    -------
+    list of str
+        Empty where no reader is named.
+
+    """
     name = next((one for one in readers_named if one), None)
     return [] if name is None else [table.name for table in find_reader(name).read(data)]

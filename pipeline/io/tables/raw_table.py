@@ -11,11 +11,25 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class RawTable:
-    """Fields [rows] by their own names.
+    """What a reader hands on: named arrays of one clock, before units, signs and glossary names.
 
-    `log_ns` [messages] counts from the capture's first message, or is None where the file has no
-    log clock; `rows_each` [messages] is how many rows a message has, None for one; `blocks` says
-    that messages are blocks. `units` holds what a units row stated.
+    Attributes
+    ----------
+    name
+        Of the table or topic.
+    fields
+        Columns by their own names [rows].
+    log_ns
+        Log clock from the capture's first message on [messages]; None where the file has none.
+    blocks
+        Whether messages are blocks of rows.
+    joint_state
+        Whether it is a ROS JointState.
+    units
+        What a units row stated, by field.
+    rows_each
+        Rows of each message [messages]; None for one.
+
     """
 
     name: str
