@@ -68,6 +68,15 @@ class Part:
     weak: WeakRows
     quiet: bool
 
+    @property
+    def since_pause_s(self) -> Array:
+        """Time since the log began or went on after a pause [n, s]."""
+        gaps = np.diff(self.t_s, prepend=-np.inf)
+        first = gaps > 0.25 * float(np.ptp(self.t_s[: int(self.weak.sizes[0])]))
+        begins = np.maximum.accumulate(np.where(first, np.arange(self.t_s.size), 0))
+        since: Array = self.t_s - self.t_s[begins]
+        return since
+
 
 @dataclass(frozen=True, slots=True)
 class Rows:
@@ -135,8 +144,10 @@ def voltage(part: Part, delay_s: float) -> tuple[Array, Array]:
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """kS, kV, kA and the delay by `voltage` over the windows of all drives without current.
 
-    The delay is found in a few rounds. Windows in which the shaft may stand are left out, for the
-    sign of friction is not known there. What regimes of the rows disagree by beyond chance is in
+    The delay is that of least deviance, from none to the longest of the policy, then by a few
+    rounds. Windows in which the shaft may stand are left out, for the sign of friction is not known
+    there; so are those that follow a pause by less than the delay, whose voltage is not recorded.
+    What regimes of the rows disagree by beyond chance is in
     the uncertainty. Nothing else is corrected: all hold at the winding's and the magnets'
     temperature of the log, and with whatever load it had. Logs count by what they leave.
     """
@@ -152,22 +163,37 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 
 
 def _solve(parts: Sequence[Part], columns: Sequence[int]) -> Solved | str:
-    """The fit of some of the columns of `voltage`, about its own delay; or why there is none."""
-    delay = 0.0
-    longest = 0.5 * max(float(np.ptp(p.t_s[: int(p.weak.sizes[0])])) for p in parts)
+    """The fit of some of the columns of `voltage`, about its own delay; or why there is none.
+
+    The voltage is no straight line over longer delays, so the one of least deviance is sought.
+    """
+    width = min(float(np.ptp(p.t_s[: int(p.weak.sizes[0])])) for p in parts)
+    longest = policy().shaft_rows.longest_delay_s
+    delays = np.linspace(0.0, longest, max(2, round(4.0 * longest / width) + 1))
+    solved = [_about(parts, columns, float(delay)) for delay in delays]
+    scored = [one for one in solved if isinstance(one, Solved)]
+    if isinstance(solved[0], str) or not scored:
+        return str(solved[0])
+    best = min(scored, key=lambda one: float(np.mean(np.log(one.sigma))))
     for _ in range(6):
-        rows = _rows(parts, delay, columns)
-        if rows.voltage_v.size < policy().evidence.rows:
-            return f"{rows.voltage_v.size} windows at speed"
-        sigma = _noise_v(rows)
-        found = linear_fit(rows.design, rows.voltage_v, sigma)
-        if not found.full_rank:
-            return "speed and voltage stay as they are"
-        step = float(found.coefficients[-1])
-        if abs(delay + step) > longest:
+        delay = best.delay_s + float(best.found.coefficients[-1])
+        nearer = _about(parts, columns, delay) if abs(delay) <= longest else ""
+        if not isinstance(nearer, Solved) or abs(delay - best.delay_s) < 1e-6 * width:
             break
-        delay += step
-    return Solved(rows, found, sigma, delay)
+        best = nearer
+    return best
+
+
+def _about(parts: Sequence[Part], columns: Sequence[int], delay_s: float) -> Solved | str:
+    """The fit linearised about a delay [s], or why there is none."""
+    rows = _rows(parts, delay_s, columns)
+    if rows.voltage_v.size < policy().evidence.rows:
+        return f"{rows.voltage_v.size} windows at speed"
+    sigma = _noise_v(rows)
+    found = linear_fit(rows.design, rows.voltage_v, sigma)
+    if not found.full_rank:
+        return "speed and voltage stay as they are"
+    return Solved(rows, found, sigma, delay_s)
 
 
 def _part(capture: Capture) -> Part | None:
@@ -195,8 +221,9 @@ def _windows(t_s: Array, theta_rad: Array, period_s: float) -> tuple[WeakRows, b
     """The shortest windows in which the angle's noise is quiet beside the acceleration."""
     limits = policy().shaft_rows
     sigma, shortest = noise_about_cubics(t_s, theta_rad), 1.5 * LEAST_SAMPLES * period_s
+    slower = max(1.0, shortest / limits.drive_windows_s[0])
     for usual in limits.drive_windows_s:
-        weak = weak_rows(t_s, max(usual, shortest), limits.overlap)
+        weak = weak_rows(t_s, slower * usual, limits.overlap)
         noise = sigma * weak.noise_gain(2)
         if noise < limits.quiet_share * float(np.std(weak.integral(theta_rad, 2))):
             return weak, True
@@ -212,6 +239,7 @@ def _rows(parts: Sequence[Part], delay_s: float, columns: Sequence[int]) -> Rows
         ends = zip(weak.starts, weak.starts + weak.sizes, strict=True)
         slowest = np.array([np.min(np.abs(part.speed_rad_s[a:b])) for a, b in ends])
         turning = slowest > policy().shaft_rows.slowest_share * fastest
+        turning &= part.since_pause_s[weak.starts] >= delay_s
         cluster = np.floor((weak.centres_s - weak.centres_s[0]) / policy().evidence.cluster_s)
         number = np.full(weak.count, float(index))
         piece = [design[:, columns], volts, number, cluster + 1e6 * index, weak.centres_s]

@@ -44,6 +44,10 @@ class ShaftRows:
         on="simulated logs of voltage and angle: at one sample and less kA came out up to ten "
         "times too large, at two and more its intervals held",
     )  # fmt: skip
+    longest_delay_s: float = chosen(
+        0.3, "s", "longest delay of the motion behind a logged voltage",
+        why="filters and buses of robots delay by up to some tenths of a second",
+    )  # fmt: skip
     overlap: float = derived(
         0.5, "1", "share of its samples that a window has in common with the next",
         source="as in Welch's spectra: no sample counts less than another, more only repeats",

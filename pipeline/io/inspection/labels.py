@@ -68,11 +68,25 @@ def read_label(name: str, unit_row: str | None = None) -> Label:
         ended = tuple(c for c in _columns(head) if known_unit(COLUMNS[c].unit, tail) is not None)
         if ended and tail not in _LETTERS:
             found, text = ended, tail
+        elif not found and tail not in _LETTERS:
+            found, text = _by_its_end(head, tail)
     if not found and dimensions:
         found = _of_dimension(stem, dimensions)
     unit = known_unit(COLUMNS[found[0]].unit, text) if found and text else None
     implied = _IMPLIED.get(_key(stem)) if found and not text else None
     return Label(found, unit or implied, text)
+
+
+def _by_its_end(head: str, tail: str) -> tuple[tuple[str, ...], str | None]:
+    """Columns of a name whose end is a unit, and the unit: `battery_V`, `iq_actual_mA`, `tick_us`.
+
+    A single letter is a unit only where the rest says of what.
+    """
+    dimensions = {unit for unit in FOREIGN_UNITS if known_unit(unit, tail) is not None}
+    found = _of_dimension(head, dimensions) if dimensions else ()
+    if len(tail) == 1 and not _marks(words_of(head)):
+        return (), None
+    return found, tail if found else None
 
 
 def known_unit(target: str, text: str) -> str | None:
@@ -171,7 +185,7 @@ def _columns(stem: str) -> tuple[str, ...]:
 
 def _by_words(stem: str) -> tuple[str, ...]:
     words = words_of(stem)
-    marks = frozenset(name for name, stems in _qualifiers().items() if matches(words, stems))
+    marks = _marks(words)
     if "not measured" in marks:
         return ()
     quantities = [name for name, stems in _quantities().items() if matches(words, stems)]
@@ -191,7 +205,7 @@ def _of_symbol(word: str) -> tuple[str, ...]:
 def _of_dimension(stem: str, dimensions: set[str]) -> tuple[str, ...]:
     """Columns of a unit's dimension, by what else the name says."""
     words = words_of(stem)
-    marks = frozenset(name for name, stems in _qualifiers().items() if matches(words, stems))
+    marks = _marks(words)
     if "not measured" in marks:
         return ()
     names = [name for name, (unit, _) in QUANTITIES.items() if unit in dimensions]
@@ -199,6 +213,11 @@ def _of_dimension(stem: str, dimensions: set[str]) -> tuple[str, ...]:
     if known:  # the words say another quantity than the unit does
         return ()
     return tuple(dict.fromkeys(column for name in names for column in _of(name, marks)))
+
+
+def _marks(words: tuple[str, ...]) -> frozenset[str]:
+    """What the words of a name say beside the quantity."""
+    return frozenset(name for name, stems in _qualifiers().items() if matches(words, stems))
 
 
 @cache

@@ -6,7 +6,7 @@ A unit that neither the name nor the numbers give is asked for and never assumed
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -97,21 +97,28 @@ def propose(table: RawTable, answers: Mapping[str, str]) -> tuple[FieldSeen, ...
     labels = {name: _label(table, name) for name in numeric}
     times = [name for name, label in labels.items() if label.columns[:1] == ("t_s",)]
     found = gather(numeric, times[0] if times else None)
-    columns = _columns(labels, found, answers)
+    columns = _columns(labels, found, answers, logged=table.log_ns is not None and not table.blocks)
     seen = [_seen(name, numeric, labels, columns, found, answers) for name in numeric]
     return tuple(_with_units(seen, labels, found, answers))
 
 
 def _label(table: RawTable, name: str) -> Label:
-    if table.joint_state and name in JOINT_COLUMNS:
-        return Label((JOINT_COLUMNS[name],), exact=True)
-    return read_label(name, dict(table.units).get(name))
+    """What a field is by its name, without the group that all fields of the table are in."""
+    if table.joint_state:
+        known = JOINT_COLUMNS.get(name)
+        return Label((known,), exact=True) if known else Label()
+    groups = {field.rpartition("/")[0] for field in table.fields}
+    bare = name.rpartition("/")[2] if len(groups) == 1 and len(table.fields) > 1 else name
+    return read_label(bare, dict(table.units).get(name))
 
 
 def _columns(
-    labels: Mapping[str, Label], found: Evidence, answers: Mapping[str, str]
+    labels: Mapping[str, Label], found: Evidence, answers: Mapping[str, str], *, logged: bool
 ) -> dict[str, tuple[str, ...]]:
-    """Columns that each field may be, after the answers and the evidence."""
+    """Columns that each field may be, after the answers and the evidence.
+
+    `logged`: the file has a clock beside its fields, so that none of them has to be one.
+    """
     clocks = {clock.field: clock for clock in found.clocks}
     columns: dict[str, tuple[str, ...]] = {}
     for name, label in labels.items():
@@ -125,7 +132,7 @@ def _columns(
             columns[name] = tuple(one for one in label.columns if one != "t_s")
         else:
             columns[name] = label.columns
-    if not any(one[:1] == ("t_s",) for one in columns.values()):
+    if not logged and not any(one[:1] == ("t_s",) for one in columns.values()):
         clear = [c for c in found.clocks if c.jitter < _MOST_CLOCK_JITTER]
         free = [c for c in clear if not columns[c.field] and not _is_answered(c.field, answers)]
         if free:
@@ -170,7 +177,7 @@ def _seen(
     """A field before its unit is settled."""
     label, options, values = labels[name], columns[name], numeric[name]
     first = float(values[0]) if values.size else None
-    seen = FieldSeen(name, first, why=_why(name, found))
+    seen = FieldSeen(name, first, why=_why(name, found, options))
     if not options:
         return seen
     if len(options) > 1:
@@ -191,9 +198,11 @@ def _seen(
 _ANGLES = ("theta_mech_rad", "theta_elec_rad", "theta_elec_deg")
 
 
-def _why(name: str, found: Evidence) -> str:
-    """What the numbers of a field show, in words."""
-    reasons = [f"starts again after {span:g}" for field, span in found.wraps if field == name]
+def _why(name: str, found: Evidence, options: Sequence[str]) -> str:
+    """What the numbers of a field show, in words; only a clock or an angle starts again."""
+    may_wrap = not options or options[0] in ("t_s", *_ANGLES)
+    wraps = found.wraps if may_wrap else ()
+    reasons = [f"starts again after {span:g}" for field, span in wraps if field == name]
     for relation in found.relations:
         if relation.field == name:
             kind = "the integral of " if relation.integral else ""
@@ -224,6 +233,8 @@ def _with_units(
             continue
         factor = _factor_seen(one, done, found, labels)
         unit = None if factor is None else _unit_of(factor, one.column)
+        if unit is None and one.column == "t_s":
+            unit = _since_1970(one.first)
         question = None if unit else _ask_unit(one, factor)
         done[one.name] = replace(one, unit=unit, question=question)
     return [done[field.name] for field in seen]
@@ -290,6 +301,12 @@ def _factor_seen(
         if field.column == "t_s" and one and two:
             return relation.factor * one / two
     return None
+
+
+def _since_1970(first: float | None) -> str | None:
+    """The unit of a clock that counts from 1970, by which it shows a year from 2001 to 2065."""
+    units = {unit: scale.factor for unit, scale in FOREIGN_UNITS["s"].items() if scale.factor <= 1}
+    return next((u for u, s in units.items() if first and 1e9 <= first * s < 3e9), None)
 
 
 def _unit_of(factor: float, column: str) -> str | None:

@@ -6,16 +6,27 @@ import csv
 import io
 import re
 from codecs import getincrementaldecoder
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from pipeline.io.inspection.vocabulary import QUALIFIERS, QUANTITIES
 from pipeline.io.tables.csv_dialect import CsvDialect
-from pipeline.io.tables.csv_table import MAX_HEAD_BYTES
+from pipeline.io.tables.csv_table import MAX_HEAD_BYTES, instants
 
 _SEPARATORS = ("|", ";", ",", "\t", " ")
 """The first of equals counts."""
 _NUMBER = re.compile(r"^[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?$|^[-+]?(nan|NaN|NAN)$")
 _LOOK_AT_LINES = 200
+_EAST_ASIAN = ("cp932", "gb18030", "big5", "euc_jp")
+_INSTANT = re.compile(r"\d:\d\d")
+_DAYS = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%d.%m.%y", "%m/%d/%Y", "%d/%m/%Y", "%d-%b-%Y")
+_TIMES = ("%H:%M:%S%.f", "%I:%M:%S%.f %p", "%H:%M")
+_INSTANTS = (
+    *(f"{day}{gap}{time}" for day in _DAYS for gap in (" ", "T") for time in _TIMES),
+    "%Y-%m-%dT%H:%M:%S%.f%#z",
+    *_TIMES,
+)
+"""The first that fits counts; which of two numbers is the month matters past midnight alone."""
 
 
 def sniff(text: str) -> tuple[CsvDialect, str | None] | None:
@@ -63,6 +74,7 @@ def sniff(text: str) -> tuple[CsvDialect, str | None] | None:
     decimal = "," if comma else "."
     fewer = separator != " "
     dialect = CsvDialect(separator=separator, decimal=decimal, fewer_columns=fewer, row_end=row_end)
+    dialect = replace(dialect, instant=_instant_of(lines[first:], dialect))
     if not heads:
         names = tuple(f"column_{n + 1}" for n in range(width))
         return replace(dialect, names=names, skip_lines=first), None
@@ -136,14 +148,50 @@ def encoding_of(head: bytes) -> str:
     Returns
     -------
     str
-        UTF-8 where the bytes are, else Latin-1, in which every byte is a letter.
+        UTF-8 where the bytes are; else the one of East Asia in which most words are known; else
+        Latin-1, in which every byte is a letter.
 
     """
     try:
         getincrementaldecoder("utf-8")().decode(head)
     except UnicodeDecodeError:
-        return "latin-1"
+        texts = (*(words for _, words in QUANTITIES.values()), *QUALIFIERS.values())
+        words = [word for text in texts for word in text.split() if not word.isascii()]
+        known = {code: _known_words(head, code, words) for code in _EAST_ASIAN}
+        best = max(known, key=lambda code: known[code])
+        return best if known[best] else "latin-1"
     return "utf-8"
+
+
+def _known_words(head: bytes, encoding: str, words: Sequence[str]) -> int:
+    """Letters of known words in a text by an encoding, 0 where it cannot be of it."""
+    try:
+        text = getincrementaldecoder(encoding)().decode(head)
+    except UnicodeDecodeError:
+        return 0
+    return sum(len(word) * text.count(word) for word in words)
+
+
+def _instant_of(lines: Sequence[str], dialect: CsvDialect) -> str | None:
+    """How a column of date and time of day is written, in strptime's letters, or None."""
+    rows = [_cells(line, dialect.separator) for line in lines]
+    for place in range(max(map(len, rows), default=0)):
+        cells = [row[place] for row in rows if len(row) > place and row[place]]
+        if cells and all(map(_INSTANT.search, cells)):
+            fitting = (form for form in _INSTANTS if _are_instants(cells, form, dialect))
+            found = next(fitting, None)
+            if found is not None:
+                return found
+    return None
+
+
+def _are_instants(cells: Sequence[str], form: str, dialect: CsvDialect) -> bool:
+    """Whether fields are date and time of day of a form, and do not go back."""
+    import polars as pl
+
+    texts = pl.Series([cell.replace(dialect.decimal, ".") for cell in cells])
+    times = instants(texts, form)
+    return bool(times.null_count() == 0 and (times.is_sorted() or "%d" not in form))
 
 
 def numeric_columns(body: bytes, dialect: CsvDialect) -> Callable[[str], bool]:
@@ -172,10 +220,14 @@ def numeric_columns(body: bytes, dialect: CsvDialect) -> Callable[[str], bool]:
     header = dialect.skip_lines
     first = header + (0 if dialect.names else 1 + dialect.skip_after_header)
     names = list(dialect.names or _cells(lines[header], dialect.separator))
-    texts: set[str] = set()
+    cells: dict[str, list[str]] = {name: [] for name in names}
     for line in lines[first : first + _LOOK_AT_LINES]:
         bare = line.rstrip().removesuffix(dialect.row_end)
         for name, cell in zip(names, _cells(bare, dialect.separator), strict=False):
-            if cell and not _NUMBER.match(cell):
-                texts.add(name)
-    return (frozenset(names) - texts).__contains__
+            if cell:
+                cells[name].append(cell)
+    numeric = {name for name, texts in cells.items() if all(map(_NUMBER.match, texts))}
+    if dialect.instant:
+        form = dialect.instant
+        numeric |= {n for n, c in cells.items() if c and _are_instants(c, form, dialect)}
+    return numeric.__contains__

@@ -157,25 +157,25 @@ def _shape_lines(shape: Shape, increment: str | None) -> list[str]:
 
 def _recognise(shape: Shape) -> str:
     if shape.header is not None and shape.reader is None:
-        return f"header: {_quoted(header_pattern(shape.header, marked=shape.marked))}"
+        pattern = header_pattern(shape.header, shape.dialect.encoding, marked=shape.marked)
+        return f"header: {_quoted(pattern)}"
     if shape.topics:
         return f"topics: [{', '.join(_quoted(topic) for topic in sorted(set(shape.topics)))}]"
     return f"files: [{', '.join(_quoted('*' + suffix) for suffix in shape.suffixes or ('.csv',))}]"
 
 
-def header_pattern(header: str, *, marked: bool = False) -> str:
-    """A regular expression of a header line, whatever the encoding of what is not ASCII in it.
+def header_pattern(header: str, encoding: str = "utf-8", *, marked: bool = False) -> str:
+    """A regular expression of a header line, whatever the bytes of what is not ASCII in it.
 
     Parameters
     ----------
     header
         The line.
+    encoding
+        Of the file. Where letters have bytes that are ASCII, as in Shift JIS, any bytes stand for
+        them.
     marked
         Whether a mark may stand before it, such as of the byte order.
-
-    Attributes
-    ----------
-    regular expression for a header line, whatever the encoding of what is not ASCII in it.
 
     """
     text = header.strip()
@@ -183,6 +183,8 @@ def header_pattern(header: str, *, marked: bool = False) -> str:
     pattern = re.escape(text if whole else text[: _LONGEST_HEADER // 2])
     pattern = re.sub(r"(?:\\?[^\x00-\x7F])+", lambda _: r"[^\\x00-\\x7F]+", pattern)
     pattern = pattern.replace("[^\\\\x00-\\\\x7F]", "[^\\x00-\\x7F]").replace("\\\t", "\\t")
+    if any(byte < 128 for c in text if not c.isascii() for byte in c.encode(encoding, "ignore")):
+        pattern = pattern.replace("[^\\x00-\\x7F]+", ".+")
     begin = r"^[^\x00-\x7F]*" if marked else "^"
     return begin + pattern + (r"\s*$" if whole else "")
 

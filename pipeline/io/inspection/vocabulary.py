@@ -19,8 +19,8 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     ),
     "angle": (
         "rad",
-        "angle position pos theta encoder winkel drehwinkel lage stellung geber angulo posicion "
-        "位置 角度",
+        "angle position pos theta encoder enc winkel drehwinkel lage stellung geber angulo "
+        "posicion 位置 角度",
     ),
     "temperature": ("degC", "temp temperatur temperature temperatura 温度"),
     "resistance": ("ohm", "resistance widerstand resistencia 电阻 抵抗"),
@@ -42,8 +42,8 @@ QUALIFIERS: dict[str, str] = {
         "alimentacion input eingang 母线 直流 電源"
     ),
     "electrical": "el elec electrical elek elektrisch electrique electrico 电角 電気角",
-    "d axis": "d daxis laengs langs d轴 d軸 ud vd",
-    "q axis": "q qaxis quer q轴 q軸 uq vq",
+    "d axis": "d daxis laengs langs d轴 d軸 id ud vd",
+    "q axis": "q qaxis quer q轴 q軸 iq uq vq",
     "ab": "ab uv u12 v12 l1l2 rs",
     "bc": "bc vw u23 v23 l2l3 st",
     "ca": "ca wu u31 v31 l3l1 tr",
@@ -92,7 +92,7 @@ TESTS: dict[str, str] = {
     "lcr": "lcr",
     "holding_current": "holding_current holding halten haltestrom maintien 保持",
     "flux_map": "flux_map fluxmap flusskennfeld 磁链图",
-    "torque_table": "torque_table static statisch drehmomenttabelle 静态",
+    "torque_table": "torque_table static statisch drehmomenttabelle 静态 静的 静特性 静トルク",
     "drive": "drive fahrt betrieb zyklus log run conduite marche 运行 運転",
 }
 DIRECTIONS = "cw ccw fwd rev forward reverse vor zurueck rueck links rechts vorwaerts rueckwaerts"

@@ -94,6 +94,13 @@ KEYS: tuple[Key, ...] = (
     Key("layout.time_increment", "pattern", "finds the sampling interval [s] there"),
     Key("layout.row_end", "text", "what ends every row and is no part of its last field", "';'"),
     Key(
+        "layout.instant",
+        "text",
+        "how a field of date and time of day is written, in strptime's letters, `%.f` for a "
+        "fraction of a second; it becomes seconds from the first row",
+        "'%d.%m.%Y %H:%M:%S%.f'",
+    ),
+    Key(
         "layout.whole_last_line",
         "flag",
         "the last row must end in a line break, since a cut number looks whole; true if not stated",

@@ -197,6 +197,10 @@ _SPELLINGS = {
 }
 
 
+_LETTERS_ALIKE = str.maketrans("µμΩ⋅・･∙", "uuΩ····")
+"""Micro signs, the ohm sign, and the dots between factors, those of Japanese text among them."""
+
+
 def normal_unit(text: str) -> str:
     """A unit as the table spells it; brackets, spaces and the two micro signs are evened out.
 
@@ -211,7 +215,7 @@ def normal_unit(text: str) -> str:
 
     """
     bare = text.strip().strip("()[]").strip()
-    bare = bare.replace("µ", "u").replace("μ", "u").replace("Ω", "Ω")
+    bare = bare.translate(_LETTERS_ALIKE)
     return _SPELLINGS.get(bare, bare)
 
 

@@ -29,8 +29,9 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     Returns
     -------
     tuple of RawTable
-        One a group, length of channels and sampling interval: fields `group/channel`, and
-        `group/time` [s] of waveforms, wf_start_offset + n wf_increment.
+        One a group, length of channels and sampling interval: fields `group/channel` with the
+        units that `unit_string` states, and `group/time` [s] of waveforms, wf_start_offset +
+        n wf_increment.
 
     Raises
     ------
@@ -45,6 +46,7 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     """
     nptdms = library("nptdms", "tdms")
     found: dict[tuple[str, int, float], dict[str, np.ndarray]] = {}
+    units: dict[str, str] = {}
     try:
         with _warnings_of("nptdms") as warnings:
             file = nptdms.TdmsFile.read(io.BytesIO(data))
@@ -57,12 +59,18 @@ def read(data: bytes) -> tuple[RawTable, ...]:
                     continue
                 step = float(channel.properties.get("wf_increment", 0.0))
                 fields = found.setdefault((group.name, values.size, step), {})
-                fields[f"{group.name}/{channel.name}"] = values
+                name = f"{group.name}/{channel.name}"
+                fields[name] = values
+                units[name] = str(channel.properties.get("unit_string", ""))
                 if step > 0.0:
                     fields[f"{group.name}/time"] = _time(channel, values.size, step)
+                    units[f"{group.name}/time"] = "s"
     except Exception as fault:
         raise CaptureError("not_tdms", f"it is no TDMS file: {fault}", "write it anew") from fault
-    return tuple(RawTable(group, fields) for (group, _, _), fields in sorted(found.items()))
+    return tuple(
+        RawTable(group, fields, units=tuple((n, units[n]) for n in fields if units[n]))
+        for (group, _, _), fields in sorted(found.items())
+    )
 
 
 @contextmanager

@@ -32,6 +32,9 @@ class CsvDialect:
         What stands behind the last field of a row, such as `;`, and is no field.
     whole_last_line
         Whether the last row must end in a line break; a number that is cut off looks whole.
+    instant
+        How a field of date and time of day is written, in the letters of strptime; it becomes
+        seconds from the first row.
 
     """
 
@@ -50,6 +53,7 @@ class CsvDialect:
     time_increment: str | None = None
     row_end: str = ""
     whole_last_line: bool = True
+    instant: str | None = None
 
 
 CONTRACT_DIALECT = CsvDialect()

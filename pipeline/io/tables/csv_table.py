@@ -28,6 +28,8 @@ _COMMENT = re.compile(r"^#\s*([^:]*?)\s*:\s?(.*?)\s*$")
 _BLANKS = re.compile(rb"[ \t]+")
 _EDGES = re.compile(rb"^ | (?=\n)", re.MULTILINE)
 _DECIMAL_COMMA = re.compile(rb"\d,\d")
+_NANOSECONDS_A_SECOND = 1e9
+_DAY_S = 86400.0
 _LONG_INTEGER = re.compile(r"^-?\d{16,}$")
 PACKED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"\x78\x9c", b"PK\x03\x04", b"BZh", b"\xfd7zXZ")
 
@@ -167,7 +169,8 @@ def read_csv(
     _check_separator(names, rows, dialect)
     rows = _even_out(rows, dialect)
     names = _check_shape(rows, names, dialect)
-    fields = _parse(rows, names, dialect, wanted)
+    fields, clocks = _parse(rows, names, dialect, wanted)
+    units += tuple((name, "s") for name in clocks)
     count = rows.count(b"\n")
     verified = stated is not None
     if stated is not None:
@@ -361,18 +364,18 @@ def _fields_a_row(rows: bytes, separator: str) -> NDArray[np.int64]:
 
 def _parse(
     rows: bytes, names: list[str], dialect: CsvDialect, wanted: Callable[[str], bool]
-) -> dict[str, Any]:
-    """Wanted columns as numbers [rows]; an empty field is NaN."""
+) -> tuple[dict[str, Any], list[str]]:
+    """Wanted columns as numbers [rows], and which were date and time; an empty field is NaN."""
     import polars as pl
 
     keep = {at: name for at, name in enumerate(names) if name and wanted(name)}
     if not rows:
-        return {name: np.empty(0) for name in keep.values()}
+        return {name: np.empty(0) for name in keep.values()}, []
     first = rows[: rows.find(b"\n")].decode("utf-8", "replace").split(dialect.separator)
     schema = {
         f"c{at}": (
             pl.String
-            if at not in keep
+            if at not in keep or (dialect.instant and number(first[at]) is None and first[at])
             else pl.Int64
             if _LONG_INTEGER.match(first[at])
             else pl.Float64
@@ -384,8 +387,13 @@ def _parse(
     except pl.exceptions.PolarsError:
         raise _locate(rows, schema, keep, dialect) from None
     found: dict[str, Any] = {}
+    clocks: list[str] = []
     for at, name in keep.items():
         values = frame[f"c{at}"]
+        if values.dtype == pl.String:
+            found[name] = _seconds(values, name, dialect.instant or "")
+            clocks.append(name)
+            continue
         found[name] = values.to_numpy() if values.null_count() == 0 else _with_nan(values)
         infinite = np.flatnonzero(np.isinf(found[name]))
         if infinite.size:
@@ -396,7 +404,7 @@ def _parse(
                 "leave the field empty where nothing was measured",
                 (row, int(infinite[-1])),
             )
-    return found
+    return found, clocks
 
 
 def _frame(rows: bytes, schema: dict[str, Any], dialect: CsvDialect) -> Any:
@@ -412,6 +420,41 @@ def _frame(rows: bytes, schema: dict[str, Any], dialect: CsvDialect) -> Any:
         encoding="utf8-lossy",
         glob=False,
     )
+
+
+def instants(texts: Any, form: str) -> Any:
+    """Date and time of day of texts [rows], null where one is not of the form.
+
+    Parameters
+    ----------
+    texts
+        polars series of texts [rows].
+    form
+        In the letters of strptime; without a day all are of one.
+
+    """
+    if "%d" not in form:
+        texts, form = "1970-01-01 " + texts, f"%Y-%m-%d {form}"
+    return texts.str.to_datetime(form, time_unit="ns", strict=False)
+
+
+def _seconds(texts: Any, name: str, form: str) -> NDArray[np.float64]:
+    """Seconds from the first row [rows]; a time of day goes on past midnight."""
+    times = instants(texts, form)
+    wrong = np.flatnonzero((times.is_null() & texts.is_not_null()).to_numpy())
+    if wrong.size:
+        row = int(wrong[0])
+        raise _refuse(
+            "bad_number",
+            f"the column {name!r} holds {str(texts[row])[:40]!r}, which is no {form!r}",
+            "correct `layout.instant` in the source map",
+            (row, int(wrong[-1])),
+        )
+    seconds = (times - times.drop_nulls().first()).dt.total_nanoseconds() / _NANOSECONDS_A_SECOND
+    found: NDArray[np.float64] = seconds.fill_null(float("nan")).to_numpy()
+    if "%d" in form:
+        return found
+    return np.unwrap(found, period=_DAY_S) if np.isfinite(found).all() else found
 
 
 def _with_nan(values: Any) -> Any:

@@ -29,6 +29,7 @@ def tables(data: bytes, form: str) -> tuple[RawTable, ...]:
     tuple of RawTable
         One for each length of vectors in a group. A dataset of one dimension is a field, so is a
         matrix of one row or one column; of a table with named columns each numeric column is one.
+        Units are those of the attribute `units` or `unit`.
 
     Raises
     ------
@@ -47,6 +48,7 @@ def tables(data: bytes, form: str) -> tuple[RawTable, ...]:
     """
     h5py = library("h5py", "hdf5")
     found: dict[tuple[str, int], dict[str, np.ndarray]] = {}
+    units: dict[str, str] = {}
     try:
         with h5py.File(io.BytesIO(data), "r") as file:
             datasets = _datasets(h5py, file)
@@ -56,11 +58,24 @@ def tables(data: bytes, form: str) -> tuple[RawTable, ...]:
                 for name, values in _vectors(path, one).items():
                     group = path.rpartition("/")[0]
                     found.setdefault((group, values.size), {})[name] = values
+                    units[name] = _unit(one)
     except (OSError, ValueError, KeyError, RuntimeError, TypeError) as fault:
         raise CaptureError(
             f"not_{form}", f"it cannot be read as HDF5: {fault}", "write it anew"
         ) from fault
-    return tuple(RawTable(group or form, fields) for (group, _), fields in sorted(found.items()))
+    return tuple(
+        RawTable(group or form, fields, units=tuple((n, units[n]) for n in fields if units[n]))
+        for (group, _), fields in sorted(found.items())
+    )
+
+
+def _unit(one: Any) -> str:
+    """The unit that a dataset's attribute `units` or `unit` states, or nothing."""
+    for key in ("units", "unit"):
+        stated = one.attrs.get(key)
+        if isinstance(stated, bytes | str):
+            return stated.decode("utf-8", "replace") if isinstance(stated, bytes) else stated
+    return ""
 
 
 def _datasets(h5py: Any, file: Any) -> dict[str, Any]:

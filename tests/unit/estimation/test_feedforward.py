@@ -79,6 +79,38 @@ def test_intervals_hold_over_seeds() -> None:
     assert missed <= 9
 
 
+@pytest.mark.parametrize("delay_s", [0.004, 0.1])
+def test_a_routine_of_slow_ramps_and_steps(delay_s: float) -> None:
+    """A robot's log: four tests from rest, stamps that jitter by more than the encoder's step.
+
+    A delay of five samples, and noise of the angle beside which short windows see little, both took
+    kA from the log, and kS by 2.5 u from the truth.
+    """
+    rng = np.random.default_rng(8)
+    fine, columns, begin, turned = 2e-4, [], 0.0, 0.0
+    for ramp, level, seconds in ((1.0, 0.0, 8.0), (-1.0, 0.0, 8.0), (0.0, 6.0, 3.0)):
+        t = np.arange(0.0, seconds, fine)
+        volts, omega = level + ramp * t, np.zeros(t.size)
+        for k in range(t.size - 1):
+            drive = volts[k] - KV_V_S_RAD * omega[k]
+            if omega[k] or abs(drive) > KS_V:
+                friction = KS_V * np.sign(omega[k] or drive)
+                omega[k + 1] = omega[k] + fine * (drive - friction) / 0.014
+        theta = np.concatenate([[0.0], np.cumsum(fine * omega[:-1])])
+        rows = np.arange(0, t.size, 100)
+        seen = np.maximum(rows - round(delay_s / fine), 0)
+        stamps = begin + t[rows] + rng.uniform(0.0, 2e-4, rows.size)
+        columns.append([stamps, volts[rows], turned + theta[seen]])
+        begin, turned = begin + seconds + 3.0, turned + theta[-1]
+    t_s, vq_v, theta_mech_rad = np.hstack(columns)
+    one = capture("drive", "robot", t_s=t_s, vq_v=vq_v, theta_mech_rad=theta_mech_rad)
+    found = estimates(ESTIMATOR, one)
+    for name, value in zip(GIVES, (KS_V, KV_V_S_RAD, 0.014, delay_s), strict=True):
+        low, high = found[name].interval()
+        assert low < value < high, (name, found[name].number, found[name].u)
+        assert found[name].u < max(0.05 * value, 0.005), name
+
+
 @pytest.mark.parametrize("seed", [2, 3])
 def test_a_time_constant_between_two_samples_is_not_told(seed: int) -> None:
     """The speed follows within a millisecond, the log has ten: kS and kV stand, of kA and the

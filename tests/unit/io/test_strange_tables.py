@@ -1,0 +1,119 @@
+"""Text tables of benches abroad, and clocks that are written as date and time of day."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.inspection.describe import InspectReport, describe
+from pipeline.io.inspection.labels import read_label
+from pipeline.io.inspection.proposals import propose
+from pipeline.io.maps.source_map import parse_source_file
+from pipeline.io.tables.raw_table import RawTable
+from pipeline.records.capture import Capture
+
+
+def looked(folder: Path, name: str, data: bytes, **answers: str) -> tuple[InspectReport, Capture]:
+    """What `inspect` says of a file, and the capture that its map makes of it."""
+    (folder / name).write_bytes(data)
+    report = describe(folder / name, {}, {"motor_id": "M1", "test": "drive", **answers})
+    maps = parse_source_file(report.starter.encode(), "found")
+    return report, read_capture(folder, survey(folder, maps).entries[0])
+
+
+def test_a_table_in_shift_jis(tmp_path: Path) -> None:
+    """Its letters have bytes that are ASCII, and its unit a dot that only Japanese text has."""
+    data = "電流[A],トルク[mN・m]\r\n-2.0,-187.1\r\n0.0,0.4\r\n2.0,187.5\r\n".encode("cp932")
+    report, capture = looked(tmp_path, "static.csv", data, test="torque_table", **{
+        "column.電流_A": "iq_a"})  # fmt: skip
+    assert report.columns == {"iq_a", "torque_shaft_nm"}
+    torque = capture.arrays("torque_shaft_nm", masked=False)["torque_shaft_nm"]
+    np.testing.assert_allclose(torque, [-0.1871, 0.0004, 0.1875])
+
+
+def test_a_table_in_gb18030(tmp_path: Path) -> None:
+    head = "时间(s),转速(rpm),转矩(N·m),q轴电流(A)\n"
+    rows = "".join(f"{0.01 * k:.2f},600,0.{k},{k}\n" for k in range(9))
+    report, capture = looked(tmp_path, "map.csv", (head + rows).encode("gb18030"))
+    assert report.columns == {"t_s", "omega_mech_rad_s", "torque_shaft_nm", "iq_a"}
+    speed = capture.arrays("omega_mech_rad_s", masked=False)["omega_mech_rad_s"]
+    np.testing.assert_allclose(speed, 20.0 * np.pi)
+
+
+@pytest.mark.parametrize(
+    ("separator", "clock"),
+    [
+        (",", "2024-03-01 23:59:{:06.3f}"),
+        (",", "2024-03-01T23:59:{:06.3f}"),
+        (",", "01.03.2024 23:59:{:06.3f}"),
+        (",", "3/1/2024 11:59:{:06.3f} PM"),
+        (";", "01.03.2024 23:59:{:06.3f}"),
+        (",", "23:59:{:06.3f}"),
+    ],
+)
+def test_a_clock_of_date_and_time(tmp_path: Path, separator: str, clock: str) -> None:
+    """Seconds from the first row, with the decimal comma that the other numbers have."""
+    lines = [f"Timestamp{separator}iq [A]"]
+    for k in range(40):
+        row = f"{clock.format(0.25 * k + 1)}{separator}{0.5 * k}"
+        lines.append(row.replace(".", ",") if separator == ";" and "." in row else row)
+    if separator == ";":
+        lines = [line.replace("01,03,2024", "01.03.2024") for line in lines]
+    report, capture = looked(tmp_path, "log.csv", "\n".join([*lines, ""]).encode())
+    assert report.columns == {"t_s", "iq_a"}
+    time = capture.arrays("t_s", masked=False)["t_s"]
+    np.testing.assert_allclose(time, 0.25 * np.arange(40), atol=1e-9)
+
+
+def test_a_time_of_day_goes_on_past_midnight(tmp_path: Path) -> None:
+    seconds = 86395.0 + 0.5 * np.arange(40)
+    clocks = [f"{s // 3600 % 24:02.0f}:{s // 60 % 60:02.0f}:{s % 60:04.1f}" for s in seconds]
+    lines = ["Uhrzeit,iq [A]", *(f"{c},{k}" for k, c in enumerate(clocks)), ""]
+    _, capture = looked(tmp_path, "log.csv", "\n".join(lines).encode(), **{"column.Uhrzeit": "t_s"})
+    time = capture.arrays("t_s", masked=False)["t_s"]
+    np.testing.assert_allclose(time, seconds - seconds[0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "unit"),
+    [
+        ("battery_V", "vdc_v", "V"),
+        ("iq_actual_mA", "iq_a", "mA"),
+        ("tick_us", "t_s", "us"),
+    ],
+)
+def test_a_unit_at_the_end_of_a_name_says_what_it_is_of(name: str, column: str, unit: str) -> None:
+    found = read_label(name)
+    assert (found.columns[:1], found.unit) == ((column,), unit)
+
+
+@pytest.mark.parametrize("name", ["phase_A", "cob_id", "sensor_V", "gain_s"])
+def test_a_letter_at_the_end_of_a_name_may_be_no_unit(name: str) -> None:
+    assert read_label(name).columns == ()
+
+
+def test_fields_of_one_group_are_known_by_their_own_names() -> None:
+    """And what a form states of a channel's unit is taken."""
+    fields = {"run/t_s": np.arange(30.0), "run/n": 0.1 * np.arange(30.0) ** 2}
+    seen = propose(RawTable("run", fields, units=(("run/n", "1/min"),)), {})
+    assert [(one.column, one.unit) for one in seen] == [("t_s", None), ("omega_mech_rad_s", "rpm")]
+
+
+def test_a_clock_from_1970_has_its_unit_from_its_size() -> None:
+    rng = np.random.default_rng(3)
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        clock = np.round((1.7096e9 + 0.01 * np.arange(60.0)) / size, 6)
+        seen = propose(RawTable("csv", {"timestamp": clock, "x": rng.normal(size=60)}), {})
+        assert (seen[0].column, seen[0].unit, seen[0].question) == ("t_s", unit, None)
+
+
+def test_stamps_of_joint_states_are_not_taken_for_the_clock_of_the_log() -> None:
+    """The nanoseconds of a stamp start again each second; the file's log clock does not."""
+    nanoseconds = (np.arange(300) * 10_000_000) % 1_000_000_000
+    fields = {"header.stamp.nanosec": nanoseconds, "position": np.sin(np.arange(300) / 20.0)}
+    log = (np.arange(300) * 10_000_000).astype(np.uint64)
+    seen = propose(RawTable("/joint_states", fields, log, joint_state=True), {})
+    assert [one.column for one in seen] == [None, "theta_mech_rad"]
