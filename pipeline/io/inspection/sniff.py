@@ -11,7 +11,8 @@ from dataclasses import replace
 
 from pipeline.io.inspection.vocabulary import QUALIFIERS, QUANTITIES
 from pipeline.io.tables.csv_dialect import CsvDialect
-from pipeline.io.tables.csv_table import MAX_HEAD_BYTES, instants
+from pipeline.io.tables.csv_table import MAX_HEAD_BYTES
+from pipeline.io.tables.instants import instants
 
 _SEPARATORS = ("|", ";", ",", "\t", " ")
 """The first of equals counts."""

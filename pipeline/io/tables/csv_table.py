@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT, CsvDialect
+from pipeline.io.tables.instants import seconds_of
 from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 from pipeline.records.parse import ParseError, decoded, number, whole
@@ -28,8 +29,6 @@ _COMMENT = re.compile(r"^#\s*([^:]*?)\s*:\s?(.*?)\s*$")
 _BLANKS = re.compile(rb"[ \t]+")
 _EDGES = re.compile(rb"^ | (?=\n)", re.MULTILINE)
 _DECIMAL_COMMA = re.compile(rb"\d,\d")
-_NANOSECONDS_A_SECOND = 1e9
-_DAY_S = 86400.0
 _LONG_INTEGER = re.compile(r"^-?\d{16,}$")
 PACKED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"\x78\x9c", b"PK\x03\x04", b"BZh", b"\xfd7zXZ")
 
@@ -391,7 +390,7 @@ def _parse(
     for at, name in keep.items():
         values = frame[f"c{at}"]
         if values.dtype == pl.String:
-            found[name] = _seconds(values, name, dialect.instant or "")
+            found[name] = seconds_of(values, name, dialect.instant or "")
             clocks.append(name)
             continue
         found[name] = values.to_numpy() if values.null_count() == 0 else _with_nan(values)
@@ -420,41 +419,6 @@ def _frame(rows: bytes, schema: dict[str, Any], dialect: CsvDialect) -> Any:
         encoding="utf8-lossy",
         glob=False,
     )
-
-
-def instants(texts: Any, form: str) -> Any:
-    """Date and time of day of texts [rows], null where one is not of the form.
-
-    Parameters
-    ----------
-    texts
-        polars series of texts [rows].
-    form
-        In the letters of strptime; without a day all are of one.
-
-    """
-    if "%d" not in form:
-        texts, form = "1970-01-01 " + texts, f"%Y-%m-%d {form}"
-    return texts.str.to_datetime(form, time_unit="ns", strict=False)
-
-
-def _seconds(texts: Any, name: str, form: str) -> NDArray[np.float64]:
-    """Seconds from the first row [rows]; a time of day goes on past midnight."""
-    times = instants(texts, form)
-    wrong = np.flatnonzero((times.is_null() & texts.is_not_null()).to_numpy())
-    if wrong.size:
-        row = int(wrong[0])
-        raise _refuse(
-            "bad_number",
-            f"the column {name!r} holds {str(texts[row])[:40]!r}, which is no {form!r}",
-            "correct `layout.instant` in the source map",
-            (row, int(wrong[-1])),
-        )
-    seconds = (times - times.drop_nulls().first()).dt.total_nanoseconds() / _NANOSECONDS_A_SECOND
-    found: NDArray[np.float64] = seconds.fill_null(float("nan")).to_numpy()
-    if "%d" in form:
-        return found
-    return np.unwrap(found, period=_DAY_S) if np.isfinite(found).all() else found
 
 
 def _with_nan(values: Any) -> Any:
