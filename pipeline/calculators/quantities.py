@@ -43,6 +43,21 @@ class Key:
     """A quantity that may be given: its name ends in its unit and may be typed without it.
 
     `low` [unit] is the smallest sensible value, excluded. `many`: a list, as in 4,8.
+
+    Attributes
+    ----------
+    quantity that may be given.
+    name, unit, words
+        Its name ends in its unit, and may be typed without it.
+    other_names
+        Further names.
+    low
+        Smallest sensible value [unit], excluded.
+    many
+        Whether it is a list, as in 4,8.
+    choices
+        Texts of which it is one.
+
     """
 
     name: str
@@ -70,15 +85,45 @@ class Given:
     texts: Mapping[str, str]
 
     def has(self, *names: str) -> bool:
-        """Whether all of these were given."""
+        """Whether all of some quantities were given.
+
+        Parameters
+        ----------
+        *names
+            Names of keys.
+
+        """
         return all(name in self.numbers for name in names)
 
     def any(self, *names: str) -> tuple[str, ...]:
-        """Those of the names that were given."""
+        """Those of some quantities that were given.
+
+        Parameters
+        ----------
+        *names
+            Names of keys.
+
+        """
         return tuple(name for name in names if name in self.numbers)
 
     def one(self, name: str) -> float:
-        """A number that was given."""
+        """A number that was given.
+
+        Parameters
+        ----------
+        name
+            Name of the key.
+
+        Attributes
+        ----------
+        number that was given.
+
+        Returns
+        -------
+        float
+            The first, of a list.
+
+        """
         return self.numbers[name][0]
 
 
@@ -245,7 +290,20 @@ def agreed(given: Given, values: Mapping[str, float], quantity: Quantity = "coup
 
 
 def render(kind: str, calculator: Calculator, given: Given, answer: Answer) -> str:
-    """The printed answer: what was given, every line with its formula, the convention."""
+    """The printed answer: what was given, every line with its formula, the convention.
+
+    Parameters
+    ----------
+    kind
+        Name of the calculation.
+    calculator
+        The calculation.
+    given
+        What was given.
+    answer
+        What follows from it.
+
+    """
     units = {key.name: key.unit for key in calculator.keys}
     shown = [
         f"{name} = {', '.join(number(v) for v in values)} {_unit(units[name])}".rstrip()
@@ -268,7 +326,18 @@ def render(kind: str, calculator: Calculator, given: Given, answer: Answer) -> s
 
 
 def number(value: float | int | str) -> str:
-    """Six significant digits, whole numbers as they are."""
+    """Six significant digits, whole numbers as they are.
+
+    Parameters
+    ----------
+    value
+        The number.
+
+    Attributes
+    ----------
+    number with six significant digits, a whole number as it is.
+
+    """
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
@@ -277,7 +346,16 @@ def _unit(unit: str) -> str:
 
 
 def usage(kinds: Mapping[str, Calculator], kind: str | None = None) -> str:
-    """The kinds, or the keys of one kind and what can be worked out of them."""
+    """The kinds of calculation, or the keys of one and what can be calculated from them.
+
+    Parameters
+    ----------
+    kinds
+        Calculations by name.
+    kind
+        One of them; None lists all.
+
+    """
     if kind is None:
         width = max(map(len, kinds))
         return "\n".join(f"  {name:<{width}}  {kinds[name].words}" for name in kinds)

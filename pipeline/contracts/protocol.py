@@ -47,11 +47,37 @@ class Gate:
 def warning(
     capture: Capture, code: str, message: str, remedy: str, rows: tuple[int, int] | None = None
 ) -> Finding:
-    """A finding that lets the capture through."""
+    """A finding that lets the capture through.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+    code
+        Short stable identifier, usually the gate's name.
+    message
+        What is doubtful.
+    remedy
+        What to do about it.
+    rows
+        First and last row concerned, from 0.
+
+    Attributes
+    ----------
+    finding that lets the capture through.
+
+    """
     return Finding(capture.path, "warning", code, message, remedy, rows)
 
 
 def span_of(rows: NDArray[np.bool_]) -> tuple[int, int]:
-    """First and last True row."""
+    """First and last row that a mask marks.
+
+    Parameters
+    ----------
+    rows
+        Marked rows [n]; at least one.
+
+    """
     where = np.flatnonzero(rows)
     return int(where[0]), int(where[-1])

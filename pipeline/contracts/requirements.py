@@ -26,7 +26,14 @@ class Requirement:
     words: str = ""
 
     def met_by(self, columns: frozenset[str]) -> bool:
-        """Whether one alternative is wholly among the columns."""
+        """Whether one alternative is wholly among some columns.
+
+        Parameters
+        ----------
+        columns
+            Columns that a capture holds.
+
+        """
         return any(columns.issuperset(alternative) for alternative in self.alternatives)
 
     def text(self) -> str:

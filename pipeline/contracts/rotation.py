@@ -21,10 +21,19 @@ VectorOf = Callable[[Capture], tuple[Array, NDArray[np.complex128]] | None]
 
 @dataclass(frozen=True, slots=True)
 class Turning:
-    """Electrical against mechanical angle: `cycles_per_turn` is negative where they oppose.
+    """How far back-EMF or currents turn for a turn of the shaft.
 
-    `u` is its standard uncertainty from the scatter over the blocks, `cycles` the electrical
-    cycles seen in either direction, `top_hz` the electrical frequency that 99 % of rows keep to.
+    Attributes
+    ----------
+    cycles_per_turn
+        Electrical cycles a mechanical turn; negative where the two oppose.
+    u
+        Its standard uncertainty, from the scatter over blocks.
+    cycles
+        Electrical cycles in either direction.
+    top_hz
+        Electrical frequency that 99 % of the rows stay below.
+
     """
 
     cycles_per_turn: float
@@ -34,13 +43,42 @@ class Turning:
 
 
 def integral(t_s: Array, rate: Array) -> Array:
-    """Running trapezoid integral [n] of a rate [unit/s], from 0."""
+    """Running integral of a rate by the trapezoidal rule.
+
+    Parameters
+    ----------
+    t_s
+        Instants [n].
+    rate
+        [n, unit/s].
+
+    Returns
+    -------
+    array [n]
+        From 0 [unit].
+
+    """
     steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(t_s)
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 def shaft_angle(capture: Capture, t_s: Array) -> Array | None:
-    """Shaft angle [n, rad] on a clock: the angle where it is there, else the speed integrated."""
+    """Angle of the shaft on another clock.
+
+    Parameters
+    ----------
+    capture
+        Holds an angle or a speed, in any of its tables.
+    t_s
+        Instants wanted [n].
+
+    Returns
+    -------
+    array [n] or None
+        In rad, the speed integrated where there is no angle; NaN outside the span of the column,
+        None without either.
+
+    """
     for name in ("theta_mech_rad", "omega_mech_rad_s"):
         for table in capture.tables:
             if name not in table.columns or "t_s" not in table.columns:
@@ -79,7 +117,19 @@ def line_voltage_vector(capture: Capture) -> tuple[Array, NDArray[np.complex128]
 
 
 def line_current_vector(capture: Capture) -> tuple[Array, NDArray[np.complex128]] | None:
-    """Clock [n, s] and space vector [n, A] of the line currents; None with fewer than two."""
+    """Space vector of the line currents.
+
+    Parameters
+    ----------
+    capture
+        Any capture.
+
+    Returns
+    -------
+    tuple of array or None
+        Instants [n, s] and complex vector [n, A]; None with fewer than two currents.
+
+    """
     return _vector_of(capture, LINE_CURRENTS)
 
 

@@ -23,27 +23,74 @@ SHA256: Schema = {"type": "string", "pattern": "^[0-9a-f]{64}$"}
 
 
 def or_null(schema: Schema) -> Schema:
-    """A schema, or null."""
+    """A schema, or null.
+
+    Parameters
+    ----------
+    schema
+        The schema.
+
+    Attributes
+    ----------
+    schema, or null.
+
+    """
     return {"anyOf": [schema, {"type": "null"}]}
 
 
 def one_of(literal: Any) -> Schema:
-    """One of the words of a literal type."""
+    """One of the values of a literal type.
+
+    Parameters
+    ----------
+    literal
+        A `Literal`.
+
+    """
     return {"enum": list(get_args(literal))}
 
 
 def list_of(items: Schema, **more: Any) -> Schema:
-    """A list of one kind of item."""
+    """A list of one kind of item.
+
+    Parameters
+    ----------
+    items
+        Schema of an item.
+    **more
+        Further keys, such as `minItems`.
+
+    Attributes
+    ----------
+    list of one kind of item.
+
+    """
     return {"type": "array", "items": items, **more}
 
 
 def map_of(values: Schema) -> Schema:
-    """An object of one kind of value under any name."""
+    """An object of one kind of value under any name.
+
+    Parameters
+    ----------
+    values
+        Schema of a value.
+
+    """
     return {"type": "object", "additionalProperties": values}
 
 
 def object_of(needed: Mapping[str, Schema], more: Mapping[str, Schema] | None = None) -> Schema:
-    """An object that holds `needed`, may hold `more`, and anything else."""
+    """An object; other keys than those named are allowed.
+
+    Parameters
+    ----------
+    needed
+        Schemas of keys that it must hold.
+    more
+        Schemas of keys that it may hold.
+
+    """
     return {
         "type": "object",
         "properties": {**needed, **(more or {})},
@@ -52,14 +99,32 @@ def object_of(needed: Mapping[str, Schema], more: Mapping[str, Schema] | None = 
 
 
 def document(identity: str, words: str, body: Schema) -> Schema:
-    """A schema of a file: its identity, a sentence and its keys."""
+    """The schema of a file.
+
+    Parameters
+    ----------
+    identity
+        Such as `findings/1`; the file holds it under `schema`.
+    words
+        Title in a few words.
+    body
+        Schema of the file's keys; it is changed in place.
+
+    """
     body["properties"]["schema"] = {"const": identity}
     body["required"] = sorted({*body["required"], "schema"})
     return {"$schema": DIALECT, "$id": f"urn:{identity}", "title": words, **body}
 
 
 def of_kind(kind: Any) -> Schema:
-    """The schema of a field of a record: a record, a tuple, a literal, a scalar or nothing."""
+    """The schema of a field of a record.
+
+    Parameters
+    ----------
+    kind
+        Its type: a record, a tuple, a mapping, a literal, a scalar, or one of these or None.
+
+    """
     origin, inner = get_origin(kind), get_args(kind)
     if is_dataclass(kind) and isinstance(kind, type):
         return object_of({name: of_kind(hint) for name, hint in hints_of(kind).items()})

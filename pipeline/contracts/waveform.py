@@ -64,7 +64,19 @@ def runs_of_equal(values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def share_of_repeats(values: Array) -> float:
-    """Share of samples [n] that equal the one before; 1 where there are too few to say."""
+    """Share of samples that equal the one before.
+
+    Parameters
+    ----------
+    values
+        Samples [n]; values that are not finite are left out.
+
+    Returns
+    -------
+    float
+        1 where there are fewer than two.
+
+    """
     finite = values[np.isfinite(values)]
     return float(np.mean(finite[1:] == finite[:-1])) if finite.size > 1 else 1.0
 
@@ -98,7 +110,23 @@ def longest_likely_run(values: Array, level: float) -> float:
 
 
 def rows_of_runs(size: int, starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> Rows:
-    """True on the rows [size] of the given stretches."""
+    """Rows that lie in some runs.
+
+    Parameters
+    ----------
+    size
+        Number of rows.
+    starts
+        First row of each run [r].
+    lengths
+        Rows of each run [r].
+
+    Returns
+    -------
+    array [size] of bool
+        True inside a run.
+
+    """
     edges = np.zeros(size + 1, dtype=np.int64)
     np.add.at(edges, starts, 1)
     np.add.at(edges, starts + lengths, -1)

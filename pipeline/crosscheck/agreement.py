@@ -212,7 +212,14 @@ def parties(found: Sequence[Disagreement]) -> tuple[list[str], list[str]]:
 
 
 def suspects(found: Sequence[Disagreement]) -> str:
-    """Which files are of another motor, in words."""
+    """Which files are of another motor, in words.
+
+    Parameters
+    ----------
+    found
+        Disagreements, at least one.
+
+    """
     usual, odd = parties(found)
     if all(one.tied for one in found):
         return f"{_named(usual)} against {_named(odd)}: of two motors?"
@@ -228,7 +235,14 @@ def _named(paths: Sequence[str]) -> str:
 
 
 def describe(one: Disagreement) -> str:
-    """One quantity of the groups in words, with k = 2."""
+    """One quantity of groups of captures in words, with k = 2.
+
+    Parameters
+    ----------
+    one
+        Its disagreement.
+
+    """
     groups = [
         f"{g.mean:.5g} ± {2.0 * g.u:.2g} in {counted(len(g.paths), 'file')}"
         for g in (one.usual, *one.odd)
@@ -238,7 +252,19 @@ def describe(one: Disagreement) -> str:
 
 
 def findings(found: Sequence[Disagreement]) -> tuple[Finding, ...]:
-    """One warning that names the odd files and every quantity in which they differ."""
+    """One warning that names the odd files and every quantity in which they differ.
+
+    Parameters
+    ----------
+    found
+        Disagreements.
+
+    Returns
+    -------
+    tuple of Finding
+        Empty where there is none.
+
+    """
     if not found:
         return ()
     words = f"{suspects(found)} {'; '.join(map(describe, found))}"

@@ -43,7 +43,20 @@ class Ratio(NamedTuple):
 
     @classmethod
     def of(cls, value: float, budget: Budget) -> Ratio:
-        """The ratio whose uncertainty is this budget [1]."""
+        """The ratio whose uncertainty is this budget [1].
+
+        Parameters
+        ----------
+        value
+            The ratio [1].
+        budget
+            Its contributions [1].
+
+        Attributes
+        ----------
+        ratio with the uncertainty of a budget.
+
+        """
         return cls(value, standard_uncertainty(budget), effective_dof(budget))
 
 
@@ -163,5 +176,18 @@ def judge_ratio(
 
 
 def not_evaluated(name: str, missing: str) -> Check:
-    """The check that could not be made, saying what is missing."""
+    """The check that could not be made, saying what is missing.
+
+    Parameters
+    ----------
+    name
+        Name of the rule.
+    missing
+        What is missing, in words.
+
+    Attributes
+    ----------
+    check that could not be made.
+
+    """
     return Check(name, "not_evaluated", missing)

@@ -35,7 +35,19 @@ ASSUMED = "assumed:"
 class Way:
     """How constants can be had: what an estimator declares, without the estimator.
 
-    It needs all of `uses` and one of `either`, where it names any.
+    Attributes
+    ----------
+    gives
+        The constants.
+    tests
+        Tests that it can use.
+    experiment
+        The test to record, in words.
+    uses
+        Constants that it needs, all of them.
+    either
+        Constants of which it needs one.
+
     """
 
     gives: tuple[str, ...]
@@ -45,7 +57,19 @@ class Way:
     either: tuple[str, ...] = ()
 
     def wanting(self, known: Known) -> list[str]:
-        """What it needs and is missing."""
+        """Constants that a way needs and that are missing.
+
+        Parameters
+        ----------
+        known
+            What is known of the motor.
+
+        Returns
+        -------
+        list of str
+            Empty where it can be gone.
+
+        """
         missing = [name for name in self.uses if _is_missing(known, name)]
         if all(_is_missing(known, name) for name in self.either):
             missing += self.either
@@ -143,10 +167,19 @@ def _reasons(step: Step) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Aims:
-    """What a datasheet is to reach: constants it must hold, uncertainties it must not exceed.
+    """What a datasheet is to reach.
 
-    `u_rel` and `u_rel_of` [1] are relative; `u_of` [the constant's unit] is for those that are zero
-    in a sound motor.
+    Attributes
+    ----------
+    required
+        Constants that it must hold.
+    u_rel
+        Relative standard uncertainty that a constant must not exceed [1].
+    u_rel_of
+        The same for single constants.
+    u_of
+        Standard uncertainty [the constant's unit] for constants that are zero in a sound motor.
+
     """
 
     required: frozenset[str] = frozenset()

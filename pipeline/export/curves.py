@@ -50,7 +50,24 @@ def bump_of(table: EffectTable) -> Bump | None:
 
 
 def drag_polynomial(table: EffectTable) -> Array | None:
-    """Coefficients [3] of c₀ ω + c₁ ω |ω| + c₂ ω³ through a curve of drag; None if it misses."""
+    """Coefficients [3] of c₀ ω + c₁ ω |ω| + c₂ ω³ through a curve of drag; None if it misses.
+
+    Parameters
+    ----------
+    table
+        Drag over speed.
+
+    Attributes
+    ----------
+    polynomial through a curve of drag.
+
+    Returns
+    -------
+    array [3] or None
+        c₀, c₁, c₂ of c₀ ω + c₁ ω|ω| + c₂ ω³ [N·m, rad/s]; None where it misses the curve by more
+        than `OF_PEAK` of its peak, or the other sense is another curve.
+
+    """
     speed, drag = _odd_half(table)
     if drag is None:
         return None
@@ -74,7 +91,16 @@ def _odd_half(table: EffectTable) -> tuple[Array, Array | None]:
 
 @dataclass(frozen=True, slots=True)
 class Wave:
-    """One order of a torque over the angle: `amplitude_nm` sin(`order` θ + `phase_rad`)."""
+    """One order of a torque over the angle: amplitude · sin(order · θ + phase).
+
+    Attributes
+    ----------
+    order
+        Waves a turn.
+    amplitude_nm, phase_rad
+        Of the wave.
+
+    """
 
     order: int
     amplitude_nm: float
@@ -82,7 +108,14 @@ class Wave:
 
 
 def waves(tables: Sequence[EffectTable]) -> list[Wave]:
-    """Orders of the torque on the shaft, the largest first: minus the drag of the tables."""
+    """Orders of the torque on the shaft, the largest first.
+
+    Parameters
+    ----------
+    tables
+        Drag over the angle of the shaft; the torque on the shaft is minus their sum.
+
+    """
     found: dict[int, complex] = {}
     for table in tables:
         values = np.array(table.values)

@@ -21,6 +21,17 @@ Values = dict[str, float]
 class Source:
     """A released datasheet on its way out: what it says, its revision, constants' own terms, and
     what the effects that are known of the motor add to it, as tables.
+
+    Attributes
+    ----------
+    released datasheet to be exported.
+    sheet, revision
+        The datasheet and its revision.
+    terms
+        Names of constants, those of further estimators too.
+    effects
+        What known effects of the motor add to it, as tables.
+
     """
 
     sheet: Datasheet
@@ -33,6 +44,22 @@ class Source:
 
         Raises UsageError for one that is missing, assumed or not identifiable, and for one whose
         convention is not known: not in the glossary, or in another unit than the glossary's.
+
+        Parameters
+        ----------
+        name
+            Glossary name.
+
+        Attributes
+        ----------
+        constant that may be exported.
+
+        Raises
+        ------
+        UsageError
+            It is missing, assumed or not identifiable, or its convention is not known: not in the
+            glossary, or in another unit.
+
         """
         found = self.optional(name)
         if found is None:
@@ -48,6 +75,26 @@ class Source:
     def optional(self, name: str) -> Estimate | None:
         """A constant where it may be exported, else None; raises UsageError as `estimate` does
         for an unknown convention.
+
+        Parameters
+        ----------
+        name
+            Glossary name.
+
+        Attributes
+        ----------
+        constant where it may be exported.
+
+        Returns
+        -------
+        Estimate or None
+            None where it is missing, assumed or not identifiable.
+
+        Raises
+        ------
+        UsageError
+            Its convention is not known.
+
         """
         estimate = self.sheet.constants.get(name)
         if estimate is None:
@@ -62,7 +109,14 @@ class Source:
         return estimate if estimate.known and estimate.status in USABLE else None
 
     def value(self, name: str) -> float:
-        """A constant's value in the glossary's unit and convention; raises as `estimate` does."""
+        """The value of a constant in the glossary's unit and convention.
+
+        Parameters
+        ----------
+        name
+            Glossary name; errors are those of `estimate`.
+
+        """
         return self.estimate(name).number
 
     def all(self) -> list[Estimate]:
@@ -84,13 +138,27 @@ class Source:
         ]
 
     def left_out(self, *held: str) -> tuple[str, ...]:
-        """Effects that a format cannot hold, with the reason; `held` are those that it does."""
+        """Effects that a format cannot hold, with the reason.
+
+        Parameters
+        ----------
+        *held
+            Effects that it does hold.
+
+        """
         every = dict.fromkeys(self.sizes(), "the format has no place for it")
         every |= self.effects.without
         return tuple(f"{name}: {why}" for name, why in every.items() if name not in held)
 
     def tables(self, variable: str) -> list[EffectTable]:
-        """Tables of the effects over one variable, by its glossary name."""
+        """Tables of the effects over one variable.
+
+        Parameters
+        ----------
+        variable
+            Glossary name.
+
+        """
         return [one for one in self.effects.tables if variable in one.variables]
 
     def heading(self) -> list[str]:
@@ -106,9 +174,22 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Exporter:
-    """One format. `render` gives the text, `read` the constants (glossary's names, units and
-    conventions) back out of it, whatever the receiver's own conventions; `options` with words.
-    `omits` lists the effects of a datasheet that the format cannot hold.
+    """One format.
+
+    Attributes
+    ----------
+    name, extension, words
+        Name, file extension and description.
+    render
+        Text of a datasheet.
+    read
+        The constants back out of such a text, in the glossary's names, units and conventions,
+        whatever the receiver's are.
+    options
+        Options with their description.
+    omits
+        Effects of a datasheet that the format cannot hold.
+
     """
 
     name: str
@@ -121,13 +202,32 @@ class Exporter:
 
 
 def no_effect_omitted(source: Source) -> tuple[str, ...]:
-    """Of a format that holds every parameter of every effect."""
+    """Of a format that holds every parameter of every effect: nothing.
+
+    Parameters
+    ----------
+    source
+        The datasheet.
+
+    """
     del source
     return ()
 
 
 def plain(text: str) -> str:
-    """The text as a comment may hold it in C, XML, shell or CSV: printable, no comment's end."""
+    """The text as a comment may hold it in C, XML, shell or CSV: printable, no comment's end.
+
+    Parameters
+    ----------
+    text
+        Any text.
+
+    Attributes
+    ----------
+    text as a comment may hold it in C, XML, shell or CSV
+        printable, without the end of a comment.
+
+    """
     shown = "".join(char if char.isprintable() else " " for char in text)
     for ending in ("*/", "--", "\\"):
         shown = shown.replace(ending, " ")
@@ -135,7 +235,26 @@ def plain(text: str) -> str:
 
 
 def number_option(options: Options, name: str) -> float | None:
-    """An option as a positive number; raises UsageError for another text."""
+    """An option as a positive number.
+
+    Parameters
+    ----------
+    options
+        Options as texts.
+    name
+        Name of the option.
+
+    Returns
+    -------
+    float or None
+        None where it is not given.
+
+    Raises
+    ------
+    UsageError
+        It is no positive number.
+
+    """
     if name not in options:
         return None
     try:

@@ -20,9 +20,18 @@ UNSTATED = "not stated: "
 
 @dataclass(frozen=True, slots=True)
 class Contrast:
-    """Candidate minus baseline [unit] with its standard uncertainty and degrees of freedom.
+    """Candidate minus baseline.
 
-    `lot_p` is None below two baseline lots; `lot_se` is the standard error of the lot-level test.
+    Attributes
+    ----------
+    difference, u, dof
+        Difference of the means of lot means, its standard uncertainty [unit] and degrees of
+        freedom.
+    motor_p
+        p-value of the motors; None where it cannot be had.
+    lot_t, lot_dof, lot_p, lot_se
+        The lot-level test and its standard error [unit]; None below two baseline lots.
+
     """
 
     difference: float
@@ -37,11 +46,25 @@ class Contrast:
 
 @dataclass(frozen=True, slots=True)
 class Assessment:
-    """Values with their station's bias taken off, lot by lot, and what follows from them.
+    """Values corrected for their station, lot by lot, and what follows from them.
 
-    `base` and `candidate` map lots to corrected values [unit] in order of time; baseline lots of
-    stations that nothing links to the candidate's are in `unlinked`. `within_sd` is that of
-    motors of one lot, `lots_sd` that of the means of baseline lots.
+    Attributes
+    ----------
+    values, corrected, correction
+        Values as published, corrected [unit], and the biases.
+    base, candidate
+        Corrected values by lot, in the order of time [unit].
+    unlinked
+        Baseline lots of stations that nothing links to those of the candidate.
+    confounded
+        Why nothing can be compared; empty where it can.
+    within_sd, within_dof
+        Standard deviation between motors of one lot [unit].
+    lots_sd
+        Standard deviation between means of baseline lots [unit].
+    contrast
+        Candidate minus baseline.
+
     """
 
     values: tuple[Value, ...]
@@ -75,7 +98,14 @@ class Groups(NamedTuple):
 
 
 def label(value: Value) -> str:
-    """The station of a value; one that is not stated is no station of any other lot."""
+    """The station of a value.
+
+    Parameters
+    ----------
+    value
+        The value; a station that is not stated is another one in every lot.
+
+    """
     return value.station or f"{UNSTATED}{value.lot}"
 
 

@@ -21,7 +21,21 @@ MOST_ORDERS = 12
 
 
 def spectra_of(members: Iterable[Member], side: Side) -> list[tuple[Order, ...]]:
-    """The orders of each motor of a side that was tested for cogging; empty for none found."""
+    """The cogging orders of each motor of a side.
+
+    Parameters
+    ----------
+    members
+        Datasheets.
+    side
+        `baseline` or `candidate`.
+
+    Returns
+    -------
+    list of tuple of Order
+        One a motor that was tested for cogging; an empty tuple where none was found.
+
+    """
     found = []
     for member in members:
         estimate = member.sheet.constants.get(SPECTRUM)

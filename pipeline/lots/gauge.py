@@ -25,7 +25,16 @@ LEVEL = 0.95
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Mean squares [unit²] and degrees of freedom of a crossed study: P motors, O stations, n."""
+    """Analysis of variance of a crossed study.
+
+    Attributes
+    ----------
+    motors, stations, repeats
+        Numbers P, O and n.
+    ms_part, ms_station, ms_interaction, ms_error
+        Mean squares [unit²].
+
+    """
 
     motors: int
     stations: int

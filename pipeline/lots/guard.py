@@ -24,9 +24,15 @@ REACH_SD = 9.0
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """Lower and upper limit [unit], infinite on a side without one, and the guard band w [unit].
+    """Limits of a constant.
 
-    The acceptance limits lie w inside the tolerance; a negative w would lie outside.
+    Attributes
+    ----------
+    lower, upper
+        Tolerance limits [unit]; infinite on a side without one.
+    guard_band
+        w [unit]: the acceptance limits lie w inside the tolerance, outside for a negative w.
+
     """
 
     lower: float

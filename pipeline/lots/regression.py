@@ -41,10 +41,21 @@ WORDS: Mapping[Verdict, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """What is compared: one version a motor on both sides, and what is there for the stations.
+    """What is compared: one version a motor on both sides.
 
-    `repeats` are versions of any motor from captures of their own; `golden` those of the golden
-    motors among them, which stand in no lot.
+    Attributes
+    ----------
+    baseline, candidate
+        The groups.
+    members
+        Their datasheets.
+    repeats
+        Versions of any motor from captures of their own, for the stations.
+    golden
+        Those of golden motors among them, which are in no lot.
+    diagnoses
+        What the model of each motor lacks.
+
     """
 
     baseline: Group
@@ -55,7 +66,14 @@ class Samples:
     diagnoses: Mapping[str, DiagnosisSummary] = field(default_factory=dict)
 
     def with_diagnoses(self, diagnoses: Mapping[str, DiagnosisSummary]) -> Samples:
-        """The same with what each motor's model lacks."""
+        """The samples with what the model of each motor lacks.
+
+        Parameters
+        ----------
+        diagnoses
+            By motor_id.
+
+        """
         return replace(self, diagnoses=diagnoses)
 
 
@@ -113,7 +131,14 @@ def compare_lots(
 
 
 def used(limits: Limits) -> LimitsUsed:
-    """The limits file as the report states it."""
+    """The limits file as the report states it.
+
+    Parameters
+    ----------
+    limits
+        The limits.
+
+    """
     rule = (
         f"Limits by their decision rule with guard bands, U = {limits.k:g} u. A change of a lot's "
         f"mean is tested against the scatter of at least {limits.min_lots} baseline lots, Holm "

@@ -52,10 +52,21 @@ class Member:
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """One motor's value of a constant [unit] at the reference temperature.
+    """The value of one motor at the reference temperature.
 
-    `station` joins the names of all stations that its captures came from; None if none says.
-    `shared` are the signed type B contributions by source [unit]; `inputs` digests of captures.
+    Attributes
+    ----------
+    motor_id, lot, side
+        The motor.
+    station, stations
+        Stations of its captures, joined and one by one; None where none is stated.
+    value, u, u_a
+        Value, combined and type A standard uncertainty [unit].
+    shared
+        Signed type B contributions by source [unit].
+    captures, inputs
+        Paths and digests of the captures that it rests on.
+
     """
 
     motor_id: str
@@ -155,7 +166,14 @@ def _to_reference(name: str, estimate: Estimate, sheet: Datasheet) -> tuple[floa
 
 
 def independent(values: Sequence[Value]) -> list[Value]:
-    """The values that rest on captures of their own: of those that share one, the first."""
+    """The values that rest on captures of their own.
+
+    Parameters
+    ----------
+    values
+        In order; of those that share a capture, the first is kept.
+
+    """
     used: set[tuple[str, str]] = set()
     kept = []
     for one in values:

@@ -52,7 +52,14 @@ class Wanted:
     literal: bool = False
 
     def fits(self, value: str | None) -> bool:
-        """Whether a text is meant."""
+        """Whether a text is meant.
+
+        Parameters
+        ----------
+        value
+            The text; None is never meant.
+
+        """
         if value is None:
             return False
         return value == self.text or (not self.literal and fnmatchcase(value, self.text))
@@ -66,7 +73,14 @@ class Query:
     terms: Mapping[str, tuple[Wanted, ...]]
 
     def takes(self, version: Version) -> bool:
-        """Whether a version's row and decisions are meant; revoked ones only by their status."""
+        """Whether the row and the decisions of a version are meant.
+
+        Parameters
+        ----------
+        version
+            The version; a revoked one is meant only by its status.
+
+        """
         if "status" not in self.terms and version.status == "revoked":
             return False
         return all(
@@ -76,7 +90,16 @@ class Query:
         )
 
     def takes_content(self, code_version: str, when: str) -> bool:
-        """Whether a datasheet is meant by its code and the time of its tests (ISO 8601)."""
+        """Whether a datasheet is meant by its code and the time of its tests.
+
+        Parameters
+        ----------
+        code_version
+            Of the datasheet.
+        when
+            ISO 8601.
+
+        """
         day = _instant(when)
         for name, wanted in self.terms.items():
             if name == "code" and not any(
@@ -160,7 +183,16 @@ def _looked_up(text: str, one: Wanted, versions: Sequence[Version]) -> str:
 
 
 def known(versions: Sequence[Version], most: int = 12) -> str:
-    """The available choices, in one line."""
+    """The values that selectors can name, in one line.
+
+    Parameters
+    ----------
+    versions
+        Versions of the registry.
+    most
+        How many of each kind are listed.
+
+    """
     published = [version.published for version in versions]
     groups = (
         ("lots", {row.lot for row in published}),

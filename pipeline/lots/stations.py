@@ -24,7 +24,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One value [unit] of a block on one station (several joined), with its error's sd [unit]."""
+    """One value on one station.
+
+    Attributes
+    ----------
+    block
+        Readings of one block are of one motor or lot.
+    station
+        The station; several are joined.
+    value, sd
+        Value and standard deviation of its error [unit].
+
+    """
 
     block: str
     station: str
@@ -34,10 +45,17 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """Biases [unit] of linked stations, which sum to zero, and their covariance [unit²].
+    """Biases of linked stations.
 
-    `group` numbers the linked set that each station belongs to; stations of different sets
-    cannot be compared. A station that no reading links is alone in its set, its bias 0.
+    Attributes
+    ----------
+    group
+        Number of the linked set of each station; stations of different sets cannot be compared.
+    bias
+        Of each station [unit]; they sum to zero in a set, 0 for a station alone.
+    covariance
+        Of the biases [unit²].
+
     """
 
     group: Mapping[str, int]
@@ -45,19 +63,64 @@ class Correction:
     covariance: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     def linked(self, one: Iterable[str], other: Iterable[str]) -> bool:
-        """Whether all stations named are of one linked set."""
+        """Whether all of some stations are of one linked set.
+
+        Parameters
+        ----------
+        one
+            Stations.
+        other
+            Further stations.
+
+        """
         return len({self.group[station] for station in {*one, *other}}) <= 1
 
     def of(self, station: str) -> float:
-        """The bias to take off a value of this station [unit]."""
+        """The bias of a station.
+
+        Parameters
+        ----------
+        station
+            The station.
+
+        Returns
+        -------
+        float
+            To subtract from a value [unit].
+
+        """
         return self.bias.get(station, 0.0)
 
     def u_of(self, station: str) -> float:
-        """Standard uncertainty of that bias [unit]."""
+        """Standard uncertainty of the bias of a station.
+
+        Parameters
+        ----------
+        station
+            The station.
+
+        Returns
+        -------
+        float
+            In the unit of the constant.
+
+        """
         return math.sqrt(max(self.covariance.get((station, station), 0.0), 0.0))
 
     def u_of_contrast(self, shares: Mapping[str, float]) -> float:
-        """Standard uncertainty of Σ share · bias [unit], shares by station."""
+        """Standard uncertainty of a weighted sum of biases.
+
+        Parameters
+        ----------
+        shares
+            Weight of each station.
+
+        Returns
+        -------
+        float
+            Of Σ share · bias [unit].
+
+        """
         total = sum(
             one * other * self.covariance.get((a, b), 0.0)
             for a, one in shares.items()

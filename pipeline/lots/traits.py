@@ -40,7 +40,14 @@ class Shown:
 
 
 def order_name(order: int) -> str:
-    """The name of a cogging order as a trait."""
+    """The name of a cogging order as a trait.
+
+    Parameters
+    ----------
+    order
+        Cycles a turn.
+
+    """
     return f"cogging_order_{order}"
 
 
@@ -83,7 +90,19 @@ def orders_shown(members: Iterable[Member], share: float) -> list[Shown]:
 
 
 def checks_failed(members: Iterable[Member]) -> list[Shown]:
-    """The checks that each motor's datasheet fails."""
+    """The checks that the datasheet of each motor fails.
+
+    Parameters
+    ----------
+    members
+        Datasheets.
+
+    Returns
+    -------
+    list of Shown
+        One a motor; members without a side are left out.
+
+    """
     return [
         Shown(
             member.sheet.motor_id,

@@ -37,6 +37,18 @@ CONDUCTION = Blank(
 
 
 def losses_not_known(operation: Operation) -> tuple[Blank, ...]:
-    """Parts of the loss that no capture of a motor parts."""
+    """Parts of the loss that captures of a motor do not separate.
+
+    Parameters
+    ----------
+    operation
+        Conduction loss is known where it states a drop or resistance of the devices.
+
+    Returns
+    -------
+    tuple of Blank
+        Iron, stray and switching loss, and conduction loss where it is not known.
+
+    """
     stated = operation.drop_v is not None or operation.on_ohm is not None
     return (IRON, STRAY, SWITCHING) if stated else (IRON, STRAY, CONDUCTION, SWITCHING)

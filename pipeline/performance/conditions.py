@@ -71,7 +71,24 @@ def operation_of(campaign: Campaign, stated: Stated) -> Operation | None:
 
 
 def check_stated(stated: Stated) -> dict[str, float]:
-    """What is stated of the conditions; raises UsageError for what no motor is operated at."""
+    """The stated conditions as numbers.
+
+    Parameters
+    ----------
+    stated
+        By name; what is None is left out.
+
+    Returns
+    -------
+    dict of float
+        In the unit of each name.
+
+    Raises
+    ------
+    UsageError
+        A number is not finite, not above 0 where it must be, or is that of no motor or inverter.
+
+    """
     given = {name: float(v) for name, v in stated.items() if v is not None}
     ambient = given.get("temp_ambient_degc", AMBIENT_DEGC)
     if not given.get("temp_limit_degc", math.inf) > ambient:

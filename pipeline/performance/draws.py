@@ -64,9 +64,28 @@ def joint_draws(estimates: Mapping[str, Estimate], half: int = HALF) -> dict[str
 
 
 def uniform_draws(name: str, low: float, high: float, half: int = HALF) -> Array:
-    """Draws [1 + 2 half] of what is known to lie between two values alone, their middle first.
+    """Draws of what is known to lie between two values alone.
 
-    `name` makes the stream of it: equal names give equal draws (JCGM 101, 6.4.2).
+    Parameters
+    ----------
+    name
+        Makes the stream: equal names give equal draws.
+    low
+        Smallest value.
+    high
+        Largest value.
+    half
+        Pairs of draws.
+
+    Returns
+    -------
+    array [1 + 2 half]
+        The middle first, then draws and their mirror images.
+
+    References
+    ----------
+    JCGM 101:2008, 6.4.2 (rectangular distribution).
+
     """
     rng = np.random.default_rng([SEED, *name.encode()])
     shares = rng.uniform(-0.5, 0.5, half)
@@ -78,6 +97,25 @@ def interval(values: Array) -> tuple[float, float, float]:
     """The first value and the 95 % interval of the draws after it, equal chances either side.
 
     Reference: JCGM 101:2008, 7.7.2 b.
+
+    Parameters
+    ----------
+    values
+        The published value, then draws [1 + n].
+
+    Attributes
+    ----------
+    value and its 95 % interval, from draws.
+
+    Returns
+    -------
+    tuple of float
+        Value, low and high; equal probability on either side.
+
+    References
+    ----------
+    JCGM 101:2008, 7.7.2 b (probabilistically symmetric coverage interval).
+
     """
     low, high = np.percentile(values[1:], [2.5, 97.5])
     return float(values[0]), float(low), float(high)

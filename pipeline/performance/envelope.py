@@ -22,9 +22,15 @@ CLOSE = 2e-3
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Currents [n, A] of the most torque at one speed and that air-gap torque [n, N·m].
+    """Currents of the most torque at one speed.
 
-    Where no current is allowed, all are NaN.
+    Attributes
+    ----------
+    id_a, iq_a
+        Phase peak [n]; NaN where no current is allowed.
+    torque_nm
+        Air-gap torque [n].
+
     """
 
     id_a: Array
@@ -90,7 +96,32 @@ def _best(
 def allowed_current_a(
     machine: Machine, beta: Array, limit_a: Array, limit_v: float, omega_rad_s: float
 ) -> Array:
-    """The largest current [n, b, A] at angles [n, b, rad] that both limits allow; NaN for none."""
+    """The largest current that both limits allow, at given angles.
+
+    Parameters
+    ----------
+    machine
+        Constants of n draws.
+    beta
+        Angle of the current ahead of the q axis [n, b, rad].
+    limit_a
+        Current limit, phase peak [n].
+    limit_v
+        Phase voltage, peak.
+    omega_rad_s
+        Mechanical speed.
+
+    Returns
+    -------
+    array [n, b]
+        In A; NaN where no current is allowed.
+
+    Notes
+    -----
+    With i_d = −I sin β and i_q = I cos β, v_d = I a_d and v_q = I a_q + ω ψ, so that |v|² = V² is a
+    quadratic equation in I. Inductances that depend on the current are iterated.
+
+    """
     omega = machine.pole_pairs * omega_rad_s
     r, psi = machine.r_ohm[:, None], machine.psi_wb[:, None]
     sine, cosine = np.sin(beta), np.cos(beta)
@@ -113,7 +144,28 @@ def allowed_current_a(
 
 
 def regime_of(machine: Machine, point: Point, limit_a: float, limit_v: float, omega: float) -> str:
-    """What limits the torque of the first draw: the current, both limits, or the voltage."""
+    """What limits the torque of the first draw.
+
+    Parameters
+    ----------
+    machine
+        Constants of the draws.
+    point
+        Currents of the most torque.
+    limit_a
+        Current limit.
+    limit_v
+        Voltage limit.
+    omega
+        Mechanical speed [rad/s].
+
+    Returns
+    -------
+    str
+        `MTPA` where only the current limits, `field weakening` where both do, `MTPV` where only the
+        voltage does, `none` where there is no torque.
+
+    """
     if not np.isfinite(point.torque_nm[0]):
         return "none"
     one = machine.one(0)
@@ -125,7 +177,23 @@ def regime_of(machine: Machine, point: Point, limit_a: float, limit_v: float, om
 
 
 def shaft_torque_nm(machine: Machine, point: Point, omega_rad_s: float) -> Array:
-    """What the shaft delivers [n, N·m]: air-gap torque less drag; 0 where nothing is left."""
+    """What the shaft delivers.
+
+    Parameters
+    ----------
+    machine
+        Constants of n draws.
+    point
+        Currents of the most torque.
+    omega_rad_s
+        Mechanical speed.
+
+    Returns
+    -------
+    array [n]
+        Air-gap torque less drag [N·m]; 0 where nothing is left.
+
+    """
     left = point.torque_nm - drag_nm(machine, np.array(omega_rad_s))
     return np.maximum(np.nan_to_num(left, nan=0.0), 0.0)
 

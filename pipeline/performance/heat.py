@@ -16,8 +16,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Heat:
-    """The way of heat from winding to ambient [n each]: steady resistance [K/W], heat capacity of
-    the winding [J/K], and time constants [s] of winding and body as a heat run gives them.
+    """The path of heat from winding to ambient.
+
+    Attributes
+    ----------
+    rth_k_w
+        Steady resistance, winding to ambient [n].
+    cth_j_k
+        Heat capacity of the winding [n].
+    tau_winding_s, tau_body_s
+        Time constants of winding and body, as a heat run gives them [n].
+
     """
 
     rth_k_w: Array
@@ -29,10 +38,28 @@ class Heat:
 def continuous_current_a(
     rth_k_w: Array, r_limit_ohm: Array, rise_k: float, other_w: Array
 ) -> Array:
-    """Phase current, peak [n, A], at which the winding settles at its limit.
+    """Current at which the winding settles at its temperature limit.
 
-    I = √((ΔT/R_th - P_other) / (1.5 R)), R at the limit; 0 where the other losses alone are enough.
-    `other_w` [n, W] are those that reach the ambient by the same way.
+    Parameters
+    ----------
+    rth_k_w
+        Resistance, winding to ambient [n].
+    r_limit_ohm
+        Phase resistance at the limit [n].
+    rise_k
+        Limit less ambient temperature.
+    other_w
+        Other losses that reach the ambient the same way [n].
+
+    Returns
+    -------
+    array [n]
+        Phase peak [A]; 0 where the other losses alone reach the limit.
+
+    Notes
+    -----
+    I = √((ΔT/R_th − P_other) / (1.5 R)).
+
     """
     left = np.maximum(rise_k / rth_k_w - other_w, 0.0)
     found: Array = np.sqrt(left / (1.5 * r_limit_ohm))

@@ -16,11 +16,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """Constants [n each] at one winding and one magnet temperature.
+    """Constants at one winding and one magnet temperature [n draws each].
 
-    `ld_slope_h_a` and `lq_slope_h_a2` are how the apparent inductances go with their own current;
-    `within_d_a` and `within_q_a` are the currents up to which that was measured, and beyond which
-    they stay.
+    Attributes
+    ----------
+    pole_pairs
+        Number p.
+    r_ohm, psi_wb, ld_h, lq_h
+        Phase resistance, magnet flux (phase peak), and apparent inductances near zero current.
+    ld_slope_h_a, lq_slope_h_a2
+        How the inductances change with their own current and its square.
+    within_d_a, within_q_a
+        Currents up to which that was measured, and beyond which they stay constant.
+    coulomb_nm, viscous_nm_s_rad
+        Drag of rotation.
+
     """
 
     pole_pairs: float
@@ -41,7 +51,14 @@ class Machine:
         return bool(np.any(self.ld_slope_h_a) or np.any(self.lq_slope_h_a2))
 
     def one(self, draw: int) -> Machine:
-        """A machine of a single draw."""
+        """The machine of a single draw.
+
+        Parameters
+        ----------
+        draw
+            Its number; 0 is that of the published values.
+
+        """
         at = slice(draw, draw + 1)
         return Machine(
             self.pole_pairs,
@@ -87,9 +104,26 @@ def inductances_h(machine: Machine, id_a: Array, iq_a: Array) -> tuple[Array, Ar
 
 
 def torque_nm(machine: Machine, id_a: Array, iq_a: Array) -> Array:
-    """Air-gap torque [n, ..., N·m] of currents [n, ..., A].
+    """Air-gap torque.
 
-    T = 1.5 p (ψ_pm i_q + (L_d - L_q) i_d i_q)
+    Parameters
+    ----------
+    machine
+        Constants of n draws.
+    id_a
+        [n, ...], phase peak.
+    iq_a
+        [n, ...], phase peak.
+
+    Returns
+    -------
+    array [n, ...]
+        In N·m.
+
+    Notes
+    -----
+    T = 1.5 p (ψ_pm i_q + (L_d − L_q) i_d i_q).
+
     """
     ld, lq = inductances_h(machine, id_a, iq_a)
     flux = _wide(machine.psi_wb, id_a) + (ld - lq) * id_a
@@ -98,9 +132,28 @@ def torque_nm(machine: Machine, id_a: Array, iq_a: Array) -> Array:
 
 
 def voltage_v(machine: Machine, id_a: Array, iq_a: Array, omega_rad_s: Array) -> Array:
-    """Phase voltage, peak [n, ..., V], at a steady mechanical speed [..., rad/s].
+    """Phase voltage at a steady speed.
 
-    v_d = R i_d - ω_e L_q i_q and v_q = R i_q + ω_e (L_d i_d + ψ_pm)
+    Parameters
+    ----------
+    machine
+        Constants of n draws.
+    id_a
+        [n, ...], phase peak.
+    iq_a
+        [n, ...], phase peak.
+    omega_rad_s
+        Mechanical speed [...].
+
+    Returns
+    -------
+    array [n, ...]
+        Phase peak [V].
+
+    Notes
+    -----
+    v_d = R i_d − ω_e L_q i_q, v_q = R i_q + ω_e (L_d i_d + ψ_pm).
+
     """
     ld, lq = inductances_h(machine, id_a, iq_a)
     omega = machine.pole_pairs * omega_rad_s
@@ -112,11 +165,30 @@ def voltage_v(machine: Machine, id_a: Array, iq_a: Array, omega_rad_s: Array) ->
 
 
 def drag_nm(machine: Machine, omega_rad_s: Array) -> Array:
-    """Torque that rotation takes [n, ..., N·m] at speeds [..., rad/s] of one sense, 0 or more.
+    """Torque that rotation takes.
 
-    T_c + B ω: friction, windage and the iron loss of the magnet's flux together, as a retardation
-    with open terminals gives them (IEEE Std 1812-2014, no-load and retardation tests; IEC
-    60034-2-1, friction and windage plus iron loss).
+    Parameters
+    ----------
+    machine
+        Constants of n draws.
+    omega_rad_s
+        Speeds of one sense, 0 or more [...].
+
+    Returns
+    -------
+    array [n, ...]
+        T_c + B ω [N·m].
+
+    Notes
+    -----
+    Friction, windage and the iron loss of the magnet's flux together, as a retardation with open
+    terminals gives them.
+
+    References
+    ----------
+    IEEE Std 1812-2014 (no-load and retardation tests). IEC 60034-2-1 (friction and windage plus
+    iron loss).
+
     """
     speeds = np.asarray(omega_rad_s)
     coulomb = machine.coulomb_nm.reshape(-1, *([1] * speeds.ndim))
@@ -126,16 +198,53 @@ def drag_nm(machine: Machine, omega_rad_s: Array) -> Array:
 
 
 def copper_w(machine: Machine, id_a: Array, iq_a: Array) -> Array:
-    """Copper loss [n, ..., W], P = 1.5 R (i_d² + i_q²) (IEC 60034-2-1, winding losses)."""
+    """Copper loss of three phases.
+
+    Parameters
+    ----------
+    machine
+        Constants of n draws.
+    id_a
+        [n, ...], phase peak.
+    iq_a
+        [n, ...], phase peak.
+
+    Returns
+    -------
+    array [n, ...]
+        P = 1.5 R (i_d² + i_q²) [W].
+
+    References
+    ----------
+    IEC 60034-2-1 (winding losses).
+
+    """
     found: Array = 1.5 * _wide(machine.r_ohm, id_a) * (id_a**2 + iq_a**2)
     return found
 
 
 def inverter_w(drop_v: float, on_ohm: float, current_a: Array) -> Array:
-    """Conduction loss of a three-phase bridge [..., W] at phase currents [..., A peak].
+    """Conduction loss of a three-phase bridge.
 
-    P = 3 (V 2 I/π + r I²/2): each phase current flows through one device at any time, which drops
-    V + r i. Switching loss is not in it.
+    Parameters
+    ----------
+    drop_v
+        Threshold voltage of a device.
+    on_ohm
+        Its on-state resistance.
+    current_a
+        Phase current, peak [...].
+
+    Returns
+    -------
+    array [...]
+        In W, without switching loss.
+
+    Notes
+    -----
+    P = 3 (V 2 I/π + r I²/2): each phase current flows through one device at any time, which drops V
+    + r i.
+
     """
     found: Array = 3.0 * (drop_v * 2.0 * current_a / np.pi + on_ohm * current_a**2 / 2.0)
     return found

@@ -34,14 +34,32 @@ ASSUMED = {
 
 @dataclass(frozen=True, slots=True)
 class Sources:
-    """Draws by name, conditions that constants were measured at, and what was assumed."""
+    """The constants that a motor's numbers are derived from.
+
+    Attributes
+    ----------
+    draws
+        Draws by name.
+    known
+        Estimates, with the conditions that they were measured at.
+    assumed
+        Sentences on what was assumed.
+
+    """
 
     draws: Mapping[str, Array]
     known: Mapping[str, Estimate]
     assumed: tuple[str, ...]
 
     def has(self, *names: str) -> bool:
-        """Whether all of these constants are known."""
+        """Whether all of some constants are known.
+
+        Parameters
+        ----------
+        *names
+            Names of constants.
+
+        """
         return all(name in self.draws for name in names)
 
     @property
@@ -51,9 +69,18 @@ class Sources:
 
 
 def sources_of(constants: Mapping[str, Estimate]) -> Sources:
-    """The draws of all constants that the numbers hang on.
+    """The draws of all constants that the numbers depend on.
 
-    A temperature coefficient that was not measured is assumed, with a budget of its own.
+    Parameters
+    ----------
+    constants
+        Estimates by name.
+
+    Returns
+    -------
+    Sources
+        A temperature coefficient that was not measured is assumed, with a budget of its own.
+
     """
     wanted = (*ELECTRICAL, *MECHANICAL, *SATURATION, *HEAT, COPPER, MAGNET)
     known = {n: constants[n] for n in wanted if n in constants and constants[n].known}
@@ -67,9 +94,26 @@ def sources_of(constants: Mapping[str, Estimate]) -> Sources:
 
 
 def machine_at(sources: Sources, temp_winding_degc: Array, temp_magnet_degc: Array) -> Machine:
-    """The machine at temperatures [degC], one for all draws or one a draw.
+    """The machine at given temperatures.
 
-    R = R25 (1 + α (T_w - 25)) and ψ = ψ25 (1 + α_m (T_m - 25)). Drag that was not measured is 0.
+    Parameters
+    ----------
+    sources
+        Draws of the constants.
+    temp_winding_degc
+        One for all draws, or one a draw.
+    temp_magnet_degc
+        One for all draws, or one a draw.
+
+    Returns
+    -------
+    Machine
+        Drag that was not measured is 0.
+
+    Notes
+    -----
+    R = R25 (1 + α (T_w − 25)) and ψ = ψ25 (1 + α_m (T_m − 25)).
+
     """
     d = sources.draws
     zero = np.zeros(sources.size)
@@ -107,7 +151,19 @@ def _slope(sources: Sources, axis: str, power: int) -> tuple[Array, float]:
 
 
 def heat_of(sources: Sources) -> Heat | None:
-    """The way of heat from the winding; one node where no second one was found, None for none."""
+    """The path of heat from the winding.
+
+    Parameters
+    ----------
+    sources
+        Draws of the constants.
+
+    Returns
+    -------
+    Heat or None
+        One node where no second one was found; None without a heat run.
+
+    """
     d = sources.draws
     if not sources.has(*HEAT[:3]):
         return None
@@ -128,7 +184,25 @@ TESTS = {
 
 
 def missing(sources: Sources, names: tuple[str, ...], of: str, words: str) -> Blank | None:
-    """The blank of a number that needs constants, where one of them is missing."""
+    """The blank of a number that needs constants which are missing.
+
+    Parameters
+    ----------
+    sources
+        Draws of the constants.
+    names
+        Constants that it needs.
+    of
+        Name of the number.
+    words
+        Its meaning.
+
+    Returns
+    -------
+    Blank or None
+        None where all are known.
+
+    """
     lacking = [name for name in names if name not in sources.draws]
     if not lacking:
         return None

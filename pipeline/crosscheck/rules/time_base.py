@@ -34,7 +34,14 @@ class Pace(NamedTuple):
     u: float
 
     def beyond(self, allowance: float) -> float:
-        """Deviation from 1 over the largest one that passes."""
+        """Deviation from 1 over the largest one that passes.
+
+        Parameters
+        ----------
+        allowance
+            Share that the scale of a speed may be off by [1].
+
+        """
         return abs(self.ratio - 1.0) / (allowance + 2.0 * self.u)
 
 

@@ -71,7 +71,14 @@ def _shaft(source: Source) -> _Shaft:
 
 
 def omits(source: Source) -> tuple[str, ...]:
-    """Effects that MuJoCo's motor cannot hold, and what of the others it misses."""
+    """Effects that MuJoCo's motor cannot hold, and what it misses of the others.
+
+    Parameters
+    ----------
+    source
+        The datasheet.
+
+    """
     shaft = _shaft(source)
     ld, lq = source.optional("ld_h"), source.optional("lq_h")
     salient: tuple[str, ...] = ()
