@@ -78,7 +78,7 @@ def read_label(name: str, unit_row: str | None = None) -> Label:
 
 
 def _by_its_end(head: str, tail: str) -> tuple[tuple[str, ...], str | None]:
-    """Columns of a name whose end is a unit, and the unit: `battery_V`, `iq_actual_mA`, `tick_us`.
+    """Columns of a name whose end is a unit, and the unit: `battery_V`, `iq_actual_mA`, "tick_us".
 
     A single letter is a unit only where the rest says of what.
     """
