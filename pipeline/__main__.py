@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TextIO
 
+from pipeline.cli.colour import coloured, wanted
 from pipeline.cli.commands import COMMANDS, Command, overview, program, usage
 from pipeline.cli.flags import Flags, parted
 from pipeline.records.errors import PipelineError, UsageError, meant
@@ -146,7 +147,8 @@ def _continued(then: Callable[[], Outcome]) -> Outcome:
 def _print(text: str, stream: TextIO) -> None:
     """Prints a text; a reader that has seen enough (`| head`) is no failure."""
     try:
-        print(text.rstrip("\n"), file=stream, flush=True)
+        shown = coloured(text) if wanted(stream) else text
+        print(shown.rstrip("\n"), file=stream, flush=True)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 

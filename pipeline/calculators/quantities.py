@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
+import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -15,6 +16,8 @@ from pipeline.records.errors import UsageError
 
 AGREEMENT = 5e-3
 TYPED = 0.01
+WIDTH = 80
+"""Columns of a terminal."""
 """How far typed numbers of a few digits may lie off a convention's own, relative."""
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 _SPELLINGS = str.maketrans({"·": "", ".": "", "*": "", " ": "", "Ω": "ohm", "µ": "u", "μ": "u"})
@@ -315,10 +318,13 @@ def render(kind: str, calculator: Calculator, given: Given, answer: Answer) -> s
         for line in answer.lines
     ]
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
-    body = [
-        f"  {name:<{widths[0]}} = {value:<{widths[1]}}  {formula:<{widths[2]}}  {words}".rstrip()
+    lines = [
+        (f"  {name:<{widths[0]}} = {value:<{widths[1]}}  {formula:<{widths[2]}}", words)
         for name, value, formula, words in rows
     ]
+    wide = any(len(line) + 2 + len(words) > WIDTH for line, words in lines)
+    gap = "\n      " if wide else "  "
+    body = [f"{line.rstrip() if wide else line}{gap}{words}".rstrip() for line, words in lines]
     head = f"{kind}: {calculator.words}"
     return "\n".join(
         [head, f"given: {'; '.join(shown)}", *body, f"convention: {answer.convention}"]
@@ -362,11 +368,18 @@ def usage(kinds: Mapping[str, Calculator], kind: str | None = None) -> str:
     calculator = kinds[kind]
     rows = list(calculator.shown_names().items())
     width = max(len(name) for name, _ in rows)
-    lines = [f"calc {kind}: {calculator.words}", "", "give"]
-    lines += [f"  {way}" for way in calculator.ways]
+    lines = [*_wrapped(f"calc {kind}: {calculator.words}", 2), "", "give"]
+    for way in calculator.ways:
+        lines += _wrapped(f"  {way}", 4)
     lines += ["", "keys"]
-    lines += [f"  {name:<{width}}  {_key_words(name, key)}" for name, key in rows]
+    for name, key in rows:
+        lines += _wrapped(f"  {name:<{width}}  {_key_words(name, key)}", width + 4)
     return "\n".join(lines)
+
+
+def _wrapped(text: str, indent: int) -> list[str]:
+    """Lines that a terminal shows whole, those after the first set in by `indent` columns."""
+    return textwrap.wrap(text, WIDTH, subsequent_indent=" " * indent, break_long_words=False)
 
 
 def _key_words(shown: str, key: Key) -> str:

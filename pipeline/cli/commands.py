@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import textwrap
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
@@ -56,7 +57,7 @@ COMMANDS = _index(
         common=("input", "output", "source", "model", "limits", "release"),
         examples=(
             "run input=data/demo output=reports/demo",
-            "run input=captures output=reports/mine model.effects=[cogging] release=auto",
+            "run input=captures output=reports/mine 'model.effects=[cogging]' release=auto",
             "run input=captures constants.kt_peak_nm_a=0.118 constants.u_kt_peak_nm_a=0.001",
         ),
         shows_progress=True,
@@ -69,7 +70,7 @@ COMMANDS = _index(
         common=("input", "output", "motor", "model"),
         examples=(
             "compare input=data/demo motor=G52-0601",
-            "compare input=data/demo motor=G52-0601 model.effects=[cogging]",
+            "compare input=data/demo motor=G52-0601 'model.effects=[cogging]'",
             "compare input=data/demo motor=G52-0601 model=ideal,standard --multirun",
         ),
         shows_progress=True,
@@ -161,7 +162,7 @@ COMMANDS = _index(
         "captures of a simulated motor, and truth",
         common=("output", "motor", "effects", "seed"),
         examples=(
-            "simulate output=captures motor=gimbal-5208 effects=[stribeck] seed=3",
+            "simulate output=captures motor=gimbal-5208 'effects=[stribeck]' seed=3",
             "simulate output=captures fleet=demo",
         ),
     ),
@@ -202,7 +203,7 @@ def usage(command: Command) -> str:
     places = "".join(f" {name.upper()}" for name in command.positional)
     lines = [f"usage: {program()} {command.name}{places} key=value ...", ""]
     lines += [command.words, "", "examples"]
-    lines += [f"  {program()} {example}" for example in command.examples]
+    lines += [line for example in command.examples for line in _example(example)]
     keys = _keys(command.settings, "")
     first = [key for name in command.common for key in keys if key.of == name]
     rest = [key for key in keys if key not in first]
@@ -243,6 +244,18 @@ def _wrapped(text: str, first: str) -> list[str]:
     return textwrap.wrap(
         text, 80, initial_indent=first, subsequent_indent=" " * len(first), break_long_words=False
     )
+
+
+def _example(words: str) -> list[str]:
+    """A command in lines that fit a terminal and can be copied as they are."""
+    lines = [f"  {program()}"]
+    for word in re.findall(r"(?:'[^']*'|\S)+", words):
+        if len(lines[-1]) + len(word) + 3 > 80:
+            lines[-1] += " \\"
+            lines.append(f"{INDENT}{word}")
+        else:
+            lines[-1] += f" {word}"
+    return lines
 
 
 def _default(key: Field[Any]) -> str:

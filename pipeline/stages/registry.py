@@ -67,8 +67,9 @@ def _show(registry: Registry, settings: RegistrySettings) -> Outcome:
     next_ = f"registry approve {motor} revision={version.revision} by=NAME why=REASON"
     if version.status == "released":
         next_ = f"export json {motor} revision={version.revision}"
-    elif version.status != "provisional":
-        return Outcome(text=text, result=sheet.document())
+    elif version.open_points:
+        plan = f"plan motor={motor} output={shlex.quote(settings.output)}"
+        return Outcome(text=text, result=sheet.document(), next=plan)
     return Outcome(text=text, result=sheet.document(), next=next_ + _where(settings))
 
 

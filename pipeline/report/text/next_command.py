@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 
 from pipeline.records.current_status import CurrentStatus
-from pipeline.records.datasheet import Datasheet
+from pipeline.records.datasheet import Datasheet, left_to_a_person
 from pipeline.views.fleet import lacking_alike
 
 
@@ -48,8 +48,11 @@ def next_command(
         if useful and (model := useful[0].model) is not None:
             found = model.adding(folder) or model.command(useful[0].motor_id, folder)
             return found + where
+    incomplete = {s.motor_id for s in datasheets if not all(map(left_to_a_person, s.why))}
     for status, command in (("provisional", "registry show {}"), ("released", "export json {}")):
         for motor_id, state in states.items():
-            if state == status:
+            if state == status and motor_id not in incomplete:
                 return command.format(shlex.quote(motor_id)) + where
-    return f"plan{where}" if datasheets else ""
+    for motor_id in states:
+        return f"plan motor={shlex.quote(motor_id)}{where}"
+    return ""
