@@ -8,7 +8,7 @@ from dataclasses import replace
 import polars as pl
 import pytest
 
-from pipeline.records.datasheet import Datasheet
+from pipeline.records.datasheet import AWAITS_APPROVAL, Datasheet
 from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.estimate import not_identifiable
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
@@ -170,7 +170,7 @@ def test_motors_that_lack_the_same_effect_have_one_reason() -> None:
 def test_the_next_command_is_what_most_motors_need() -> None:
     """Effects before a diagnosis before a decision; one that a check has refused comes last."""
     sound = ModelVerdict("adequate", held_out=0.5, residual=1.0)
-    fine = replace(make_datasheet("fine"), model=sound, why=(AWAITS,))
+    fine = replace(make_datasheet("fine"), model=sound, why=(AWAITS_APPROVAL,))
     unclear = replace(make_datasheet("un clear"), model=misses(76.0, "un clear"))
     refused = replace(unclear, motor_id="refused", status="refused")
     diagnosis = "diagnose input=in motor='un clear' output=out"
@@ -178,6 +178,6 @@ def test_the_next_command_is_what_most_motors_need() -> None:
     assert next_command([fine, refused], "in", "out") == "registry show fine output=out"
     released = replace(fine, status="released")
     assert next_command([released, refused], "in", "out") == "export json fine output=out"
-    lacking = replace(fine, why=(AWAITS, "missing: ld_h (record current steps)"))
+    lacking = replace(fine, why=(AWAITS_APPROVAL, "missing: ld_h (record current steps)"))
     assert next_command([lacking, refused], "in", "out") == "plan motor=fine output=out"
     assert next_command([], "in", "out") == ""
