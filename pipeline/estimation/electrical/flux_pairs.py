@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -64,15 +63,28 @@ def frame_of(points: Sequence[Point], pole_pairs: int) -> tuple[float, float]:
 
 
 def _matched(points: Sequence[Point]) -> tuple[list[tuple[Point, Point]], float]:
-    """Pairs of opposite q current at one speed and one d current, and the largest current [A]."""
+    """Pairs of opposite q current at one speed and one d current, and the largest current [A].
+
+    Each point is in one pair at most, so that the noise of a pair is its own; of several the one
+    of the same capture goes first, then the nearest. A point without q current is its own pair.
+    """
     largest = max(max(abs(p.iq_a), abs(p.id_a)) for p in points)
-    matched = [
-        (one, other)
-        for one, other in combinations_with_replacement(points, 2)
-        if one.group == other.group
-        and abs(one.id_a - other.id_a) < policy().flux_pairs.same_current * largest
-        and abs(one.iq_a + other.iq_a) < policy().flux_pairs.same_current * largest
-    ]
+    same = policy().flux_pairs.same_current * largest
+    matched, left = [], list(points)
+    while left:
+        one = left.pop(0)
+        if abs(2.0 * one.iq_a) < same:
+            matched.append((one, one))
+            continue
+        fitting = [
+            (other.capture is not one.capture, abs(one.iq_a + other.iq_a), k)
+            for k, other in enumerate(left)
+            if one.group == other.group
+            and abs(one.id_a - other.id_a) < same
+            and abs(one.iq_a + other.iq_a) < same
+        ]
+        if fitting:
+            matched.append((one, left.pop(min(fitting)[2])))
     return matched, largest
 
 

@@ -227,7 +227,14 @@ def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
         variances.append((f.u_d_wb**2 + zero.u_d_wb**2) / step**2)
     weights = 1.0 / np.maximum(variances, 1e-300)
     weights /= weights.sum()
-    u = float(np.sqrt(np.sum(weights**2 * variances)))
+    # A flux that is in several differences is one noise in all of them.
+    levers: dict[int, float] = {}
+    for (f, zero), weight in zip(used, weights, strict=True):
+        share = float(weight) / (f.id_a - zero.id_a)
+        levers[id(f)] = levers.get(id(f), 0.0) + share
+        levers[id(zero)] = levers.get(id(zero), 0.0) - share
+    noise = {id(f): f.u_d_wb for pair in used for f in pair}
+    u = float(np.sqrt(sum((share * noise[k]) ** 2 for k, share in levers.items())))
     return Result(float(weights @ values), u, used[0][0].id_a, smallest)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.method import Method
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.heat_record import (
     REFERENCE,
@@ -173,6 +174,12 @@ def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | N
             found = _two_nodes(record, losses_w, ambient, start, direct)
         if found is not None:
             return found
+    noise = max(white_noise_sigma(winding), 1e-4 * float(np.ptp(winding)))
+    if float(np.std(single.residuals)) > policy().heat_record.unexplained * noise:
+        cold = abs(float(winding[0]) - ambient) < 3.0 * record.capture.meta.instrument_u(
+            "u_temp_degc"
+        )
+        return _hidden_body(t, losses_w, winding, ambient, cold)
     tau = autocorrelation_time(single.residuals)
     inverse_c, rate = float(single.coefficients[1]), float(single.coefficients[2])
     if not single.full_rank or inverse_c <= 0.0 or rate <= 0.0:
@@ -192,6 +199,45 @@ def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | N
     covariance[0, 0] = u**2
     scatter = _common_scatter(covariance)
     return Balance(rth, u, max(single.dof / tau, 1.0), fitted, covered, words, values, scatter)
+
+
+def _hidden_body(
+    t_s: Array, losses_w: Array, winding: Array, ambient: float, cold: bool
+) -> Balance | None:
+    """The two nodes of `network` by the winding alone, where one time constant does not do.
+
+    With the body left out of both equations, and integrated twice so that no temperature is
+    differentiated,
+
+    T = T0 + c t + k ∫P + k g ∬P - (f + g) ∫(T - T_a) - h ∬(T - T_a),
+
+    with k = 1/C, f = a + b, g = c + d and h = f g - b c, so that R = k g / h. A `cold` motor begins
+    at ambient, and has no c; with it a constant loss does not part c from k. None where these are
+    not those of two bodies that cool.
+    """
+    power, outward = trapezoid(t_s, losses_w), -trapezoid(t_s, winding - ambient)
+    columns = [power, trapezoid(t_s, power), outward, trapezoid(t_s, outward), np.ones(t_s.size)]
+    fit = linear_fit(np.column_stack(columns if cold else [*columns, t_s]), winding)
+    k, kg, both, h = (float(c) for c in fit.coefficients[:4])
+    if not fit.full_rank or min(k, kg, h) <= 0.0 or both <= kg / k:
+        return None
+    f = both - kg / k
+    slopes = np.array([
+        [0.0, 1.0 / h, 0.0, -kg / h**2],
+        [-1.0 / k**2, 0.0, 0.0, 0.0],
+        [-kg / (k * f) ** 2, 1.0 / (k * f**2), -1.0 / f**2, 0.0],
+        [1.0 / kg, -k / kg**2, 0.0, 0.0],
+    ])  # fmt: skip
+    tau = autocorrelation_time(fit.residuals)
+    covariance = slopes @ fit.covariance[:4, :4] @ slopes.T * tau
+    slowest = 0.5 * both - math.sqrt(max(0.25 * both**2 - h, 0.0))
+    covered, rth = float(t_s[-1] - t_s[0]) * slowest, kg / h
+    covariance[0, 0] += (rth * math.exp(-covered)) ** 2
+    values = np.array([rth, 1.0 / k, 1.0 / f, k / kg])
+    words = f"winding {1.0 / f:.3g} s and a body of {k / kg:.3g} s that was not measured"
+    fitted, dof = winding - fit.residuals, max(fit.dof / tau, 1.0)
+    scatter = _common_scatter(covariance)
+    return Balance(rth, math.sqrt(covariance[0, 0]), dof, fitted, covered, words, values, scatter)
 
 
 def _start(double: LinearFit, body: LinearFit) -> tuple[Array | None, bool]:
@@ -340,7 +386,8 @@ def _estimates(
 
     What is wrong with the loss is wrong with the heat capacity the other way round, and leaves the
     time constants alone. A thermometer's offset leaves the loss alone, for R25 is low by what R(T)
-    of it is high, and the rise as well where it measured the ambient too.
+    of it is high, and the rise as well where it measured the ambient too; else it is one of the
+    ambient the other way round.
     """
     meta = record.capture.meta
     thermometer = temperature_source(meta)
@@ -352,10 +399,10 @@ def _estimates(
     else:
         others = tuple(part for part in resistance.budget if part.source != thermometer)
         loss = propagate([(-2.0, current), (-1.0 / resistance.number, others)])
-    relative = list(loss)
-    rise = float(record.temp_winding_degc.max()) - float(ambient[0])
-    if record.temp_ambient_degc is None and rise > 0.0:
-        relative.append(Contribution(thermometer, meta.instrument_u("u_temp_degc") / rise, "B"))
+    offsets = np.zeros(len(GIVES))
+    if record.temp_ambient_degc is None:
+        u_degc = meta.instrument_u("u_temp_degc")
+        offsets = _by_offset(balance, record, _losses_w(record, known), float(ambient[0]), u_degc)
     at = {
         "current_a": round(float(record.current_a.mean()), 4),
         "temp_ambient_degc": round(float(ambient[0]), 2),
@@ -364,14 +411,32 @@ def _estimates(
     note = f"steady state by {balance.words}; the motor as mounted on this bench"
     found = []
     signs = {GIVEN: 1.0, CAPACITY: -1.0}
-    for name, value, row in zip(GIVES, balance.values, balance.scatter, strict=False):
+    for name, value, row, offset in zip(
+        GIVES, balance.values, balance.scatter, offsets, strict=False
+    ):
         parts = [METHOD.scatter(of, u, balance.dof) for of, u in zip(GIVES, row, strict=False) if u]
-        parts += propagate([(signs.get(name, 0.0) * float(value), tuple(relative))])
+        parts += propagate([(signs.get(name, 0.0) * float(value), loss)])
+        parts.append(Contribution(thermometer, float(offset), "B"))
         parts = [part for part in parts if part.u]
         found.append(METHOD.measured(name, float(value), parts, (record.capture,), at, note))
     if len(found) < len(GIVES):
         found.append(METHOD.missing(BODY_TAU, f"one node explains the run; {EXPERIMENT}"))
     return tuple(found)
+
+
+def _by_offset(
+    balance: Balance, record: HeatRecord, losses_w: Array, ambient: float, u_degc: float
+) -> Array:
+    """What a thermometer that reads high by `u_degc` makes of each constant [their units]."""
+    moved = [_balance(record, losses_w, ambient + side * u_degc) for side in (-1.0, 1.0)]
+    low, high = (None if one is None else one.values for one in moved)
+    if low is not None and high is not None and low.size == high.size == balance.values.size:
+        shift: Array = 0.5 * (low - high)
+        return shift
+    rise = float(record.temp_winding_degc.max()) - ambient
+    signs = np.array([1.0, -1.0, 0.0, 0.0])[: balance.values.size]
+    usual: Array = balance.values * signs * u_degc / rise
+    return usual
 
 
 def _evidence(balance: Balance, record: HeatRecord) -> Evidence:

@@ -96,6 +96,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     torque ripple of that angle (`locked_rotor`).
     """
     captures = [c for c in campaign.of(METHOD.name) if c.has("iq_a", "torque_shaft_nm")]
+    if not captures:
+        return METHOD.nothing(GIVES, f"no table of current and torque; {EXPERIMENT}")
     rows = _Rows.of(captures)
     if rows.iq_a.size < LEAST_ROWS + len(captures) or rows.levels < LEAST_LEVELS:
         note = f"{rows.iq_a.size} rows of {rows.levels} currents; {EXPERIMENT}"

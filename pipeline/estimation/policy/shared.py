@@ -128,6 +128,10 @@ class HeatRecord:
         0.2, "1", "of the largest current, above which a stretch heats",
         why="a fifth of the current is a twenty-fifth of the heat",
     )  # fmt: skip
+    unexplained: float = chosen(
+        3.0, "1", "residual over the thermometer's noise, above which one time constant is not all",
+        why="chance does not do that; one exponential then reads R up to a quarter low",
+    )  # fmt: skip
     motional_share: float = chosen(
         1e-4, "1", "of the electrical power, below which a rotor's own is left out",
         why="a hundredth of a per cent of R is below what any gain leaves",

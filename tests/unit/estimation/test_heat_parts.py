@@ -51,6 +51,39 @@ def one_node(t, *, rth=1.5, tau=60.0, power=40.0, start=25.0, ambient=25.0):
     return end + (start - end) * np.exp(-t / tau)
 
 
+def test_a_body_that_nobody_measured_shows_in_the_winding() -> None:
+    """Two time constants in one thermometer: all four constants, and R as sure as the slow one is.
+
+    One time constant read R 25 % low with z of 12.
+    """
+    t = np.arange(0.0, 4000.0, 2.0)
+    losses = 40.0 * np.ones(t.size)
+    k, a, b, c, d = NETWORK
+    rise = network(t, losses, np.array([[*NETWORK, 0.0, 0.0]]))[0, 0]
+    noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
+    found = _balance(record(t, 25.0 + rise + noise), losses, 25.0)
+    assert found is not None
+    assert "not measured" in found.words
+    expected = [k / (a + b * d / (c + d)), 1.0 / k, 1.0 / (a + b), 1.0 / (c + d)]
+    u = np.sqrt(np.diag(found.scatter @ found.scatter.T))
+    assert np.all(np.abs(found.values - expected) < 4.0 * u)
+    assert np.all(u[1:] < 0.05 * np.array(expected[1:]))
+    slow = 0.5 * (a + b + c + d) - math.sqrt(0.25 * (a + b - c - d) ** 2 + b * c)
+    assert found.covered == pytest.approx(3998.0 * slow, rel=0.02)
+    assert found.u_rth_k_w == pytest.approx(expected[0] * math.exp(-3998.0 * slow), rel=0.1)
+    assert found.fitted_degc - 25.0 == pytest.approx(rise, abs=0.05)
+    half = _balance(record(t, 25.0 + rise + noise), 2.0 * losses, 25.0)
+    assert half is not None
+    assert half.values == pytest.approx(found.values * np.array([0.5, 2.0, 1.0, 1.0]), rel=1e-6)
+    # below three of the thermometer's noise one time constant does
+    loud = 25.0 + rise + 3.0 * np.random.default_rng(2).standard_normal(t.size)
+    plain = _balance(record(t, loud), losses, 25.0)
+    assert plain is not None
+    assert "one time constant" in plain.words
+    # what only warms is no balance
+    assert _balance(record(t, 25.0 + 0.01 * t + 1e-6 * t**2), losses, 25.0) is None
+
+
 def steady(k, a, b, c, d):
     """R of the winding by Kirchhoff: 1/C over a, beside b in series with d of the body."""
     # heat that b carries to the body leaves it at share d/(c + d)
@@ -250,11 +283,12 @@ def test_what_an_instrument_makes_of_the_resistance() -> None:
     assert balance.values == pytest.approx([1.5, 40.0, 60.0], rel=1e-3)
     assert found.at["temp_high_degc"] == pytest.approx(winding.max(), abs=0.01)
     assert found.at["current_a"] == pytest.approx(math.sqrt(40.0 / 0.6), abs=1e-4)
-    known = Constants((known_value("r_phase_ohm", 0.4, 0.004, "ohm"),))
+    flat = known_value("temp_coeff_copper_1_k", 0.0)
+    known = Constants((known_value("r_phase_ohm", 0.4, 0.004, "ohm"), flat))
     parts, _ = budget(replace(run, temp_ambient_degc=None), known)
     assert parts["current@s"] == pytest.approx(-2.0 * gains["u_rel_current"])
     assert parts["test:r_phase_ohm"] == pytest.approx(-0.01)
-    assert parts["temperature@s"] == pytest.approx(0.5 / (winding.max() - 25.0))
+    assert parts["temperature@s"] == pytest.approx(0.5 / 60.0, rel=1e-3)
     assert "voltage@s" not in parts
 
 

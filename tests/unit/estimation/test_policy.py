@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from scipy.stats import norm
 
 import pipeline.estimation
 from pipeline.api.options import check_options
@@ -62,6 +63,41 @@ def test_every_number_says_what_it_is() -> None:
         assert entry.unit
         assert len(entry.meaning) > 10, entry.name
         assert len(entry.origin.reason) > 10, entry.name
+
+
+def test_the_manual_states_the_numbers_in_force() -> None:
+    """A number that is changed by mistake is another than the one that the manual gives."""
+    page = (ROOT.parents[1] / "docs" / "policy.md").read_text(encoding="utf-8")
+    section, stated = "", {}
+    for line in page.partition("## Estimators")[2].splitlines():
+        if line.startswith("### "):
+            section = line[4:]
+        elif line.startswith("| `"):
+            _, field, value, *_ = (cell.strip() for cell in line.split("|"))
+            numbers = [float(one) for one in value.split(",")]
+            stated[f"{section}.{field.strip('`')}"] = numbers
+    for entry in entries(DEFAULT):
+        assert stated.pop(entry.name) == pytest.approx(np.atleast_1d(entry.value)), entry.name
+    assert stated == {}
+
+
+def test_numbers_that_follow_from_a_source_follow_from_it() -> None:
+    """By normal deviates, by the scatter of a scatter, by coefficients of magnets and copper."""
+    evidence, spread = DEFAULT.evidence, DEFAULT.capture_spread
+    assert 2.0 * norm.sf(evidence.sigmas) == pytest.approx(1.0 / 16e3, rel=0.02)
+    assert 2.0 * norm.sf(DEFAULT.back_emf.standing_sigmas) == pytest.approx(2e-9, rel=0.02)
+    assert 2.0 * norm.sf(DEFAULT.points.drift_sigmas) == pytest.approx(2e-9, rel=0.02)
+    assert 2.0 * norm.sf(DEFAULT.steps.spike_sigmas) == pytest.approx(1e-15, rel=0.3)
+    assert 1.0 / np.sqrt(2.0 * (evidence.rows - 1)) == pytest.approx(1.0 / 6.0, rel=0.03)
+    assert 1.0 / np.sqrt(2.0 * DEFAULT.drag.least_freedom) == 0.25
+    assert spread.inverter == pytest.approx(1e-6 * 20e3)
+    for share, kelvin in (
+        (spread.flux_temperature_known, 5.0),
+        (spread.flux_temperature_unpowered, 10.0),
+        (spread.flux_temperature_unknown, 20.0),
+    ):
+        assert share == pytest.approx(kelvin * abs(DEFAULT.magnet.coefficient_1_k), rel=0.1)
+    assert spread.resistance_temperature_known == pytest.approx(5.0 * 0.0039, rel=0.05)
 
 
 def test_every_number_is_used() -> None:

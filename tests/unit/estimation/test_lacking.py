@@ -1,0 +1,69 @@
+"""What captures that lack a column are good for: the same constants with a u that says so, or none.
+
+Alone and beside whole captures: a file that cannot be used keeps no other from being used.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from pipeline.estimation.protocol import Fit
+from pipeline.records.capture import Campaign, Capture
+from tests.unit.estimation.test_scales import ESTIMATORS, PLANS, campaign, fitted
+
+
+def doubted(name: str) -> Campaign:
+    """The captures with thermometers whose offset is as large as the bench draws it."""
+    made = campaign(name)
+    metas = (replace(c.meta, u_temp_degc=0.5) for c in made.captures)
+    captures = zip(made.captures, metas, strict=True)
+    return replace(made, captures=tuple(replace(c, meta=meta) for c, meta in captures))
+
+
+def without(capture: Capture, column: str) -> Capture:
+    tables = tuple(t.drop(column) if column in t.columns else t for t in capture.tables)
+    return replace(capture, path=f"less_{capture.path}", sha256="e" * 64, tables=tables)
+
+
+def columns_of(made: Campaign) -> list[str]:
+    return sorted({n for c in made.captures for t in c.tables for n in t.columns})
+
+
+CASES = [(name, column) for name in PLANS for column in columns_of(campaign(name))]
+
+
+def agree(plain: Fit, other: Fit, *, keeps: bool) -> None:
+    """Each number within four of both uncertainties, each that is withheld with its reason."""
+    for one, two in zip(plain.estimates, other.estimates, strict=True):
+        assert two.name == one.name
+        if not two.known:
+            assert two.note, two.name
+            assert not keeps or not one.known, (two.name, two.note)
+            continue
+        assert math.isfinite(two.number)
+        assert math.isfinite(two.u)
+        if one.known:
+            room = 4.0 * math.hypot(one.u, two.u) + 1e-9 * abs(one.number)
+            assert two.number == pytest.approx(one.number, abs=room), two.name
+
+
+@pytest.mark.parametrize(("name", "column"), CASES)
+def test_captures_without_a_column_give_no_other_number(name: str, column: str) -> None:
+    made = doubted(name)
+    less = tuple(without(c, column) for c in made.captures)
+    other = fitted(name, replace(made, captures=less))
+    agree(fitted(name, made), other, keeps=False)
+    if not any(e.known for e in other.estimates):
+        assert any(ESTIMATORS[name].experiment in e.note or e.note for e in other.estimates)
+
+
+@pytest.mark.parametrize(("name", "column"), CASES)
+def test_a_capture_without_a_column_keeps_no_whole_one_from_use(name: str, column: str) -> None:
+    made = doubted(name)
+    lacking = [without(c, column) for c in made.captures]
+    first = next(c for c, whole in zip(lacking, made.captures, strict=True) if c != whole)
+    both = replace(made, captures=(replace(first, path="0"), *made.captures))
+    agree(fitted(name, made), fitted(name, both), keeps=True)
