@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import polars as pl
 
 from pipeline.estimation.estimators import (
     hand_turn,
@@ -178,13 +180,23 @@ def _nice(wanted_hz: float) -> float:
 
 
 def _hand_trial(seed: int) -> Trial:
-    campaign, real = recorded(HAND, seed)
+    """A thermometer at the magnets, off as the station's are: an assumed one is not drawn."""
+    plain, real = recorded(HAND, seed)
+    shown_degc = 25.0 + real.temperature_degc
+    captures = (
+        replace(
+            c, tables=tuple(t.with_columns(temp_magnet_degc=pl.lit(shown_degc)) for t in c.tables)
+        )
+        for c in plain.captures
+    )
     true = true_constants()
     psi, pairs = true["psi_pm_wb"], float(true["pole_pairs"])
+    assumed = hand_turn.ESTIMATOR.options["alpha_assumed_1_k"]
+    seen = psi * real.voltage / (1.0 + assumed * real.temperature_degc)
     return Trial(
-        campaign,
+        replace(plain, captures=tuple(captures)),
         {"psi_pm_wb": psi, "pole_pairs": pairs},
-        {"psi_pm_wb": psi * real.voltage, "pole_pairs": pairs},
+        {"psi_pm_wb": seen, "pole_pairs": pairs},
     )
 
 
