@@ -53,7 +53,8 @@ def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None
     str or None
         Its path, if of the captures that the effect moves by more than a `tie` of deviance those
         beside the one that gains most do not gain in sum, in the groups that it acts on. An effect
-        that moves no other capture cannot be confirmed there: None.
+        that moves no other capture cannot be confirmed there: None. One that it does
+        not act on, which other parameters alone move with it, can show nothing of it.
 
     Notes
     -----
@@ -75,11 +76,12 @@ def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None
     paths = [segment.capture for segment in tried.segments]
     names = list(dict.fromkeys(paths))
     of_group = np.array([names.index(paths[number]) for number, _, _ in tried.labels])
-    power = np.bincount(of_group[tried.group], moved**2, len(names))
     was, now = (
         tried.counts * (np.log(np.maximum(q, 1.0)) + np.minimum(q, 1.0)) for q in (before, after)
     )
     acts = np.bincount(tried.group, np.any(tried.matrix[:, own], axis=1), len(tried.labels)) > 0
+    moved[~acts[tried.group]] = 0.0
+    power = np.bincount(of_group[tried.group], moved**2, len(names))
     gain = np.bincount(of_group[acts], (was - now)[acts], len(names))
     could = power > fit.policy.selection.tie
     most = int(np.argmax(gain))
