@@ -127,6 +127,7 @@ def _model() -> Schema:
             "unexcited": list_of(of_kind(Unexcited)),
             "fitted": list_of(object_of({"effect": NAME, "parameters": map_of(quantity)})),
             "scales": map_of(SPREAD),
+            "touches": map_of(TEXT),
         },
     )
 

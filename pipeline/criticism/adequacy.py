@@ -8,11 +8,15 @@ that is large for the machine, and that no slow drift of the instruments explain
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.diagnosis import base_fit, searched
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.library.headline import headline
+from pipeline.criticism.library.registry import effects
 from pipeline.criticism.regression.goodness import leave_out, remainder
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal
@@ -23,7 +27,7 @@ from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import Diagnosis, ReportedParameter
-from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
+from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict, Parameters
 
 
 def model_verdict(
@@ -73,6 +77,8 @@ def model_verdict(
     # instruments that drift count as noise where the verdict says that nothing else is left
     tested = _residuals(base if found.verdict in ("missing", "unknown") else kept)
     named = replace(_named(tested, found), scales=base.system.fit.machine.scales)
+    library = effects(model.effects_path)
+    named = replace(named, touches=_touches(named.sizes, library))
     return _stated(model, named), found
 
 
@@ -109,6 +115,15 @@ def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
         unexcited=unseen,
         fitted=_fitted(found),
     )
+
+
+def _touches(sizes: Mapping[str, Parameters], library: Mapping[str, Effect]) -> dict[str, str]:
+    """What constants mean where the effects that are known of the motor act, with their sizes."""
+    return {
+        constant: f"{words}: {headline(library[name], parameters)}"
+        for name, parameters in sizes.items()
+        for constant, words in library[name].touches.items()
+    }
 
 
 def _fitted(found: Diagnosis) -> dict[str, dict[str, ReportedParameter]]:

@@ -613,12 +613,14 @@ class Description:
 
     `words` is its formula in a line, `signature` what it looks like, `headline` what a person says
     of it, with sizes in braces (`criticism.library.headline`); name and parameters without one.
+    `touches`: constants of a datasheet that mean something else where it acts, and what.
     """
 
     words: str
     signature: str
     reference: str
     headline: str = ""
+    touches: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -108,6 +108,9 @@ class ModelVerdict(PlainRecord):
     scales
         Sizes of the machine [unit of the name's suffix] that parameters of effects are multiples
         of.
+    touches
+        Constants of a datasheet that mean something else where the effects of `sizes` act, and
+        what they are then.
 
     """
 
@@ -125,6 +128,7 @@ class ModelVerdict(PlainRecord):
     unexcited: tuple[Unexcited, ...] = ()
     fitted: Mapping[str, Parameters] = field(default_factory=dict)
     scales: Mapping[str, float] = field(default_factory=dict)
+    touches: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def sizes(self) -> dict[str, Parameters]:

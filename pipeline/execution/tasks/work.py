@@ -25,6 +25,7 @@ from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet
 from pipeline.records.diagnosis import Diagnosis
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.model_verdict import ModelVerdict
@@ -120,7 +121,7 @@ def captures_apart(
 def assemble(job: MotorJob, campaign: Campaign, found: Judged, stamp: Stamp) -> Datasheet:
     """The datasheet of one motor."""
     references = references_of(campaign, stamp.readings)
-    chosen = found.constants.chosen()
+    chosen = _with_notes(found.constants.chosen(), found.model)
     status, why = verdict(
         chosen,
         found.checks,
@@ -145,6 +146,16 @@ def assemble(job: MotorJob, campaign: Campaign, found: Judged, stamp: Stamp) -> 
         libraries=stamp.libraries,
         model=found.model,
     )
+
+
+def _with_notes(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[str, Estimate]:
+    """The constants, with a note where an effect of the motor makes them something else."""
+    noted = dict(constants)
+    for name, words in model.touches.items():
+        if name in noted and noted[name].known:
+            note = "; ".join(part for part in (words, noted[name].note) if part)
+            noted[name] = replace(noted[name], note=note)
+    return noted
 
 
 def references_of(campaign: Campaign, readings: Sequence[str]) -> tuple[CaptureReference, ...]:

@@ -13,10 +13,13 @@ from pipeline.criticism import adequacy
 from pipeline.criticism.adequacy import model_verdict
 from pipeline.criticism.data.machine_scale import PAIRLESS
 from pipeline.criticism.diagnosis import TOO_LITTLE, diagnose
+from pipeline.criticism.library.registry import effects
+from pipeline.execution.tasks.work import _with_notes
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import ReportedParameter, Unexcited
+from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 from pipeline.stages.steps.campaigns import campaigns
 
@@ -127,3 +130,20 @@ def test_the_record_comes_back_from_its_document() -> None:
     )
     assert ModelVerdict.of(named.document()) == named
     assert ModelVerdict.of(ModelVerdict("not_tested", note="off").document()).note == "off"
+
+
+def test_a_coupling_makes_inertia_that_of_all_that_turns() -> None:
+    """Asked for or found: the datasheet's J is no rotor's, and says how much lies beyond."""
+    share = {"share": ReportedParameter(0.84, 0.01, "1")}
+    sizes = {"compliance": share, "stribeck": {}}
+    (words,) = adequacy._touches(sizes, effects(None)).values()
+    assert words.startswith("is of all that turns, not of the rotor alone: ")
+    assert words.endswith("84.0 ± 2.0 % of the inertia beyond it")
+
+
+def test_a_constant_that_is_known_says_what_it_means() -> None:
+    known = Estimate("j_rotor_kgm2", 1e-4, "kg·m²", "measured", "inertia", note="by the drive")
+    none = not_identifiable("j_rotor_kgm2", "kg·m²", "inertia", "record a drive")
+    model = ModelVerdict("missing", touches={"j_rotor_kgm2": "is of all", "b_visc_nm_s_rad": "-"})
+    assert _with_notes({known.name: known}, model)[known.name].note == "is of all; by the drive"
+    assert _with_notes({none.name: none}, model)[none.name].note == "record a drive"
