@@ -20,7 +20,11 @@ from tests.benchmark.worlds.programmes import (
     recordings,
 )
 
-WORLDS: Mapping[str, str] = {"motulator": "motulator", "mujoco": "mujoco"}
+WORLDS: Mapping[str, str] = {
+    "motulator": "motulator",
+    "mujoco": "mujoco",
+    "gym": "gym-electric-motor",
+}
 """Worlds, and the package that each needs."""
 
 AT_ONCE = 40

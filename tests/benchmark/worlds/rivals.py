@@ -21,6 +21,7 @@ from pipeline.execution.tasks.start import start_constants
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from tests.benchmark.blind import Diagnose
+from tests.benchmark.worlds.sindy import weak_sindy
 
 Array = NDArray[np.float64]
 Method = Callable[[Campaign], Sequence[str] | None]
@@ -107,7 +108,7 @@ def _chosen(
     return tuple(found)
 
 
-METHODS: Mapping[str, Method] = {"stepwise_bic": stepwise_bic}
+METHODS: Mapping[str, Method] = {"stepwise_bic": stepwise_bic, "pysindy": weak_sindy}
 
 
 def judged_by(method: str) -> Diagnose:

@@ -6,14 +6,17 @@ import sys
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.errors import UsageError
 from tests.benchmark.command import main, options
 from tests.benchmark.worlds.case import WorldCase, marked
 from tests.benchmark.worlds.lanes import Lane, run
 from tests.benchmark.worlds.programmes import PROGRAMMES, PWM_HZ, Campaigner, Hidden
 from tests.benchmark.worlds.rivals import _chosen
+from tests.benchmark.worlds.sindy import weak_sindy
 from tests.benchmark.worlds.table import beside, by_programme, table
 
 NULL = WorldCase("motulator", "laboratory", 1)
@@ -104,6 +107,14 @@ def hinge() -> Any:
     from tests.benchmark.worlds import with_mujoco
 
     return with_mujoco
+
+
+@pytest.fixture(scope="module")
+def gym() -> Any:
+    pytest.importorskip("gym_electric_motor", reason="group worlds is not installed")
+    from tests.benchmark.worlds import with_gym
+
+    return with_gym
 
 
 def driven(place: Any, sizes: dict[str, float], omega: float, i_dq: complex, n: int = 250) -> Any:
@@ -308,6 +319,94 @@ def test_a_log_of_q_alone_holds_means_around_its_samples(hinge: Any) -> None:
     }
 
 
+@pytest.mark.parametrize("omega", [90.0, -90.0])
+def test_a_machine_of_gym_keeps_the_contract_of_frame_and_signs(gym: Any, omega: float) -> None:
+    motor, i, v, torque, turned, slope = driven(gym, {}, omega, -20.0 + 50.0j)
+    assert slope == 0.0
+    assert turned == omega
+    assert i == pytest.approx(-20.0 + 50.0j, abs=0.3)
+    omega_e = motor.pole_pairs * omega
+    flux = motor.ld_h * i.real + motor.psi_pm_wb + 1j * motor.lq_h * i.imag
+    short = np.sinc(omega_e / PWM_HZ / 2.0 / np.pi)
+    assert v * short == pytest.approx(motor.r_phase_ohm * i + 1j * omega_e * flux, rel=2e-3)
+    made = 1.5 * motor.pole_pairs * (np.conj(flux) * i).imag
+    drag = motor.torque_coulomb_nm * np.sign(omega) + motor.b_visc_nm_s_rad * omega
+    assert torque == pytest.approx(made - drag, rel=2e-3)
+
+
+def test_a_leg_of_gym_that_is_dead_follows_its_current(gym: Any) -> None:
+    motor, i, v, *_ = driven(gym, {"dead_time": 2e-6}, 2.0, 80.0 + 0j)
+    lost = v.real - motor.r_phase_ohm * i.real
+    step = 2e-6 * PWM_HZ * motor.vdc_v
+    assert 1.1 * step < lost < 4.0 / 3.0 * step * 1.02
+
+
+def test_a_locked_rotor_and_open_terminals_of_gym_show_inductance_and_magnet(gym: Any) -> None:
+    motor = gym.motor(3)
+    plant = gym.Plant(motor, Hidden({}))
+    t = np.linspace(0.0, 0.2, 100)
+    along = plant.locked(lambda _: 0.5, (), t, -np.pi / 2.0)
+    tau = motor.lq_h / motor.r_phase_ohm
+    assert along == pytest.approx(0.5 / motor.r_phase_ohm * -np.expm1(-t / tau), abs=1e-4)
+    theta = np.linspace(0.0, 0.5, 50)
+    v = plant.emf(theta, np.full(50, 80.0))
+    height = -motor.pole_pairs * 80.0 * motor.psi_pm_wb
+    for k in range(3):
+        angle = motor.pole_pairs * theta - 2.0 * np.pi * k / 3.0
+        assert v[:, k] == pytest.approx(height * np.sin(angle), rel=1e-9)
+
+
+def test_a_field_winding_of_gym_answers_a_step_at_once_with_less_inductance(gym: Any) -> None:
+    motor = gym.motor(3)
+    t = np.array([0.0, 1e-5, 2e-5])
+    rises = []
+    for sizes in ({}, {"field_winding": 0.1}):
+        plant = gym.Plant(motor, Hidden(sizes))
+        assert plant.emf(t, np.full(3, 80.0)) == pytest.approx(
+            gym.Plant(motor, Hidden({})).emf(t, np.full(3, 80.0))
+        )
+        rises.append(plant.locked(lambda _: 1.0, (), t, 0.0)[-1])
+    assert rises[0] / rises[1] == pytest.approx(0.9, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "at"),
+    [
+        ("windage", lambda m, w, _: m.torque_rated_nm * 0.012 * (w / m.speed_rated_rad_s) ** 2),
+        ("constant_load", lambda m, _, __: 0.01 * m.torque_rated_nm),
+        ("unbalance", lambda m, _, theta: 0.01 * m.torque_rated_nm * np.sin(theta + 1.1)),
+        ("stribeck", lambda m, w, _: 8e-3 * m.torque_rated_nm * np.exp(-((w / 9.0) ** 1.5))),
+    ],
+)
+def test_what_is_hidden_in_gym_brakes_a_coast_as_it_is_meant_to(
+    gym: Any, name: str, at: Any
+) -> None:
+    m = gym.motor(2)
+    plant = gym.Plant(m, Hidden({name: gym.TYPICAL[name](m)}))
+    path = plant.coast(0.4, 60.0, 1000.0, 500)
+    speed, theta = (0.5 * (path[1:, k] + path[:-1, k]) for k in (1, 0))
+    brake = -m.j_rotor_kgm2 * np.diff(path[:, 1]) * 1000.0
+    extra = brake - m.torque_coulomb_nm - m.b_visc_nm_s_rad * speed
+    assert extra == pytest.approx(at(m, speed, theta), abs=0.02 * 0.008 * m.torque_rated_nm)
+    still = plant.turned(np.array([0.3]), np.array([5.0]))
+    rest = -still - m.torque_coulomb_nm - 5.0 * m.b_visc_nm_s_rad
+    assert rest == pytest.approx(at(m, 5.0, 0.3), rel=1e-9)
+
+
+def test_the_link_of_gym_sags_by_the_power_that_is_drawn(gym: Any) -> None:
+    """Rated power costs the share that is hidden; what is asked for is more by as much."""
+    asked, lost = [], 0.0
+    for sizes in ({}, {"sagging_link": 0.03}):
+        motor, i, v, *_ = driven(gym, sizes, 200.0, 60.0j)
+        flux = motor.ld_h * i.real + motor.psi_pm_wb + 1j * motor.lq_h * i.imag
+        there = motor.r_phase_ohm * i + 1j * motor.pole_pairs * 200.0 * flux
+        asked.append(abs(v) / abs(there))
+        power = 1.5 * (there * np.conj(i)).real
+        lost = 0.03 * power / (motor.torque_rated_nm * motor.speed_rated_rad_s)
+    # legs draw the current of an edge until the next, which the ripple puts a tenth off
+    assert asked[1] / asked[0] - 1.0 == pytest.approx(lost, rel=0.15)
+
+
 def test_stepwise_regression_names_the_blocks_that_pay_and_no_other() -> None:
     random = np.random.default_rng(3)
     matrix = random.normal(size=(400, 7))
@@ -358,3 +457,41 @@ def test_dry_friction_of_a_joint_opposes_motion_not_acceleration() -> None:
     assert (omega[1:-1] < -5.0).any()
     assert (omega[1:-1] > 5.0).any()
     assert friction[turning] == pytest.approx(expected[turning], abs=0.02 * m.torque_coulomb_nm)
+
+
+def turned_by(extra: Any) -> Campaign:
+    """A log of a shaft that a q current drives to and fro, with a torque that the model lacks."""
+    step, n = 1e-3, 6000
+    t = step * np.arange(n)
+    iq = 4.0 * np.sin(7.0 * t) + 2.0 * np.sin(31.0 * t)
+    theta, omega = np.zeros(n), np.zeros(n)
+    for k in range(n - 1):
+        # sixty steps a row, so that the sign of a friction turns where it should
+        theta[k + 1], omega[k + 1] = theta[k], omega[k]
+        for part in range(60):
+            i = iq[k] + (iq[k + 1] - iq[k]) * (part + 0.5) / 60.0
+            w = omega[k + 1]
+            pull = 0.3 * i - 2e-3 * w - 0.05 * np.tanh(w / 0.05) - extra(theta[k + 1], w)
+            omega[k + 1] = w + pull / 3e-3 * step / 60.0
+            theta[k + 1] += omega[k + 1] * step / 60.0
+    noise = np.random.default_rng(5)
+    iq, omega = iq + noise.normal(0.0, 0.02, n), omega + noise.normal(0.0, 0.05, n)
+    columns = {"t_s": t, "theta_mech_rad": theta, "omega_mech_rad_s": omega, "iq_a": iq}
+    meta = CaptureMeta(motor_id="m", test="drive", pole_pairs=2, slots=6)
+    capture = Capture("drive.mcap", "", "unverified", meta, (pl.DataFrame(columns),))
+    return Campaign("m", (capture,))
+
+
+@pytest.mark.parametrize(
+    ("extra", "names"),
+    [
+        (lambda _, __: 0.0, ()),
+        (lambda theta, _: 0.05 * np.sin(12.0 * theta + 0.4), ("cogging",)),
+        (lambda _, w: 2e-5 * w * abs(w), ("windage",)),
+    ],
+)
+def test_sparse_identification_names_the_term_that_moves_the_shaft(
+    extra: Any, names: tuple[str, ...]
+) -> None:
+    pytest.importorskip("pysindy", reason="group worlds is not installed")
+    assert weak_sindy(turned_by(extra)) == names
