@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.unit.estimation.test_scales import PLANS, campaign, fitted
+from tests.unit.estimation.test_scales import PLANS, campaign, plain_fit
 
 
 def read(name: str, column: str) -> np.ndarray:
@@ -27,7 +27,7 @@ OTHER_ZERO = {"theta_mech_rad"}
 @pytest.mark.parametrize("name", PLANS)
 def test_plots_show_what_was_read(name: str) -> None:
     """Within the range of the column that an axis names; means never reach beyond their samples."""
-    for plot in fitted(name, campaign(name)).evidence:
+    for plot in plain_fit(name).evidence:
         for series in plot.series:
             assert series.x.size == series.measured.size
             for axis, values in ((plot.x_name, series.x), (plot.y_name, series.measured)):
@@ -47,7 +47,7 @@ LEFT = {"holding_current": 0.15, "cogging": 0.07}
 
 @pytest.mark.parametrize("name", PLANS)
 def test_fits_lie_on_what_they_are_drawn_over(name: str) -> None:
-    for plot in fitted(name, campaign(name)).evidence:
+    for plot in plain_fit(name).evidence:
         for series in plot.series:
             if series.fitted.size == 0:
                 continue

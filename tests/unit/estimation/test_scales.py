@@ -123,6 +123,12 @@ def fitted(name: str, made: Campaign, given: Constants | None = None, volts: flo
     return one.fit(made, known(name) if given is None else given, options)
 
 
+@cache
+def plain_fit(name: str) -> Fit:
+    """What it finds in the captures as they are."""
+    return fitted(name, campaign(name))
+
+
 def by_source(estimate: Estimate) -> dict[str, float]:
     """Signed contribution of each source."""
     total: dict[str, float] = {}
@@ -156,7 +162,7 @@ def test_no_result_depends_on_the_size_of_the_machine(name: str) -> None:
     given = Constants(
         tuple(replace(e, value=e.number * factor_of(e.unit)) for e in known(name).estimates)
     )
-    plain = fitted(name, campaign(name))
+    plain = plain_fit(name)
     larger = fitted(name, scaled(campaign(name), factors), given, VOLTS)
     for one, other in zip(plain.estimates, larger.estimates, strict=True):
         assert (one.name, one.status) == (other.name, other.status)
@@ -193,7 +199,7 @@ GAINS = {"voltage": ("V",), "current": ("A",), "torque": ("N·m",)}
 @pytest.mark.parametrize("name", PLANS)
 def test_a_budget_says_what_a_gain_does(name: str) -> None:
     """All readings of an instrument larger by its standard uncertainty: the shift is its part."""
-    plain = {e.name: e for e in fitted(name, campaign(name)).estimates if e.known}
+    plain = {e.name: e for e in plain_fit(name).estimates if e.known}
     for gain, units in GAINS.items():
         factors = dict.fromkeys(units, 1.0 + U)
         moved = {e.name: e for e in fitted(name, scaled(campaign(name), factors)).estimates}
@@ -238,9 +244,7 @@ def test_a_budget_says_what_a_thermometer_does(name: str) -> None:
 def test_the_order_of_captures_changes_nothing(name: str) -> None:
     made = campaign(name)
     turned = Campaign(made.motor_id, made.captures[::-1])
-    for one, other in zip(
-        fitted(name, made).estimates, fitted(name, turned).estimates, strict=True
-    ):
+    for one, other in zip(plain_fit(name).estimates, fitted(name, turned).estimates, strict=True):
         assert other.value == pytest.approx(one.value, rel=1e-6)
         if one.known:
             assert other.u == pytest.approx(one.u, rel=1e-3), one.name
@@ -255,7 +259,7 @@ def test_a_constant_goes_with_the_power_of_the_clock_that_is_said(name: str) -> 
     """A clock fast by a share g makes times longer and speeds lower by it."""
     said, made = ESTIMATORS[name].clock_powers, campaign(name)
     fast = scaled(made, {"s": 1.0 + U, "rad/s": 1.0 / (1.0 + U)})
-    for one, other in zip(fitted(name, made).estimates, fitted(name, fast).estimates, strict=True):
+    for one, other in zip(plain_fit(name).estimates, fitted(name, fast).estimates, strict=True):
         if not one.known:
             continue
         expected = one.number * (1.0 + U) ** said.get(one.name, 0)
@@ -284,7 +288,7 @@ def test_no_result_depends_on_when_a_clock_began(name: str) -> None:
         )
         for c in made.captures
     )
-    plain, other = fitted(name, made), fitted(name, replace(made, captures=late))
+    plain, other = plain_fit(name), fitted(name, replace(made, captures=late))
     for one, two in zip(plain.estimates, other.estimates, strict=True):
         alike(one, two)
 
@@ -306,6 +310,6 @@ def test_a_capture_that_cannot_be_used_keeps_no_other_from_it(name: str, end: st
             tables=tuple(t.head(3) for t in whole.tables),
         )
         beside = (brief, *made.captures) if end == "first" else (*made.captures, brief)
-        plain, other = fitted(name, made), fitted(name, replace(made, captures=beside))
+        plain, other = plain_fit(name), fitted(name, replace(made, captures=beside))
         for one, two in zip(plain.estimates, other.estimates, strict=True):
             alike(one, two)

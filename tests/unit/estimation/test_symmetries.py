@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.estimate import Estimate
-from tests.unit.estimation.test_scales import PLANS, by_source, campaign, fitted
+from tests.unit.estimation.test_scales import PLANS, by_source, campaign, fitted, plain_fit
 
 # In a mirror a motor turns the other way: phases b and c are exchanged, d stays and q turns round.
 EXCHANGED = {
@@ -87,7 +87,7 @@ def alike(one: Estimate, other: Estimate, sign: float = 1.0) -> None:
 def test_a_motor_in_a_mirror_has_the_same_constants(name: str) -> None:
     made = campaign(name)
     shown = replace(made, captures=tuple(mirrored(c) for c in made.captures))
-    plain, other = fitted(name, made), fitted(name, shown)
+    plain, other = plain_fit(name), fitted(name, shown)
     seen = {e.name: e for e in other.estimates}
     for one in plain.estimates:
         sign = -1.0 if one.name in ODD else 1.0
@@ -117,7 +117,7 @@ SHARE = {
 @pytest.mark.parametrize("name", PLANS)
 def test_twice_the_captures_halve_the_variance_of_chance_and_nothing_else(name: str) -> None:
     made = campaign(name)
-    plain = fitted(name, made)
+    plain = plain_fit(name)
     other = {e.name: e for e in fitted(name, twice(made)).estimates}
     for one in plain.estimates:
         two = other[one.name]
