@@ -70,6 +70,14 @@ def test_a_gain_that_two_stations_do_not_share_is_allowed_for() -> None:
     assert disagreements([*north, *(reading(r.path, r.value) for r in south)]) != ()
 
 
+@pytest.mark.parametrize(("deviates", "parted"), [(3.85, False), (3.93, True)])
+def test_two_readings_have_one_degree_of_freedom(deviates: float, parted: bool) -> None:
+    """One in ten thousand of a normal deviate is beyond 3.891 of it, either sign."""
+    half = 0.5 * deviates * math.sqrt(2.0) * 0.1 * math.hypot(1e-4, 0.005)
+    found = disagreements([reading("one", 0.1 - half), reading("two", 0.1 + half)])
+    assert bool(found) is parted
+
+
 @pytest.mark.parametrize("seed", range(200))
 def test_one_motor_is_never_two(seed: int) -> None:
     """Readings that scatter as their budgets and methods say, over stations and quantities."""

@@ -67,6 +67,16 @@ def test_a_wrong_clock_fails_and_its_file_is_named(factor):
     assert "t_s of coast.csv" in check.suspect
 
 
+@pytest.mark.parametrize(("times", "named"), [(1.8, False), (2.2, True)])
+def test_a_file_is_named_from_two_u_beyond_the_allowance(times, named):
+    """Beside one that is off by 1 % and fails."""
+    u = 2**0.5 * 1e-4
+    other = spin(1.0 + RULE.options["allowance"] + times * u)
+    check = judged(spin(1.01), replace(other, path="other.csv"))
+    assert check.status == "fail"
+    assert ("other.csv" in check.suspect) is named
+
+
 def test_a_clock_within_its_stated_uncertainty_passes():
     """2.4 % off on a bench that states 2 %: no failure, and J has that in its u."""
     assert judged(spin(1.0 + 1e-4)).status == "pass"
