@@ -164,7 +164,9 @@ def judge_ratio(
     value, u, dof = ratio
     status = judge_deviation(value - 1.0, u, allowance)
     k = coverage_factor(dof)
-    words = f"{meaning}; {value:.4f} ± {k * u:.4f} (k={k:.3g}), expected 1 within the limit"
+    words = (
+        f"{meaning}; {value:.4f} ± {k * u:.4f} (k={k:.3g}), expected 1 ± {allowance + 2.0 * u:.2g}"
+    )
     suspect = None
     if status == "not_evaluated":
         words += "; too uncertain to judge"

@@ -19,7 +19,7 @@ EFFECT = Effect(
     signature="second electrical order in the dq voltages, proportional to current, at any speed",
     tests=("resistance", "torque_map"),
     experiment="resistance through all three terminal pairs, or current at low speed",
-    headline="phase resistances that differ, by {cosine & sine %} of their mean",
+    headline="phase resistances that differ, by up to {phases cosine & sine %} of their mean",
     reference="Fortescue, Trans. AIEE 37 (1918), symmetrical co-ordinates",
     parameters=(
         Parameter("cosine", "1", 0.01, 0.001, low=-0.3, high=0.3),

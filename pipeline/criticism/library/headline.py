@@ -22,7 +22,8 @@ def headline(effect: Effect, parameters: Mapping[str, ReportedParameter]) -> str
     ----------
     effect : Effect
         `headline` may name in braces a parameter `{a}`, the length of a vector `{a & b}`, a share
-        in percent `{a %}`, or `{largest}`, the wave of the largest amplitude.
+        in percent `{a %}`, what three phases differ by at most `{phases a & b %}`, or `{largest}`,
+        the wave of the largest amplitude.
     parameters : mapping of str to (value, u, unit)
         What was fitted, by name.
 
@@ -43,8 +44,11 @@ def _size(wanted: str, parameters: Mapping[str, ReportedParameter]) -> str:
         return _largest(parameters)
     names, percent = wanted.removesuffix("%"), wanted.endswith("%")
     nothing = ReportedParameter(None, None, "1")
-    parts = [parameters.get(name.strip(), nothing) for name in names.split("&")]
-    value, u, unit = amplitude(parts)
+    of_phases = names.startswith("phases ")
+    parts = [
+        parameters.get(name.strip(), nothing) for name in names.removeprefix("phases ").split("&")
+    ]
+    value, u, unit = largest_difference(*parts) if of_phases else amplitude(parts)
     if value is None or u is None:
         return UNKNOWN_SIZE
     return number_text(100.0 * value, 100.0 * u, "%") if percent else number_text(value, u, unit)
@@ -72,6 +76,30 @@ def amplitude(parts: Sequence[ReportedParameter]) -> ReportedParameter:
     length = math.hypot(*(value for value, _ in values))
     spread = math.hypot(*(value * u for value, u in values))
     return ReportedParameter(length, spread / length if length > 0 else 0.0, parts[0].unit)
+
+
+def largest_difference(cosine: ReportedParameter, sine: ReportedParameter) -> ReportedParameter:
+    """Largest less smallest of the three 2 Re(γ e^{−j4πk/3}), γ = cosine + j sine, to first order.
+
+    Parameters
+    ----------
+    cosine, sine
+        Parts of the negative-sequence component γ [1].
+
+    Returns
+    -------
+    ReportedParameter
+        Without a value where a part has none.
+
+    """
+    if cosine.value is None or sine.value is None:
+        return ReportedParameter(None, None, cosine.unit)
+    angles = [4.0 * math.pi * k / 3.0 for k in range(3)]
+    phases = [2.0 * (cosine.value * math.cos(a) + sine.value * math.sin(a)) for a in angles]
+    top, bottom = (angles[phases.index(one)] for one in (max(phases), min(phases)))
+    slopes = 2.0 * (math.cos(top) - math.cos(bottom)), 2.0 * (math.sin(top) - math.sin(bottom))
+    u = math.hypot(slopes[0] * (cosine.u or 0.0), slopes[1] * (sine.u or 0.0))
+    return ReportedParameter(max(phases) - min(phases), u, cosine.unit)
 
 
 def _largest(parameters: Mapping[str, ReportedParameter]) -> str:

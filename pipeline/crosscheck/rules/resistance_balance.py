@@ -27,12 +27,12 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
         return not_evaluated(NAME, "needs a resistance capture on each of the pairs ab, bc and ca")
     allowance = options["allowance"]
     status = judge_deviation(imbalance.number, imbalance.u, allowance)
+    limit = allowance + 2.0 * imbalance.u
     words = (
-        f"spread of the phase resistances over their mean; {imbalance.number:.4f} ± "
-        f"{2.0 * imbalance.u:.4f} (k=2), at most {allowance:g}"
+        f"largest less smallest phase resistance over their mean; {imbalance.number:.4f} ± "
+        f"{2.0 * imbalance.u:.4f} (k=2), at most {limit:.3g}"
     )
     suspect = "a joint, a missing turn or a terminal contact" if status == "fail" else None
-    limit = allowance + 2.0 * imbalance.u
     return Check(NAME, status, words, imbalance.number, limit, "1", suspect)
 
 

@@ -87,8 +87,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     look = _Look(points, pairs, magnet, captures, *frame_of(points, pairs))
     fluxes = flux_pairs(points, pairs)
     own = _direct(fluxes, magnet), _quadrature(fluxes, magnet)
+    turned_rad = round(look.angle_rad, 3) + 0.0
     words = (
-        f"{table.note()}; {_timing_words(captures)}; frame turned by {look.angle_rad:.3f} rad, "
+        f"{table.note()}; {_timing_words(captures)}; frame turned by {turned_rad:g} rad, "
         f"currents {1e6 * look.behind_s:.3g} µs late, taken out"
     )
     estimates = (

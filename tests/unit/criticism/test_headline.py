@@ -5,13 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from pipeline.criticism.effect import SCALES as SCALED
 from pipeline.criticism.effect import Machine
 from pipeline.criticism.effects.angle_eccentricity import EFFECT as ECCENTRIC
 from pipeline.criticism.effects.cogging import EFFECT as COGGING
-from pipeline.criticism.library.headline import UNKNOWN_SIZE, amplitude, headline
+from pipeline.criticism.effects.phase_imbalance import EFFECT as IMBALANCE
+from pipeline.criticism.library.headline import (
+    UNKNOWN_SIZE,
+    amplitude,
+    headline,
+    largest_difference,
+)
 from pipeline.criticism.library.registry import effects
 from pipeline.records.diagnosis import ReportedParameter
 
@@ -66,3 +73,15 @@ def test_every_effect_names_parameters_that_it_has(name: str) -> None:
     words = headline(effect, reported)
     assert effect.headline and UNKNOWN_SIZE not in words
     assert "{" not in words
+
+
+@pytest.mark.parametrize("bad", range(3))
+def test_phases_differ_by_the_largest_less_the_smallest(bad: int) -> None:
+    """One phase 7 % above, two 3.5 % below the mean, whichever it is: 10.5 %, as a meter has it."""
+    gamma = 0.035 * np.exp(4j * np.pi * bad / 3.0)
+    parts = (ReportedParameter(gamma.real, 1e-4, "1"), ReportedParameter(gamma.imag, 1e-4, "1"))
+    value, u, _ = largest_difference(*parts)
+    assert value == pytest.approx(0.105)
+    assert u == pytest.approx(1e-4 * math.sqrt(12.0), rel=1e-6)
+    words = headline(IMBALANCE, dict(zip(("cosine", "sine"), parts, strict=True)))
+    assert words.startswith("phase resistances that differ, by up to 10.5")

@@ -158,7 +158,13 @@ def test_what_failed_is_a_card_above_the_constants(
         ("fail", "check-1"),
         ("marginal", "check-2"),
     ]
-    for words in ("kt vs ke", "1.1547", "limit 0.01", "torque test against back-EMF", "2/sqrt(3)"):
+    for words in (
+        "kt vs ke",
+        "1.1547",
+        "may deviate by 0.01",
+        "torque test against back-EMF",
+        "2/sqrt(3)",
+    ):
         assert words in cards
     assert html.index('class="cards"') < html.index('id="constants"')
     sound = replace(datasheet, checks=(Check("kt_vs_ke", "pass", "holds", 1.0, 0.01, "1"),))
