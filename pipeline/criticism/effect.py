@@ -338,8 +338,8 @@ class Operating(Samples):
         -----
         The torque of a free shaft is given by the second difference of its angle, which is a mean
         under a triangle of two samples: sinc² of half the angle that the wave turns in one sample.
-        Of a coasting shaft that mean is taken over `finer` points a sample, each the mean of its
-        own part, else a wave that turns many times from point to point would alias.
+        Where that mean is taken over `finer` points a sample, each has the mean of its own part:
+        a wave that turns many times from point to point would alias.
 
         """
         name = ("shaft", order, self.shaft.held)
@@ -347,9 +347,9 @@ class Operating(Samples):
         return waves
 
     def _turned(self, order: int) -> tuple[Array, Array]:
-        angle = order * self.theta_rad
-        power = 2 if self.inverter else 1
-        if self.shaft.held or (power == 1 and self.shaft.finer == 1) or angle.size < _NEIGHBOURS:
+        angle, finer = order * self.theta_rad, self.shaft.finer > 1
+        power = 1 if finer else 2
+        if self.shaft.held or not (self.inverter or finer) or angle.size < _NEIGHBOURS:
             return np.cos(angle), np.sin(angle)
         seen = np.sinc(np.gradient(angle) / (2.0 * math.pi)) ** power
         return seen * np.cos(angle), seen * np.sin(angle)
@@ -378,7 +378,7 @@ class Operating(Samples):
         return replace(
             self,
             **samples,
-            shaft=replace(self.shaft, run=run),
+            shaft=replace(self.shaft, run=run, finer=1),
             supply=replace(self.supply, volts_v=None),
             psi_wb=None,
             torque_em_nm=None,

@@ -94,7 +94,8 @@ def record(
         Source of gains, noise and start angle.
     protocol
         Fields of the test's dataclass in `protocols`; `changed`: constants of the motor [units of
-        `design.Motor`] that are others in this capture, such as a magnet that has lost flux.
+        `design.Motor`] that are others in this capture, such as a magnet that has lost flux;
+        `changed_from`: of a torque map or a drive the share of the capture [1] from which on.
 
     Returns
     -------
@@ -111,9 +112,14 @@ def record(
     """
     if test not in _TESTS:
         raise ValueError(f"no test {test}; there are {', '.join(_TESTS)}")
-    motor = replace(motor, **protocol.pop("changed", {}))
+    other = replace(motor, **protocol.pop("changed", {}))
+    since = protocol.pop("changed_from", 0.0)
+    if since > 0.0 and test not in ("torque_map", "drive"):
+        raise ValueError(f"nothing changes within a {test}")
+    motor = motor if since > 0.0 else other
     how = PROTOCOLS[test](**protocol)
-    session = Session(motor, plant_of(motor), bench, bench.drawn(rng), rng)
+    plants = plant_of(motor), plant_of(other)
+    session = Session(motor, plants[0], bench, bench.drawn(rng), rng, plants[1], since)
     recording = _TESTS[test](session, how)
     if bench.temperature_hz is None:
         return recording

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.simulator.field import SQRT3, current, magnet, torque_of
-from pipeline.simulator.motion import bristle_after, coupling, extra, heat, passive
+from pipeline.simulator.motion import bristle_after, coupling, dragged, extra, heat, passive
 from pipeline.simulator.plant import Plant
 
 HISTORY = 256
@@ -77,6 +77,7 @@ class Control(NamedTuple):
     angle_offset: float
     angle_wobble: float
     angle_wobble_phase: float
+    angle_play: float
     lsb_angle: float
     speed_lag_s: float
     ambient: float
@@ -88,7 +89,7 @@ class Control(NamedTuple):
 
 @njit(cache=True)
 def phase_drop(i: float, p: Plant) -> float:
-    """Voltage that dead time and switches take from one phase.
+    """Voltage that dead time and switches take from one phase, less what a compensation gives back.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def phase_drop(i: float, p: Plant) -> float:
     Returns
     -------
     float
-        V_d i/√(i² + i_knee²) [V], of the sign of the current.
+        V_d i/√(i² + i_knee²) − V_c clip(i/i_ramp, ±1) [V].
 
     References
     ----------
@@ -108,7 +109,8 @@ def phase_drop(i: float, p: Plant) -> float:
     doi:10.1109/41.88903.
 
     """
-    return float(p.dead_v) * i / math.sqrt(i * i + p.dead_knee_a * p.dead_knee_a)
+    given = p.given_v * min(max(i / p.given_ramp_a, -1.0), 1.0)
+    return float(p.dead_v * i / math.sqrt(i * i + p.dead_knee_a * p.dead_knee_a) - given)
 
 
 @njit(cache=True)
@@ -470,7 +472,7 @@ def run_on(
 
 
 @njit(cache=True)
-def drive(reference: Array, noise: Array, c: Control, p: Plant) -> Array:
+def drive(reference: Array, noise: Array, c: Control, p: Plant, later: Plant, change: int) -> Array:
     """Field-oriented control over some periods.
 
     Parameters
@@ -484,6 +486,8 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant) -> Array:
         Controller, inverter and sensors.
     p
         The plant.
+    later, change
+        The plant from that period on; `p` again where nothing changes.
 
     Returns
     -------
@@ -500,8 +504,10 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant) -> Array:
     start = sensed_angle(c.theta, 0.0, c)
     volt = command(loop, (0.0, 0.0), c.pole_pairs * start, c.omega, np.zeros(4), c)
     loop[:] = 0.0
-    omega, before = c.omega, start
+    omega, before, carried = c.omega, start, c.theta
     for k in range(reference.shape[0]):
+        if k == change:
+            p = later
         want, copper = reference[k], work[1]
         newest = run_on(y, work, volt, want, warm, c.substeps_before, history, newest, c, p)
         true = stator_current(y, warm[1], p)
@@ -509,7 +515,8 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant) -> Array:
         if c.delay_s > 0.0:
             late = remembered(history, newest, min(delay, max(0.0, newest - 1.001)))
         seen = sensed_current(late, noise[k], c)
-        angle = sensed_angle(y[2], noise[k, 3], c)
+        carried = dragged(carried, y[2], 0.5 * c.angle_play)
+        angle = sensed_angle(carried, noise[k, 3], c)
         if k > 0:
             omega += blend * ((angle - before) / c.period_s - omega)
         before = angle

@@ -121,6 +121,7 @@ def _in_the_loop(session: Session) -> dict[str, float]:
         "angle_offset": session.fault("angle_offset") / session.motor.pole_pairs,
         "angle_wobble": session.fault("angle_eccentricity"),
         "angle_wobble_phase": session.fault("angle_eccentricity", "phase_rad"),
+        "angle_play": session.bench.encoder_play_rad,
         "lsb_angle": 2.0 * math.pi / 2.0**session.bench.encoder_bits,
         "speed_lag_s": session.bench.speed_lag_s,
     }
@@ -207,7 +208,8 @@ def torque_map(session: Session, how: protocols.TorqueMap) -> Recording:
     stiff = width * m.j_rotor_kgm2
     dyno = {"dyno_nms": stiff, "dyno_nm": 0.25 * width * stiff}
     loop = control(session, 1.0 / pwm_hz, how.voltage_timing, omega, warm, **dyno)
-    rows = drive(reference, loop_noise(session, i_d.size, 1.0 / pwm_hz), loop, session.plant)
+    noise = loop_noise(session, i_d.size, 1.0 / pwm_hz)
+    rows = drive(reference, noise, loop, session.plant, *session.then(i_d.size))
     meta = _meta(session, "torque_map", how.voltage_timing, pwm_hz)
     return Recording("torque_map", meta, (log(session, rows, 1.0 / pwm_hz),))
 
@@ -259,6 +261,6 @@ def drive(session: Session, how: protocols.Drive) -> Recording:
         ki_speed=0.25 * width * kp,
     )
     noise = loop_noise(session, reference.shape[0], 1.0 / pwm_hz)
-    rows = converter.drive(reference, noise, loop, session.plant)
+    rows = converter.drive(reference, noise, loop, session.plant, *session.then(len(reference)))
     meta = _meta(session, "drive", how.voltage_timing, pwm_hz)
     return Recording("drive", meta, (log(session, rows, 1.0 / pwm_hz),))

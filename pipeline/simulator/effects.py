@@ -74,8 +74,14 @@ FORMS: dict[str, Form] = {
     ),
     "dead_time": Form(
         "V",
-        "each phase loses size * i/sqrt(i² + knee_a²)",
-        lambda m: {"size": 0.005 * m.vdc_v, "knee_a": 0.01 * m.current_rated_a},
+        "each phase loses size * i/sqrt(i² + knee_a²), of which a compensation gives back its "
+        "share `compensated`, in proportion to i up to ramp_a and in full beyond",
+        lambda m: {
+            "size": 0.005 * m.vdc_v,
+            "knee_a": 0.01 * m.current_rated_a,
+            "compensated": 0.0,
+            "ramp_a": 0.1 * m.current_rated_a,
+        },
     ),
     "voltage_scale": Form("1", "recorded voltages times 1 + size", lambda _: {"size": 0.02}),
     "sample_delay": Form(

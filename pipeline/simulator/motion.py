@@ -468,6 +468,43 @@ def warmed(watt_25: Array, start: tuple[float, float], ambient: float, h: float,
 
 
 @njit(cache=True)
+def dragged(carried: float, theta: float, half_gap: float) -> float:
+    """Angle [rad] of what a shaft drags along by a pin in a slot.
+
+    Parameters
+    ----------
+    carried
+        Its angle so far [rad].
+    theta
+        Angle of the shaft [rad].
+    half_gap
+        Play to either side [rad].
+
+    Returns
+    -------
+    float
+        The nearest angle to `carried` within the slot.
+
+    References
+    ----------
+    Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer, 1989 (play operator).
+
+    """
+    return min(max(carried, theta - half_gap), theta + half_gap)
+
+
+@njit(cache=True)
+def played(x: Array, half_gap: float) -> Array:
+    """What a signal [n] drags along by a slot of `half_gap` to either side, from its middle on."""
+    out = np.empty(x.size)
+    carried = x[0]
+    for n in range(x.size):
+        carried = dragged(carried, x[n], half_gap)
+        out[n] = carried
+    return out
+
+
+@njit(cache=True)
 def lagged(x: Array, blend: float) -> Array:
     """First-order lag [n] that starts settled: y += blend (x - y)."""
     out = np.empty(x.size)

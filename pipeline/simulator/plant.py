@@ -13,7 +13,8 @@ from pipeline.simulator.effects import active, cogging_order
 
 NUMBERS = """
     pole_pairs r_a_ohm r_b_ohm r_c_ohm alpha_copper skin skin_knee omega_elec_rated dead_v
-    dead_knee_a psi_wb alpha_magnet h5 h7 h11 h13 p5 p7 p11 p13 ld_h lq_h nu_d nu_q nu_phase
+    dead_knee_a given_v given_ramp_a psi_wb alpha_magnet h5 h7 h11 h13 p5 p7 p11 p13 ld_h
+    lq_h nu_d nu_q nu_phase
     sat_form sat_exponent sat_psi_q sat_q sat_d x0_wb cross j_rotor j_load stiffness damping
     half_gap b_visc coulomb stribeck stribeck_w windage windage_exponent omega_rated omega_eps
     load_friction bristle eddy eddy_knee hysteresis unbalance unbalance_phase rth_wa rth_wm
@@ -122,6 +123,8 @@ def _resistive(motor: Motor, on: dict[str, dict[str, float]]) -> dict[str, float
         "skin_knee": skin.get("knee", 1.0),
         "dead_v": dead.get("size", 0.0),
         "dead_knee_a": dead.get("knee_a", 1.0),
+        "given_v": dead.get("compensated", 0.0) * dead.get("size", 0.0),
+        "given_ramp_a": dead.get("ramp_a", 1.0),
     }
 
 

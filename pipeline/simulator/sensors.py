@@ -90,13 +90,22 @@ def late(signal: Array, t_s: Array, delay_s: float) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """One motor on one station with its instruments as they really are, and its randomness."""
+    """One motor on one station with its instruments as they really are, and its randomness.
+
+    `later`: the plant that it is from the share `since` of a capture on.
+    """
 
     motor: Motor
     plant: Plant
     bench: Bench
     instruments: Instruments
     rng: np.random.Generator
+    later: Plant | None = None
+    since: float = 0.0
+
+    def then(self, n: int) -> tuple[Plant, int]:
+        """The plant that the motor is later in a capture of `n` periods, and the period of that."""
+        return (self.plant, 0) if self.later is None else (self.later, round(self.since * n))
 
     def fault(self, name: str, key: str = "size") -> float:
         """Parameter of a sensor effect, 0 where the effect is absent."""
@@ -214,7 +223,11 @@ class Session:
 
     def angle(self, theta: Array) -> Array:
         """Mechanical angle [n] by the encoder, with its faults."""
+        from pipeline.simulator.motion import played
+
         bench = self.bench
+        if bench.encoder_play_rad > 0.0:
+            theta = played(np.ascontiguousarray(theta), 0.5 * bench.encoder_play_rad)
         seen = theta + self.fault("angle_offset") / self.motor.pole_pairs
         wobble = self.fault("angle_eccentricity")
         if wobble != 0.0:
@@ -236,6 +249,7 @@ class Session:
 
     def torque(self, torque: Array, t_s: Array) -> Array:
         """Shaft torque [n] by the transducer, with lag, gain, offset."""
+        torque = self._strained(torque)
         lag = self.fault("torque_lag")
         if lag > 0.0 and torque.size > 1:
             torque = first_order_lag(torque, (t_s[1] - t_s[0]) / lag)
@@ -244,6 +258,22 @@ class Session:
         sigma = self.bench.torque_noise_rel * self.motor.torque_rated_nm
         seen = gain * torque + self.fault("torque_offset") + self.noise(torque.size, sigma, t_s)
         return to_grid(seen, grid(8.0 * self.motor.torque_rated_nm, self.bench.adc_bits))
+
+    def _strained(self, torque: Array) -> Array:
+        """What a transducer's body makes of a torque [n, N·m]: it bends, and lags behind its past.
+
+        The hysteresis is that of one play operator of a quarter of rated torque to either side.
+        """
+        from pipeline.simulator.motion import played
+
+        bench, rated = self.bench, self.motor.torque_rated_nm
+        bent = torque + bench.torque_bend_rel * torque**3 / rated**2
+        if bench.torque_hysteresis_rel == 0.0:
+            return bent
+        half = 0.25 * rated
+        behind = torque - played(np.ascontiguousarray(torque), half)
+        lost: Array = bent - 0.5 * bench.torque_hysteresis_rel * rated * behind / half
+        return lost
 
     def temperature(self, degc: Array) -> Array:
         """A thermometer [n] with its offset."""

@@ -7,11 +7,12 @@ import numpy as np
 from pipeline.criticism.data.drive_log import DriveLog
 from pipeline.criticism.data.segment import slow_orders
 from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.policy.captures import Cutting
 from pipeline.numerics.weak_rows import WeakRows, smooth_speed, weak_rows
 
 
 def runs_free(log: DriveLog, machine: Machine) -> bool:
-    """Whether current and drags alone explain how the shaft of a log moves.
+    """Whether current and drags alone explain how the shaft of a log moves, of one mass or two.
 
     Parameters
     ----------
@@ -31,7 +32,7 @@ def runs_free(log: DriveLog, machine: Machine) -> bool:
 
 
 def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
-    """Power of the acceleration that neither current nor drags explain.
+    """Power of the acceleration that neither current nor drags explain, nor a spring in the shaft.
 
     Parameters
     ----------
@@ -52,11 +53,13 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
     against speed, a constant, and waves of the angle. A torque that no column has is left in the
     residual; where a speed loop works against it, the current goes with it and its coefficient is
     too small. So what is left, its noise taken out, over what the current makes bounds the
-    relative error of 1/J.
+    relative error of 1/J. With the second derivative of i_q and the fourth of the angle it is that
+    of two masses and a spring, where the coefficients are such.
 
     References
     ----------
     Fuller, Measurement Error Models, 1987, 1.1 (attenuation).
+    Ellis and Lorenz, IEEE Ind. Appl. Conf., 2000 (resonant loads).
 
     """
     theta = log.columns["theta_mech_rad"]
@@ -76,16 +79,45 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
         elif group is others[0]:
             return None
     columns = np.column_stack(chosen)[whole]
-    size = np.sqrt((columns**2).sum(axis=0))
-    columns = columns / np.where(size > policy.load_rounding * size.max(), size, np.inf)
     target = weak.integral(theta, order=2)[whole]
-    found, _, rank, _ = np.linalg.lstsq(columns, target, rcond=policy.load_rounding)
-    left = target - columns @ found
-    made = columns[:, : len(driven)] @ found[: len(driven)]
     noise = log.sensors.noise["theta_mech_rad"] * weak.noise_gain(2)
-    power = float(left @ left) / (target.size - int(rank)) - noise**2
+    found, left, rank = _regressed(columns, target, policy)
+    if len(chosen) + 2 <= most:
+        soft = np.column_stack([columns, np.column_stack(_spring(log, weak))[whole]])
+        sprung = _regressed(soft, target, policy)
+        of_current, of_bend, of_fourth = sprung[0][[0, -2, -1]].tolist()
+        if _two_masses(of_current, of_bend, of_fourth, policy):
+            found, left, rank = sprung
+    made = columns[:, : len(driven)] @ found[: len(driven)]
+    power = float(left @ left) / (target.size - rank) - noise**2
     share: float = max(power, 0.0) / max(float(np.mean(made**2)), 1e-300)
     return share
+
+
+def _regressed(columns: Array, target: Array, policy: Cutting) -> tuple[Array, Array, int]:
+    """Coefficients [k] of columns [w, k], what they leave of a target [w], and their rank."""
+    size = np.sqrt((columns**2).sum(axis=0))
+    size = np.where(size > policy.load_rounding * size.max(), size, np.inf)
+    scaled = columns / size
+    found, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=policy.load_rounding)
+    return found / size, target - scaled @ found, int(rank)
+
+
+def _spring(log: DriveLog, weak: WeakRows) -> list[Array]:
+    """Window means [w] of what a spring between two masses adds: d²i_q/dt² and d⁴θ/dt⁴."""
+    bend = np.pad(np.diff(log.columns["theta_mech_rad"], 2), 1) / log.period_s**2
+    return [weak.integral(log.columns["iq_a"], order=2), weak.integral(bend, order=2)]
+
+
+def _two_masses(of_current: float, of_bend: float, of_fourth: float, policy: Cutting) -> bool:
+    """Whether coefficients of i_q, its second derivative and the angle's fourth are a spring's.
+
+    θ″ + θ⁗/ω² = K (i_q + i_q″/ω_a²) + ..., with the share 1 − ω_a²/ω² of the inertia at the far
+    end. A load that only pulsates has ω = ω_a.
+    """
+    soft = of_bend / of_current if of_current else 0.0
+    share = 1.0 + of_fourth / soft if soft > 0.0 else 0.0
+    return policy.spring_shares[0] < share < policy.spring_shares[1]
 
 
 def _columns(

@@ -23,13 +23,11 @@ from pipeline.criticism.data.traces import (
 )
 from pipeline.criticism.effect import Array, Complex, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
-from pipeline.criticism.machine.model import STATE, Model, Pieces, ripple
+from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.signals.shaft import (
-    TORQUE_RIPPLES,
-    moved_on,
     net_torque,
     sensed_torque,
-    torque_of_current,
+    torque_between,
     torque_reading,
     true_load,
 )
@@ -194,9 +192,7 @@ def predicted(
     voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)
     rows = [voltage.real, voltage.imag]
     if TORQUE in segment.channels:
-        torque = net_torque(x, pieces)
-        if any(values[name] for name in TORQUE_RIPPLES):
-            torque = torque + _between(segment, x, pieces, values)
+        torque = net_torque(x, pieces) + torque_between(segment, x, pieces, values)
         rows.append(sensed_torque(segment, x, torque, model, values))
     return np.stack(rows)
 
@@ -246,19 +242,6 @@ def _pace(
     """Electrical speed [n, rad/s], and what it turns [n, rad] while a voltage vector is held."""
     turn = x.machine.pole_pairs * x.omega_rad_s * x.supply.hold_s
     return difference(x.machine.pole_pairs * x.theta_rad, segment.ts_s), turn
-
-
-def _between(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> Array:
-    """Torque [n, N·m] of what current and flux do between samples.
-
-    The current moves on for a part of a period; and while a held voltage turns, both are off their
-    means. A free shaft responds to sample-period means; a locked shaft's transducer has a
-    nuisance parameter of its own.
-    """
-    flux, current = ripple(x, values["ripple_held" if x.shaft.held else "ripple_mean"], values)
-    torque = torque_of_current(x, pieces, moved_on(segment, x, values) - current)
-    less: Array = 1.5 * x.machine.pole_pairs * (np.conj(flux) * x.i_a).imag
-    return torque - less
 
 
 def _reading(segment: Segment, channel: str, model: Model, values: Values) -> Array:

@@ -93,7 +93,7 @@ def state(
     motion = motion_of(segment, signals, model.machine)
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     x = operating(segment, signals, model, values, current, motion)
-    return at_true_angle(segment, x, model, values)
+    return at_true_angle(segment, x.fed(), model, values)
 
 
 def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:

@@ -14,9 +14,8 @@ from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
 from pipeline.criticism.signals.shaft import (
-    moved_on,
     net_torque,
-    torque_of_current,
+    torque_between,
     torque_reading,
     unexplained_acceleration,
 )
@@ -32,8 +31,6 @@ from pipeline.records.capture import Capture
 
 TORQUE, RECORDER = "torque_shaft_nm", "log"
 _USED = ("theta_mech_rad", "iq_a", "id_a", "travel_rad", "run", "temp_magnet_degc")
-_PAD = 8
-"""Samples kept at either side: the angle's second difference needs a few beyond a window."""
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
@@ -60,7 +57,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     shaft["row"] = np.arange(log.keep.size, dtype=float)
     policy = machine.policy.cutting
     window = window_of(log.period_s, log.keep.size, policy)
-    shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion, _PAD)
+    shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     blocks = in_time(shaft.pop("row")[starts + window // 2], log.keep.size)
     return segment_of(
@@ -84,7 +81,9 @@ def state(
     motion = motion_of(segment, signals, model.machine, finer)
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     x = operating(segment, signals, model, values, current, motion)
-    return at_true_angle(segment, x, model, values)
+    # a vector that turns while it is held ripples; the current of one axis does not
+    hold_s = x.supply.hold_s if "id_a" in signals else 0.0
+    return at_true_angle(segment, x.fed(hold_s=hold_s), model, values)
 
 
 def measured(segment: Segment, _: Mapping[str, Array], __: Model, ___: Values) -> Array:
@@ -117,12 +116,13 @@ def predicted(
 
     Notes
     -----
-    (1.5 p [Im(ψ* i) + ∂W/∂ε] − drags)/J − d²θ/dt², of a shaft without any load; with the current a
-    part of a sample period on.
+    (1.5 p [Im(ψ* i) + ∂W/∂ε] − drags)/J − d²θ/dt², of a shaft without any load; with what current
+    and flux do between samples. With a spring between two masses its drag is −f J twist″
+    (`machine.two_masses`).
 
     """
     stretch = 1.0 + clock_gain(RECORDER, model, values)
-    torque = net_torque(x, pieces) + torque_of_current(x, pieces, moved_on(segment, x, values))
+    torque = net_torque(x, pieces) + torque_between(segment, x, pieces, values)
     return unexplained_acceleration(segment, x, torque, values, stretch)[None]
 
 
@@ -142,7 +142,10 @@ EQUATION = Equation(
     measured=measured,
     predicted=predicted,
     observes=Observes(
-        ("ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad", "ripple_torque", *STATE),
+        (
+            *("ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad"),
+            *("ripple_mean", "ripple_torque", *STATE),
+        ),
         hooks=frozenset({"flux", "torque"}),
         sensors=frozenset({"angle", "current", "clock"}),
         form="affine",

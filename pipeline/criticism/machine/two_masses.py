@@ -41,14 +41,14 @@ def passed_on(x: Operating, share: float) -> Array:
     Parameters
     ----------
     x
-        State of the machine, with its torque [n, N·m] and angle [n, rad].
+        State of the machine, with its torque [N·m] and angle [rad] at one or more points a sample.
     share
         Of the inertia that is at the far end [1].
 
     Returns
     -------
     array [n, N·m]
-        S = T − (1 − share) J θ″; 0 at either end, where the means do not reach.
+        S = T − (1 − share) J θ″ at the samples; 0 at either end, where the means do not reach.
 
     Notes
     -----
@@ -60,8 +60,22 @@ def passed_on(x: Operating, share: float) -> Array:
     J. W. Tukey, Exploratory Data Analysis, Addison-Wesley, 1977, ch. 16 (twicing).
 
     """
+    torque, theta = _sampled(x)
     near = (1.0 - share) * x.base["j_kgm2"]
-    return _smoothed(x, x.torque_nm[1:-1] - near * np.diff(x.theta_rad, 2) / x.ts_s**2)
+    return _smoothed(x, torque[1:-1] - near * np.diff(theta, 2) / x.ts_s**2)
+
+
+def _sampled(x: Operating) -> tuple[Array, Array]:
+    """Torque [N·m] and angle [rad] at the samples alone [n] of a state of more points."""
+    finer = x.shaft.finer
+    return x.torque_nm[::finer], x.theta_rad[::finer]
+
+
+def _at_points(x: Operating, signal: Array) -> Array:
+    """A signal of the samples at all points of a state, on straight lines."""
+    finer = x.shaft.finer
+    at = np.arange(signal.size * finer) / finer
+    return np.interp(at, np.arange(signal.size), signal) if finer > 1 else signal
 
 
 def _smoothed(x: Operating, inner: Array) -> Array:
@@ -72,11 +86,11 @@ def _smoothed(x: Operating, inner: Array) -> Array:
     box = np.full(block, 1.0 / block)
     smooth = np.convolve(np.convolve(box, box), box)
     kernel = 2.0 * np.pad(smooth, smooth.size // 2) - np.convolve(smooth, smooth)
-    found = np.zeros(x.theta_rad.size)
+    found = np.zeros(inner.size + 2)
     if found.size < kernel.size + 2:
         return found
     first = kernel.size // 2 + 1
-    found[first : x.theta_rad.size - first] = np.convolve(inner, kernel, mode="valid")
+    found[first : found.size - first] = np.convolve(inner, kernel, mode="valid")
     return found
 
 
@@ -92,7 +106,7 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
 
     Returns
     -------
-    array [n, N·m]
+    array [n·m, N·m]
         −f J twist″ = −(torque_s2 T″ − angle_s2 J0 θ⁗); 0 of a shaft that no inverter drives.
 
     Notes
@@ -101,14 +115,13 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
     has, and that at the right inertia.
 
     """
-    drag = np.zeros(x.theta_rad.size)
     if not x.inverter:
-        return drag
-    bend = np.diff(x.theta_rad, 2) / x.ts_s**2
+        return np.zeros(x.theta_rad.size)
+    torque, theta = _sampled(x)
+    bend = np.diff(theta, 2) / x.ts_s**2
     bent = q["angle_s2"] * inertia_scale(x.machine)
-    made = q["torque_s2"] * x.torque_nm[1:-1] - bent * bend
-    drag[1:-1] = -np.diff(_smoothed(x, made), 2) / x.ts_s**2
-    return drag
+    made = _smoothed(x, q["torque_s2"] * torque[1:-1] - bent * bend)
+    return _at_points(x, -np.pad(np.diff(made, 2), 1) / x.ts_s**2)
 
 
 def inertia_scale(machine: Machine) -> float:
@@ -213,13 +226,13 @@ def far_drag(x: Operating, share: float, between: float, twist_rad: Callable[[],
     between
         1: the transducer stands between the two parts, and so reads S. 0: it is beyond them, and a
         dynamometer that holds the far end reads S too. −1: that dynamometer gives way, and what
-        it reads has the far part's inertia in it.
+        it reads has the far part's inertia in it. Without a transducer the far end is free.
     twist_rad
-        Gives the twist [n, rad] where it is needed.
+        Gives the twist [n, rad] at the samples where it is needed.
 
     Returns
     -------
-    array [n, N·m]
+    array [n·m, N·m]
         −share J θ″ or −share J twist″; 0 of a shaft that no inverter drives.
 
     Notes
@@ -230,11 +243,9 @@ def far_drag(x: Operating, share: float, between: float, twist_rad: Callable[[],
     if not x.inverter:
         return np.zeros(np.shape(x.omega_rad_s))
     far = share * x.base["j_kgm2"]
-    rigid = between > 0.0 or (between == 0.0 and x.shaft.held)
-    moved = x.theta_rad if rigid else twist_rad()
-    drag = np.zeros(x.theta_rad.size)
-    drag[1:-1] = -far / x.ts_s**2 * np.diff(moved, 2)
-    return drag
+    rigid = not x.shaft.alone and (between > 0.0 or (between == 0.0 and x.shaft.held))
+    moved = x.theta_rad[:: x.shaft.finer] if rigid else twist_rad()
+    return _at_points(x, -far / x.ts_s**2 * np.pad(np.diff(moved, 2), 1))
 
 
 def side_of(through_nm: Array, least_nm: float) -> Array:

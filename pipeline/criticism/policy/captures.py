@@ -148,6 +148,10 @@ class Cutting:
         on="free shafts, which leave 0.002 at most, and loads of a third of rated torque, which "
         "leave 0.09 to 2",
     )  # fmt: skip
+    spring_shares: tuple[float, float] = derived(
+        (0.03, 0.95), "1", "shares of the inertia behind a spring between which it is one",
+        source="the negligible size and the bound of `compliance`",
+    )  # fmt: skip
     load_windows: int = derived(
         2, "windows", "windows a column of that regression at the least",
         source="of two, one shares no sample with another",

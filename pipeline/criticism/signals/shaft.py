@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Complex, Operating, Recorded, Values
-from pipeline.criticism.machine.model import Model, Pieces, air_gap_torque, values_of
+from pipeline.criticism.machine.model import Model, Pieces, air_gap_torque, ripple, values_of
 from pipeline.criticism.signals.true_state import ahead_in
 from pipeline.criticism.signals.voltage import central
 
@@ -60,7 +60,22 @@ def torque_reading(segment: Segment, model: Model, values: Values) -> Array:
     return torque
 
 
-def moved_on(segment: Segment, x: Operating, values: Values) -> Complex:
+def torque_between(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> Array:
+    """Torque [n, N·m] of what current and flux do between samples.
+
+    The current moves on for a part of a period; and while a held voltage turns, both are off their
+    means. A free shaft responds to sample-period means; a locked shaft's transducer has a
+    nuisance parameter of its own.
+    """
+    if not any(values[name] for name in TORQUE_RIPPLES):
+        return np.zeros(x.theta_rad.size)
+    flux, current = ripple(x, values["ripple_held" if x.shaft.held else "ripple_mean"], values)
+    torque = _torque_of_current(x, pieces, _moved_on(segment, x, values) - current)
+    less: Array = 1.5 * x.machine.pole_pairs * (np.conj(flux) * x.i_a).imag
+    return torque - less
+
+
+def _moved_on(segment: Segment, x: Operating, values: Values) -> Complex:
     """Change of the current within a part of a sample period.
 
     Parameters
@@ -87,7 +102,7 @@ def moved_on(segment: Segment, x: Operating, values: Values) -> Complex:
     return current
 
 
-def torque_of_current(x: Operating, pieces: Pieces, current: Complex) -> Array:
+def _torque_of_current(x: Operating, pieces: Pieces, current: Complex) -> Array:
     """Torque of a small further current at the same flux.
 
     Parameters

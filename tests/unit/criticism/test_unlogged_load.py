@@ -19,7 +19,7 @@ from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import campaign
-from pipeline.simulator.design import EXACT, Bench
+from pipeline.simulator.design import EXACT, Bench, Motor
 from pipeline.simulator.truth import truth
 from tests.simulated import campaign_of, design
 
@@ -34,8 +34,8 @@ MACHINE = Machine(3, 9, SCALES)
 UNEXPLAINED = MACHINE.policy.cutting.unexplained_share
 
 
-def driven(how: dict[str, float], keep: Collection[str] = AXES) -> Campaign:
-    whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), 2, (("d", "drive", how),)))
+def driven(how: dict[str, float], keep: Collection[str] = AXES, motor: Motor = MOTOR) -> Campaign:
+    whole = campaign_of(campaign(motor, Bench(instruments=EXACT), 2, (("d", "drive", how),)))
     (one,) = whole.captures
     tables = (t.select([n for n in t.columns if n in {"t_s", *keep}]) for t in one.tables)
     return replace(whole, captures=(replace(one, tables=tuple(tables)),))
@@ -90,6 +90,28 @@ def load(i: float, _: float, t: float) -> float:
 def test_waves_of_the_angle_are_no_load_and_steps_in_time_are():
     assert unexplained_share(turned(cogging), MACHINE) < UNEXPLAINED
     assert unexplained_share(turned(load), MACHINE) > 4 * UNEXPLAINED
+
+
+def pulsating(i: float, _: float, t: float) -> float:
+    return 50.0 * (i + 0.5 * np.sin(70.0 * t))
+
+
+def test_a_load_that_pulsates_is_no_spring():
+    """Of one frequency its fourth derivative is a multiple of its second, as a spring's is not."""
+    assert unexplained_share(turned(pulsating), MACHINE) > 4 * UNEXPLAINED
+
+
+def sprung(hertz: float, share: float) -> Motor:
+    """The motor with a share of its inertia behind a spring, by the resonance of both parts."""
+    stiff = J * share * (1.0 - share) * (2.0 * np.pi * hertz) ** 2
+    return MOTOR.having(compliance={"size": 1.0 / stiff, "load_fraction": share})
+
+
+@pytest.mark.parametrize(("hertz", "part"), [(35.0, 0.6), (17.0, 0.3)])
+def test_a_spring_in_the_shaft_is_no_load_and_hides_none(hertz, part):
+    motor = sprung(hertz, part)
+    assert share(driven(FREE, motor=motor)) < UNEXPLAINED / 4
+    assert share(driven(LOADED, motor=motor)) > 4 * UNEXPLAINED
 
 
 def test_a_shaft_that_stands_or_a_log_of_a_moment_says_nothing():

@@ -44,6 +44,7 @@ def loop(motor, period_s=5e-5, **change):
         "angle_offset": 0.0,
         "angle_wobble": 0.0,
         "angle_wobble_phase": 0.0,
+        "angle_play": 0.0,
         "lsb_angle": 0.0,
         "speed_lag_s": 5e-4,
         "ambient": 25.0,
@@ -82,7 +83,7 @@ def test_energy_in_is_heat_plus_field_plus_motion(effects):
     want = np.zeros((n, 4))
     want[:, 0] = -3.0
     want[:, 1] = np.where(np.arange(n) // 300 % 2 == 0, 3.0, -2.0)
-    rows = converter.drive(want, np.zeros((n, 4)), loop(motor), plant)
+    rows = converter.drive(want, np.zeros((n, 4)), loop(motor), plant, plant, 0)
     theta, omega = rows[:, AT["theta"]], rows[:, AT["omega"]]
     eps = motor.pole_pairs * theta
     psi = (rows[:, AT["psi_alpha"]] + 1j * rows[:, AT["psi_beta"]]) * np.exp(-1j * eps)
@@ -105,7 +106,8 @@ def test_steady_state_is_the_voltage_equation():
     n, omega = 3000, 100.0
     want = np.tile([-2.0, 5.0, 0.0, omega], (n, 1))
     c = loop(motor, held_speed=True, omega=omega)
-    rows = converter.drive(want, np.zeros((n, 4)), c, plant_of(motor))[-1]
+    plant = plant_of(motor)
+    rows = converter.drive(want, np.zeros((n, 4)), c, plant, plant, 0)[-1]
     turn = np.exp(-1j * motor.pole_pairs * rows[AT["theta"]])
     v = complex(rows[AT["v_alpha"]], rows[AT["v_beta"]]) * turn
     i = complex(rows[AT["i_alpha_true"]], rows[AT["i_beta_true"]]) * turn
@@ -132,7 +134,8 @@ def test_logged_voltage_makes_the_flux_change_that_its_timing_says(before, right
     motor = design("gimbal-5208").having(cogging=0.0, copper_temperature=0.0)
     want = np.tile([0.0, 4.0, 0.0, 150.0], (400, 1))
     c = loop(motor, held_speed=True, omega=150.0, substeps_before=before)
-    rows = converter.drive(want, np.zeros((400, 4)), c, plant_of(motor))
+    plant = plant_of(motor)
+    rows = converter.drive(want, np.zeros((400, 4)), c, plant, plant, 0)
     psi = rows[:, AT["psi_alpha"]] + 1j * rows[:, AT["psi_beta"]]
     v = rows[:, AT["v_alpha"]] + 1j * rows[:, AT["v_beta"]]
     i = rows[:, AT["i_alpha_true"]] + 1j * rows[:, AT["i_beta_true"]]

@@ -1,0 +1,125 @@
+"""A spring between two masses, from the angle and the current of a free shaft alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.diagnosis import base_fit
+from pipeline.criticism.effect import ShaftState
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.two_masses import far_drag, linear_far_drag, passed_on
+from pipeline.criticism.regression.goodness import significant_groups
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.linear_start import with_linear_start
+from pipeline.criticism.selection.score_test import Score, candidates, widened
+from pipeline.execution.tasks.start import start_constants
+from pipeline.records.comparison import ModelSpec
+from pipeline.simulator.bench import campaign
+from pipeline.simulator.design import Bench
+from pipeline.simulator.effects import parameters
+from tests.simulated import campaign_of, design
+from tests.unit.criticism.machines import operating
+
+MOTOR = replace(design("servo-15kw"), effects={})
+SOFT = {"load_fraction": 0.35, "damping_ratio": 0.02}
+PLAN = (
+    ("open_circuit", "open_circuit", {}),
+    ("drive_0", "drive", {"load": 0.0}),
+    ("drive_1", "drive", {"load": 0.0}),
+)
+
+
+@cache
+def base(coupled: bool) -> LinearSystem:
+    """The fit of a rigid shaft to logs of current, voltage and angle, of two masses or of one."""
+    motor = MOTOR.having(compliance=SOFT) if coupled else MOTOR
+    whole = campaign_of(campaign(motor, Bench(encoder_bits=15), 8, PLAN))
+    captures = [
+        replace(one, tables=tuple(t.drop("torque_shaft_nm", strict=False) for t in one.tables))
+        for one in whole.captures
+    ]
+    free = replace(whole, captures=tuple(captures))
+    fitted = base_fit(free, ModelSpec("standard"), start_constants(free))
+    assert not isinstance(fitted, str)
+    return fitted.system
+
+
+def coupling(system: LinearSystem) -> Score | None:
+    """The score of compliance, begun from its linear form."""
+    only = {"compliance": effects()["compliance"]}
+    offered = candidates(only, system.fit.model)
+    wide = widened(system.fit, offered)
+    return next(iter(with_linear_start(wide, offered, (), significant_groups(wide))), None)
+
+
+def test_the_motion_of_a_free_shaft_shows_share_and_stiffness():
+    score = coupling(base(coupled=True))
+    assert score is not None
+    assert score.passes
+    full = parameters("compliance", MOTOR, SOFT)
+    torque = base(coupled=True).fit.machine.scales["torque_nm"]
+    assert score.step["compliance.share"] == pytest.approx(0.35, abs=0.02)
+    twist = score.candidate.values["compliance.twist_rad"]
+    assert twist == pytest.approx(full["size"] * torque, rel=0.05)
+
+
+def test_a_rigid_shaft_has_none_and_is_at_its_floor():
+    system = base(coupled=False)
+    assert coupling(system) is None
+    assert not significant_groups(system).any()
+    assert system.fit.values["j_kgm2"] == pytest.approx(MOTOR.j_rotor_kgm2, rel=2e-3)
+
+
+def finer(x, points):
+    """A state of the same samples at some points each, on straight lines."""
+    at = np.arange(x.theta_rad.size * points) / points
+    places = np.arange(x.theta_rad.size)
+    fine = {
+        name: np.interp(at, places, getattr(x, name))
+        for name in ("theta_rad", "omega_rad_s", "torque_em_nm")
+    }
+    return replace(x, shaft=ShaftState(alone=True, finer=points), kept={}, **fine)
+
+
+def test_a_state_of_more_points_a_sample_has_the_same_coupling():
+    t = 1e-4 * np.arange(300)
+    x = replace(
+        operating(t.size),
+        theta_rad=20.0 * t + 1e-3 * np.sin(400.0 * t),
+        torque_em_nm=np.cos(300.0 * t),
+        ts_s=1e-4,
+        shaft=ShaftState(alone=True),
+    )
+    fine = finer(x, 3)
+    assert passed_on(fine, 0.4) == pytest.approx(passed_on(x, 0.4))
+    q = {"torque_s2": 1e-5, "angle_s2": 2e-5}
+    assert linear_far_drag(fine, q)[::3] == pytest.approx(linear_far_drag(x, q))
+    twist = 1e-4 * np.sin(350.0 * t)
+    assert far_drag(fine, 0.4, 1.0, lambda: twist)[::3] == pytest.approx(
+        far_drag(x, 0.4, 1.0, lambda: twist)
+    )
+
+
+def test_some_samples_of_it_are_a_state_of_their_own():
+    x = finer(replace(operating(60), torque_em_nm=np.ones(60)), 4)
+    some = x.at(np.arange(20))
+    some.torque_em_nm = np.ones(20)
+    assert passed_on(some, 0.4).size == 20
+
+
+def test_without_a_transducer_it_does_not_matter_where_one_would_stand():
+    t = 1e-4 * np.arange(300)
+    x = replace(operating(t.size), theta_rad=np.sin(90.0 * t), torque_em_nm=np.cos(300.0 * t))
+    alone = replace(x, shaft=ShaftState(alone=True))
+    q = {"share": 0.3, "twist_rad": 0.01, "damping_s": 0.0}
+    drags = [
+        effects()["compliance"].torque(alone, q | {"between": one}) for one in (1.0, 0.0, -1.0)
+    ]
+    assert drags[0] == pytest.approx(drags[2])
+    assert drags[1] == pytest.approx(drags[2])
+    between = effects()["compliance"].torque(x, q | {"between": 1.0})
+    assert np.abs(between - drags[2]).max() > 0.1 * np.abs(drags[2]).max()
