@@ -23,7 +23,7 @@ from pipeline.criticism.regression.linear_system import LinearSystem, linear_sys
 from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.selection.missing_data import at_ambient, loaded, unused
+from pipeline.criticism.selection.missing_data import at_ambient, loaded, mixed, unused
 from pipeline.criticism.selection.pruning import trimmed
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.validation.error_maps import all_maps
@@ -76,7 +76,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     asked = model_of(model, machine)
     names = tuple(effect.name for effect in asked.effects)
     if not found:
-        return _nothing(campaign, model, names, _IDLE)
+        return _nothing(campaign, model, names, *(mixed(campaign, machine) or (_IDLE,)))
     base = fit_of(found, asked)
     system = linear_system(trimmed(base.system, names).fit)
     held = leave_out(system)
@@ -95,6 +95,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         (
             *unused(campaign, system.segments),
             *loaded(campaign, machine),
+            *mixed(campaign, machine),
             *at_ambient(system.segments, system.fit.model),
             *against_stated(system, held),
             *hum_notes(base.hum),
@@ -109,9 +110,11 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     )
 
 
-def _nothing(campaign: Campaign, model: ModelSpec, names: tuple[str, ...], note: str) -> Comparison:
+def _nothing(
+    campaign: Campaign, model: ModelSpec, names: tuple[str, ...], *notes: str
+) -> Comparison:
     """No errors, and why there are none."""
-    return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), (note,))
+    return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), notes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import Ladder, SearchResult, search_ladder
 from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
-from pipeline.criticism.selection.missing_data import at_ambient, loaded, unexcited, unused
+from pipeline.criticism.selection.missing_data import at_ambient, loaded, mixed, unexcited, unused
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of, frame_notes
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
@@ -163,6 +163,7 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
         (
             *unused(campaign, found),
             *loaded(campaign, machine),
+            *mixed(campaign, machine),
             *at_ambient(found, last.fit.model),
             *against_stated(last, ladder.held[-1]),
             *hum_notes(ladder.base.hum),

@@ -117,6 +117,9 @@ class Machine:
         Other orders, whole numbers or not, that a fit left in logs under load.
     travel_turns
         How far the shaft turns in any one capture [turns].
+    pairs_known
+        Whether anything gives the pole pairs. Where not, they are taken as one, so that
+        a flux linkage is Ke, and one over speed or torque says nothing of the flux.
     stated
         Stated constants of the motor: value and standard uncertainty by the name of the parameter.
     policy
@@ -132,6 +135,7 @@ class Machine:
     encoder_rad: float = 0.0
     load_orders: tuple[float, ...] = ()
     travel_turns: float = math.inf
+    pairs_known: bool = True
     stated: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     policy: Policy = DEFAULT
 

@@ -26,6 +26,8 @@ _TRACED = ("torque_map", "drive", "heat_run")
 _TABLES = (*sorted(TESTS_WITHOUT_CLOCK), "holding_current")
 _SHAFT_ALONE = ("spin_down", "cogging")
 """Tests without a current, of which a winding's pole pairs say nothing."""
+_OF_AN_ANGLE = ("vd_v", *LINES_V, "va_v", "vb_v", "vc_v", "ia_a", "ib_a", "ic_a")
+"""What a turning winding shows by its electrical angle; q voltage, q current and torque do not."""
 _TURNING = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
 _LINES_A = ("ia_a", "ib_a", "ic_a")
 
@@ -51,15 +53,17 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
     Returns
     -------
     Machine or None
-        None where the shaft turned and nothing gives its pole pairs, without which no speed means
-        anything to a winding.
+        None where the shaft turned and nothing gives its pole pairs, without which no angle means
+        anything to both axes or the phases of a winding.
 
     """
     slots, stated = campaign.nameplate("slots"), stated_u(campaign.captures)
     pole_pairs = pole_pairs_of(campaign, start)
+    counted = pole_pairs is not None
     if pole_pairs is None:
         electric = [c for c in campaign.captures if c.meta.test not in _SHAFT_ALONE]
-        if any(capture.has(name) for capture in electric for name in _TURNING):
+        turning = [c for c in electric if any(c.has(name) for name in _TURNING)]
+        if any(c.has(name) for c in turning for name in _OF_AN_ANGLE):
             return None
         pole_pairs = 1
     captures = tuple(c for c in map(with_values, campaign.captures) if c is not None)
@@ -73,7 +77,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
     flux = 0.0 if voltage else _largest(tables, ("psi_d_wb", "psi_q_wb"))
     voltage = voltage or flux * pole_pairs * speed
     # without a winding on record the torque's own size is all there is
-    known = stated_parameters(stated_constants(campaign), pole_pairs)
+    known = stated_parameters(stated_constants(campaign), pole_pairs, counted=counted)
     shaft = 0.0 if current and voltage else _largest(campaign.captures, ("torque_shaft_nm",))
     shaft = shaft or (0.0 if current and voltage else _stated_torque(known, speed))
     clamped = _largest(tables, ("torque_shaft_nm",))
@@ -105,6 +109,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         stated,
         encoder_step(campaign, policy),
         travel_turns=max(map(_travel_turns, campaign.captures), default=0.0),
+        pairs_known=counted,
         stated=known,
         policy=policy,
     )

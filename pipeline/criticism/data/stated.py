@@ -19,10 +19,11 @@ PARAMETERS: Mapping[str, str] = {
     "temp_coeff_magnet_1_k": "magnet_temperature.alpha_1_k",
 }
 """The parameter that a constant is."""
+_OF_PAIRS = ("psi_pm_wb", "ld_h", "lq_h")
 
 
 def stated_parameters(
-    stated: Iterable[Estimate], pole_pairs: int
+    stated: Iterable[Estimate], pole_pairs: int, *, counted: bool = True
 ) -> dict[str, tuple[float, float]]:
     """Value and standard uncertainty by parameter, in its unit.
 
@@ -33,6 +34,8 @@ def stated_parameters(
         uncertainty counts: they may all come from one measurement.
     pole_pairs
         Of the motor, for torque and back-EMF constants.
+    counted
+        Whether they are known; where not, a flux linkage or inductance says nothing of them.
 
     Notes
     -----
@@ -47,7 +50,7 @@ def stated_parameters(
         elif one.name in COUPLINGS and value > 0.0:
             flux_wb = coupling_from(one.name, value) / pole_pairs
             name, value, u = "psi_wb", flux_wb, flux_wb * u / value
-        if not name or u <= 0.0:
+        if not name or u <= 0.0 or (one.name in _OF_PAIRS and not counted):
             continue
         if name not in found or u * abs(found[name][0]) < found[name][1] * abs(value):
             found[name] = value, u

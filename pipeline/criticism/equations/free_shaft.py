@@ -89,15 +89,15 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 def _coasts(theta: Array, window: int, driven_share: float) -> NDArray[np.bool_]:
     """Samples [n] in which a shaft coasts.
 
-    These are all samples, unless the shaft is driven or held at its speed before some coast, for
-    more than a share of that coast. Then they are those of the coasts alone.
+    These are all samples, unless the shaft is driven or held at its speed before some coast, or
+    rests behind it, for more than a share of that coast. Then they are those of the coasts alone.
     """
     speed = smoothed(np.gradient(theta), 2 * (window // 2) + 1)
     runs = sorted(((rows.start, rows.stop) for rows, _ in coasting_rows(speed)))
-    ends = [0, *(stop for _, stop in runs)]
+    ends, starts = [0, *(stop for _, stop in runs)], [*(start for start, _ in runs), theta.size]
     driven = any(
-        start - end > driven_share * (stop - start)
-        for (start, stop), end in zip(runs, ends, strict=False)
+        max(start - end, after - stop) > driven_share * (stop - start)
+        for (start, stop), end, after in zip(runs, ends, starts[1:], strict=False)
     )
     free = np.full(theta.size, not driven)
     for start, stop in runs:

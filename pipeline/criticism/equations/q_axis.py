@@ -12,14 +12,19 @@ from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.traces import window_of
 from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
-from pipeline.criticism.machine.model import STATE, Model, Pieces, values_of
+from pipeline.criticism.machine.model import STATE, UNSAMPLED, Model, Pieces, values_of
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
     drive_current,
     motion_of,
     operating,
 )
-from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage
+from pipeline.criticism.signals.voltage import (
+    central,
+    recorded_voltage,
+    rotor_voltage,
+    within_rows,
+)
 from pipeline.numerics.projection import projection, window_starts
 from pipeline.records.capture import Capture
 
@@ -55,7 +60,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     window = window_of(log.period_s, log.keep.size, machine.policy.cutting)
     starts = window_starts(log.keep, window)
     weak = projection(log.columns["theta_mech_rad"], starts, window, ())
-    return segment_of(
+    made = segment_of(
         capture,
         "q",
         "drive",
@@ -66,6 +71,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         weak=weak,
         blocks=in_time(weak.starts + window // 2, log.keep.size),
     )
+    return replace(made, fixed={**made.fixed, UNSAMPLED: 1.0})
 
 
 def state(
@@ -113,11 +119,14 @@ def predicted(
 
     Notes
     -----
-    v_q = Im(R i + drops + dψ/dt + j ω_e ψ), ω = dθ/dt.
+    v_q = Im(R i + drops + dψ/dt + j ω_e ψ), ω = dθ/dt. A sample of the voltage is of an instant: of
+    what drives a change of flux within a row it may show nothing, or much more than the row's mean.
+    So that part of dψ/dt has a share of its own that is not known.
 
     """
     turn = x.machine.pole_pairs * x.omega_rad_s * segment.ts_s
     voltage = rotor_voltage(pieces, turn / segment.ts_s, segment.ts_s)
+    voltage = voltage + values[UNSAMPLED] * within_rows(pieces.psi_wb, segment.ts_s)
     voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)
     rows = [voltage.imag]
     if SPEED in segment.channels:
@@ -152,6 +161,6 @@ EQUATION = Equation(
         form="affine",
     ),
     recorder="log",
-    sensing=Sensing(errors=frozenset({"late_speed", "voltage_jumps"})),
+    sensing=Sensing(errors=frozenset({"late_speed", "voltage_jumps", "unsampled"})),
     use=Use(shows=frozenset({"current", "turning"}), warms=frozenset({"drop", "flux"})),
 )

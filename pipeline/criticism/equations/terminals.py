@@ -25,7 +25,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     Parameters
     ----------
     capture
-        A resistance test, or a current step at a stated angle.
+        A resistance test, a heat run, or a current step at a stated angle.
     machine
         Policy.
 
@@ -33,10 +33,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     -------
     Segment or None
         None without a pair, a current of it, or the angle of a current step. Of a resistance test
-        only the settled windows are used, of a step those clear of its edges.
+        or heat run only the settled windows are used, of a step those clear of its edges.
 
     """
-    pair = capture.meta.pair
+    pairs = [one for one in PAIR_RAD if capture.has(f"v{one}_v")]
+    pair = capture.meta.pair or (pairs[0] if len(pairs) == 1 else None)
     if pair is None or not capture.has(f"v{pair}_v"):
         return None
     current = next((n for n in (f"i{pair[0]}_a", f"i{pair[1]}_a") if capture.has(n)), None)
@@ -61,7 +62,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     else:
         window = window_of(period, keep.size, policy)
     weak = projection(np.zeros(keep.size), window_starts(keep, window), window, ())
-    if capture.meta.test == "resistance":
+    if capture.meta.test != "current_step":
         weak = _settled(weak, amps, policy.change_u * sensors.noise["i_pair_a"])
     return segment_of(
         capture,
@@ -171,7 +172,7 @@ def predicted(
 EQUATION = Equation(
     name="terminal",
     words="v_pair = √3 Re[(R i + drops + dψ/dt) e^{j(ε + 30° − pair)}] at rest",
-    tests=("resistance", "current_step"),
+    tests=("resistance", "current_step", "heat_run"),
     columns=("t_s",),
     channels=(Channel("v_pair_v", offset="voltmeter"),),
     cut=cut,

@@ -130,6 +130,19 @@ class Cutting:
         why="the steps that stand for the triangle are wrong by a third of a percent at most",
     )  # fmt: skip
     part_rad: float = chosen(3.0, "rad", "turn of the highest order in one part", why="half a wave")
+    setup_share: float = chosen(
+        0.2, "1", "difference of two files' decelerations, of their mean, above which they are of "
+        "two set-ups",
+        why="as the estimators have it: grease changes a coast by a tenth, a chain by more",
+    )  # fmt: skip
+    setup_top: float = chosen(
+        0.95, "1", "of the lower top speed of two coasts, from which on they are compared",
+        why="as the estimators have it: the first moments are of the driven shaft too",
+    )  # fmt: skip
+    setup_least: float = chosen(
+        0.2, "1", "of the speed that two coasts have to have in common",
+        why="as the estimators have it: the noise of a smoothed speed is a hundredth of that",
+    )  # fmt: skip
     coast_parts: int = chosen(48, "1", "parts of a coasting shaft's sample at the most", why=COST)
     log_parts: int = chosen(6, "1", "parts of a log's sample at the most", why=COST)
     load_window_s: float = calibrated(
@@ -282,6 +295,11 @@ class Priors:
     late_speed_s: float = chosen(
         5e-3, "s", "lateness of a speed that no angle is beside",
         why="observers and filters of drives are 1 to 10 ms late",
+    )  # fmt: skip
+    unsampled_share: float = derived(
+        10.0, "1", "change of flux within a row, as a sampled voltage shows it, over the true one",
+        source="a sample before the current moves shows nothing; one at the jump of a loop that "
+        "settles in a tenth of a row shows ten times the row's mean",
     )  # fmt: skip
     gain: float = chosen(
         0.01, "1", "gain of a sensor or instrument", why="an instrument of class 1"

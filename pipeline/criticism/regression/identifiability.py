@@ -34,6 +34,10 @@ _EDGE = 1e-9
 """Share of a bound by which a value that stands there may miss it."""
 
 
+OF_PAIRS = ("psi_wb", "ld_h", "lq_h")
+"""Parameters that are seen in multiples of the pole pairs."""
+
+
 @dataclass(frozen=True, slots=True)
 class Known:
     """What a fit determines of its own parameters.
@@ -228,6 +232,9 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
     for c in BASE:
         if c.name in PHYSICAL:
             value = fit.values[c.name]
+            if c.name in OF_PAIRS and not model.machine.pairs_known:
+                made[c.name] = _parameter(value, u[c.name], c.unit, False, False)
+                continue
             bound = _at(value, limits.get(c.name))
             sure = c.name not in POSITIVE or (REACH * u[c.name] < value and not bound)
             made[c.name] = _parameter(value, u[c.name], c.unit, sized[c.name] and sure, bound)
@@ -349,12 +356,28 @@ def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCom
         if not abs(deviance - system.deviance) < policy.walk_rise:
             moving |= moved
     wide = [(one, sure_of.u_of(one.gradient, bent=one.product)) for one in made]
-    return tuple(
+    combined = [
         _combined(one, u, names, fit.model)
         for one, u in wide
         if not moving[[place for place, _ in one.weights]].any()
         if within(np.array(u), np.array(one.size))
-    )
+    ]
+    if fit.model.machine.pairs_known:
+        return tuple(combined)
+    place = names.index("psi_wb")
+    if not open_[place] and observed[place] and REACH * sure_of.u[place] < values[place]:
+        u = float(sure_of.u[place])
+        combined.insert(0, KnownCombination("psi_wb", float(values[place]), u, "Wb", ("psi_wb",)))
+    return tuple(c for one in combined if (c := _of_pairs(one)))
+
+
+def _of_pairs(one: KnownCombination) -> KnownCombination | None:
+    """A combination of a machine whose pole pairs, unknown, were taken as one."""
+    if {"ld_h", "lq_h"}.intersection(one.of):
+        return None
+    alone = one.expression == "psi_wb"
+    named = "pole_pairs*psi_wb" if alone else "(pole_pairs*psi_wb)"
+    return replace(one, expression=one.expression.replace("psi_wb", named))
 
 
 def _combined(one: Combination, u: float, names: Sequence[str], model: Model) -> KnownCombination:

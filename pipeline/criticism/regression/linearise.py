@@ -19,6 +19,7 @@ from pipeline.criticism.machine.model import (
     LATE_SPEED,
     STATE,
     UNLOGGED_K,
+    UNSAMPLED,
     Model,
     Pieces,
     base_of,
@@ -271,6 +272,7 @@ def _restore(rows: Array, unknown: Sequence[Array]) -> None:
 
 _FINE = 1e-3
 """Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
+_OF_SOME_LOGS = ("unlogged_d_share", LATE_SPEED, UNSAMPLED, *UNLOGGED_K)
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 
@@ -341,7 +343,7 @@ class _Sampler:
             "gain_torque": observes_sensor(self.segment, "load"),
             "gain_lcr": observes_sensor(self.segment, "lcr"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
-            **{n: n in self.segment.fixed for n in ("unlogged_d_share", LATE_SPEED, *UNLOGGED_K)},
+            **{n: n in self.segment.fixed for n in _OF_SOME_LOGS},
             "gain_clock": observes_sensor(self.segment, "clock"),
             self.segment.instrument.meter: observes_sensor(self.segment, "voltage"),
             self.segment.instrument.ammeter: observes_sensor(self.segment, "current"),

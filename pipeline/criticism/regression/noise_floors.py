@@ -22,6 +22,7 @@ from pipeline.criticism.residuals.channels import (
     reported_unit,
 )
 from pipeline.criticism.residuals.residual import operate, residual
+from pipeline.criticism.signals.voltage import within_rows
 
 VOLTS = ("vd_v", "vq_v")
 SPEED = "omega_mech_rad_s"
@@ -282,20 +283,31 @@ def reading_error(
     if "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
         both[place] = np.hypot(both[place], _of_torque(segment, model, values, state))
-    if "voltage_jumps" in sensing.errors:
-        jumps = _jumps(segment, *VOLTS, policy)[:, None]
-        for place, channel in enumerate(segment.channels):
-            if channel in VOLTS:
-                both[place] = np.hypot(both[place], jumps)
-        if any(effect.drop is not None for effect in model.effects):
-            x = operate(segment, segment.recorded, model, values) if state is None else state
-            steep = steep_drops(model, values, x)
-            for channel, axis in (("vd_v", steep.real), ("vq_v", steep.imag)):
-                if channel not in segment.channels:
-                    continue
-                place = segment.channels.index(channel)
-                both[place] = np.hypot(both[place], np.abs(weak.project(axis[None])[0]))
+    for place, channel in enumerate(segment.channels):
+        if channel in VOLTS:
+            both[place] = np.hypot(both[place], _of_voltage(segment, channel, model, values, state))
     return both
+
+
+def _of_voltage(
+    segment: Segment, channel: str, model: Model, values: Values, state: Operating | None
+) -> Array | float:
+    """What a drive's log may be off by in a voltage [W, M], as weak samples of its channel."""
+    weak, policy = segment.weak, model.policy.noise_floors
+    errors = equation_of(segment).sensing.errors
+    if weak is None or "voltage_jumps" not in errors:
+        return 0.0
+    total: Array = np.zeros((weak.starts.size, weak.orders.size))
+    total = np.hypot(total, _jumps(segment, *VOLTS, policy)[:, None])
+    if "unsampled" in errors:
+        change = values["lq_h"] * within_rows(segment.recorded["iq_a"], segment.ts_s)
+        total = np.hypot(total, np.abs(weak.project(change[None])[0]))
+    if any(effect.drop is not None for effect in model.effects):
+        x = operate(segment, segment.recorded, model, values) if state is None else state
+        steep = steep_drops(model, values, x)
+        axis = steep.real if channel == "vd_v" else steep.imag
+        total = np.hypot(total, np.abs(weak.project(axis[None])[0]))
+    return total
 
 
 def _of_torque(

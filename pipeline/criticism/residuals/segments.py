@@ -15,6 +15,7 @@ from pipeline.criticism.effect import Machine
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equations
 from pipeline.criticism.machine.model import LATE_SPEED, UNLOGGED, UNLOGGED_AT_REST
+from pipeline.numerics.coast_setups import Setup, coast_setups
 from pipeline.records.capture import Campaign, Capture
 
 
@@ -37,8 +38,10 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
     """
     made: list[Segment] = []
     gains = gains_of(campaign.captures)
+    mixed = {c.path for setup in mixed_setups(campaign, machine) for c in setup.captures}
     for recorded in campaign.captures:
-        capture = with_values(recorded) if recorded.meta.test in known_tests() else None
+        used = recorded.meta.test in known_tests() and recorded.path not in mixed
+        capture = with_values(recorded) if used else None
         if capture is not None:
             own = gains[recorded.path]
             cut = (_by_encoder(s, machine) for s in _cut(capture, machine))
@@ -47,6 +50,26 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
     # a table that other captures can predict is held out as a whole
     whole = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
     return tuple(replace(s, blocks=None) if s.kind in whole else s for s in made)
+
+
+def mixed_setups(campaign: Campaign, machine: Machine) -> tuple[Setup, ...]:
+    """The set-ups of coasts that have no common inertia and drag; none where all go together.
+
+    Parameters
+    ----------
+    campaign
+        All captures of one motor.
+    machine
+        Policy.
+
+    Returns
+    -------
+    tuple of Setup
+        Their files.
+
+    """
+    found = coast_setups(campaign.of("spin_down"), machine.policy.cutting)
+    return found if len(found) > 1 else ()
 
 
 def known_tests() -> frozenset[str]:

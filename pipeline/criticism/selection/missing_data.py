@@ -11,12 +11,28 @@ from pipeline.criticism.data.unlogged_load import unexplained_share
 from pipeline.criticism.effect import Effect, Evidence, Machine
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import UNLOGGED, Model
-from pipeline.criticism.residuals.segments import known_tests
+from pipeline.criticism.residuals.segments import known_tests, mixed_setups
 from pipeline.criticism.selection.alternatives import detectable
 from pipeline.criticism.selection.score_test import Candidate
 from pipeline.criticism.selection.stepwise import LadderStep
+from pipeline.numerics.coast_setups import REMEDY, setup_words
 from pipeline.records.capture import Campaign
 from pipeline.records.diagnosis import Unexcited
+
+
+def mixed(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
+    """A note of the coasts that are left out, since they are of several set-ups.
+
+    Parameters
+    ----------
+    campaign
+        All captures of one motor.
+    machine
+        Policy.
+
+    """
+    setups = mixed_setups(campaign, machine)
+    return (f"coasts left out: {setup_words(setups)}; {REMEDY}",) if setups else ()
 
 
 def unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:

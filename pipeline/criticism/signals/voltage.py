@@ -130,6 +130,44 @@ def central(signal: Any, period_s: float) -> Any:
     return slope
 
 
+def within_rows(signal: Any, period_s: float) -> Any:
+    """The part of a signal's slope that its samples do not resolve.
+
+    Parameters
+    ----------
+    signal
+        [n, any unit], real or complex.
+    period_s
+        Sample period [s].
+
+    Returns
+    -------
+    array [n]
+        Zero at both ends.
+
+    Notes
+    -----
+    m c of the central difference c. m is the largest of min(|h/c|, 1) at a sample and its two
+    neighbours, h half of what the slopes before and after a sample differ by. Of a line m is zero,
+    beside a step between two samples one.
+
+    Examples
+    --------
+    >>> within_rows(np.array([0.0, 0.0, 1.0, 1.0]), 0.5)
+    array([0., 1., 1., 0.])
+    >>> within_rows(np.array([0.0, 1.0, 2.0, 3.0]), 0.5)
+    array([0., 0., 0., 0.])
+
+    """
+    slope = central(signal, period_s)
+    bend = np.zeros(slope.size)
+    bend[1:-1] = np.abs(np.diff(signal, 2)) / (2 * period_s)
+    size = np.abs(slope)
+    share = np.minimum(bend / np.where(size > 0.0, size, np.inf), 1.0)
+    share[1:-1] = np.maximum(share[1:-1], np.maximum(share[:-2], share[2:]))
+    return share * slope
+
+
 def forward(signal: Any, period_s: float) -> Any:
     """Slope to the next sample.
 

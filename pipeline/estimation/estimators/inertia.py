@@ -13,7 +13,6 @@ from pipeline.estimation.electrical.magnet_temperature import (
     magnet_uncertainties,
 )
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
-from pipeline.estimation.mechanical.coast_setups import Setup, coast_setups, setup_words
 from pipeline.estimation.mechanical.drag import (
     DRAG_FORMS,
     DragFit,
@@ -37,6 +36,7 @@ from pipeline.estimation.uncertainty.instruments import (
     unstated_note,
 )
 from pipeline.estimation.uncertainty.regimes import Disagreement
+from pipeline.numerics.coast_setups import Setup, coast_setups, setup_words
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
@@ -195,7 +195,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     drag curve left free, T = J (a_driven - a_coasting) at each speed.
     """
     torque = _torque(known)
-    setups = coast_setups(campaign.of("spin_down"))
+    setups = coast_setups(campaign.of("spin_down"), policy().coast_down)
     if len(setups) > 1:
         campaign = replace(campaign, captures=campaign.of("drive"))
     rows = _rows(known, campaign) if torque is not None else None

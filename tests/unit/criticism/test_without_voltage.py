@@ -101,8 +101,54 @@ def test_coasts_ask_for_no_pole_pairs():
     found = compared(coasts)
     together = {one.expression: one for one in found.combinations}
     assert holds(together[f"{DRY_NAME}/j_kgm2"], DRY / J)
-    turned = recorded(("drive", {}), keep=("iq_a", "vq_v", "theta_mech_rad"))
+    turned = recorded(("drive", {}), keep=("id_a", "iq_a", "vd_v", "vq_v", "theta_mech_rad"))
     assert "pole pairs" in compared(turned).notes[0]
+
+
+def test_without_pole_pairs_a_q_axis_has_no_flux_but_its_back_emf():
+    """One pole pair was taken for granted, and the flux linkage was that many times too large."""
+    found = compared(recorded(("drive", {}), keep=("iq_a", "vq_v", "theta_mech_rad")))
+    assert found.parameters["psi_wb"].value is None
+    together = {one.expression: one for one in found.combinations}
+    assert holds(together["pole_pairs*psi_wb"], TRUE["pole_pairs"] * PSI)
+
+
+def test_without_pole_pairs_a_table_of_torque_has_its_torque_constant_alone():
+    keep = ("iq_a", "torque_shaft_nm")
+    found = compared(recorded(("torque_table", {}), keep=keep), ld_h=1.0, u_ld_h=0.1)
+    assert all(found.parameters[name].value is None for name in ("psi_wb", "ld_h", "lq_h"))
+    (ke,) = found.combinations
+    assert ke.of == ("psi_wb",)
+    assert holds(ke, TRUE["pole_pairs"] * PSI)
+
+
+def test_a_heat_run_between_two_terminals():
+    keep = ("vab_v", "ia_a", "temp_winding_degc")
+    log = recorded(("resistance", {}), keep=keep)
+    (whole,) = log.campaigns.values()
+    warm = replace(whole.captures[0], meta=replace(whole.captures[0].meta, test="heat_run"))
+    turned = replace(log, campaigns={whole.motor_id: replace(whole, captures=(warm,))})
+    assert holds(compared(turned).parameters["r_ohm"], TRUE["r_phase_ohm"])
+
+
+def test_coasts_of_two_set_ups_are_named_and_left_out():
+    """Pooled, they had friction over inertia between the two, with the u of one."""
+    coasts = recorded(("spin_down", {"direction": 1}), ("spin_down", {"direction": -1}),
+                      keep=("theta_mech_rad",))  # fmt: skip
+    (whole,) = coasts.campaigns.values()
+    slower = [_slowed(one, 1.5) for one in whole.captures]
+    mixed = replace(whole, captures=(*whole.captures, *slower))
+    found = compared(replace(coasts, campaigns={whole.motor_id: mixed}))
+    assert found.combinations == ()
+    (note,) = found.notes
+    assert "2 set-ups" in note
+    assert all(one.path in note for one in mixed.captures)
+
+
+def _slowed(one, factor: float):
+    """The coast as it is where the shaft takes longer for it."""
+    tables = tuple(t.with_columns(t["t_s"] * factor) for t in one.tables)
+    return replace(one, path=f"with_chain/{one.path}", tables=tables)
 
 
 def test_a_heat_run_of_one_axis_has_the_resistance_and_its_coefficient():

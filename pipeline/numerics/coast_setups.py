@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.policy import policy
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed
@@ -25,6 +25,22 @@ REMEDY = (
     "give each set-up a motor_id of its own (`per_file` in a source map, or manifest.csv), or "
     "leave the files of the others out"
 )
+
+
+class Limits(Protocol):
+    """When two coasts are compared, and how much their decelerations may differ [1]."""
+
+    @property
+    def setup_share(self) -> float:
+        """Difference over the mean."""
+
+    @property
+    def setup_top(self) -> float:
+        """Of the lower top speed, from which on they are compared."""
+
+    @property
+    def setup_least(self) -> float:
+        """Of the speed that they have to have in common."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +90,15 @@ class Setup:
     ratio: float = 1.0
 
 
-def coast_setups(captures: Sequence[Capture]) -> tuple[Setup, ...]:
+def coast_setups(captures: Sequence[Capture], limits: Limits) -> tuple[Setup, ...]:
     """The files of coasts, parted where they slow down too differently to be of one set-up.
 
     Parameters
     ----------
     captures
         Coasts, with an angle or a speed.
+    limits
+        A policy's.
 
     Returns
     -------
@@ -100,12 +118,12 @@ def coast_setups(captures: Sequence[Capture]) -> tuple[Setup, ...]:
         falls = _falls(capture)
         if not falls:
             continue
-        fitting = (g for g in groups if not any(_apart(falls, others) for _, others in g))
+        fitting = (g for g in groups if not any(_apart(falls, others, limits) for _, others in g))
         group = next(fitting, None)
         if group is not None:
             group.append((capture, falls))
             continue
-        ratios.append(_ratio(falls, groups[0][0][1]) if groups else 1.0)
+        ratios.append(_ratio(falls, groups[0][0][1], limits) if groups else 1.0)
         groups.append([(capture, falls)])
     return tuple(
         Setup(tuple(capture for capture, _ in group), ratio)
@@ -147,11 +165,10 @@ def _falls(capture: Capture) -> list[Fall]:
     return [Fall(sense, t[rows], sense * speed[rows]) for rows, sense in coasting_rows(speed)]
 
 
-def _both(one: Fall, other: Fall) -> Array | None:
+def _both(one: Fall, other: Fall, limits: Limits) -> Array | None:
     """Speeds [3, rad/s] that part what both coasts go through in halves; None for too little."""
     if one.sense != other.sense:
         return None
-    limits = policy().coast_down
     high = limits.setup_top * min(float(f.speed_rad_s.max()) for f in (one, other))
     low = max(*(float(f.speed_rad_s.min()) for f in (one, other)), (1.0 - limits.setup_top) * high)
     if low > (1.0 - limits.setup_least) * high:
@@ -159,21 +176,21 @@ def _both(one: Fall, other: Fall) -> Array | None:
     return np.linspace(high, low, 3)
 
 
-def _ratios(falls: Sequence[Fall], others: Sequence[Fall]) -> list[float]:
+def _ratios(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> list[float]:
     """Decelerations of coasts over those of others, of all halves that can be compared."""
     found = []
     for one in falls:
         for other in others:
-            speeds = _both(one, other)
+            speeds = _both(one, other, limits)
             for high, low in pairwise([] if speeds is None else speeds):
                 found.append(one.deceleration(high, low) / other.deceleration(high, low))
     return found
 
 
-def _apart(falls: Sequence[Fall], others: Sequence[Fall]) -> bool:
-    share = policy().coast_down.setup_share
-    return any(abs(r - 1.0) > share * 0.5 * (r + 1.0) for r in _ratios(falls, others))
+def _apart(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> bool:
+    share = limits.setup_share
+    return any(abs(r - 1.0) > share * 0.5 * (r + 1.0) for r in _ratios(falls, others, limits))
 
 
-def _ratio(falls: Sequence[Fall], others: Sequence[Fall]) -> float:
-    return float(np.median(_ratios(falls, others)))
+def _ratio(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> float:
+    return float(np.median(_ratios(falls, others, limits)))
