@@ -57,9 +57,10 @@ def validate(
     check_columns(capture)
     masks: list[Mask] = []
     capture, unfilled = _filled_rows(capture)
+    capture, twice = _rows_once(capture)
     check_tables(capture)
     capture, findings = _without_blanks(capture)
-    findings = [*unfilled, *findings]
+    findings = [*unfilled, *twice, *findings]
     refusals: dict[str, CaptureError] = {}
     broken: list[CaptureError] = []
     for gate in gates():
@@ -105,6 +106,27 @@ def _filled_rows(capture: Capture) -> tuple[Capture, list[Finding]]:
             span = (first, table.height - 1)
             findings.append(warning(capture, "unfilled_rows", words, remedy, span))
         tables.append(table.head(first) if count > 1 else table)
+    return (replace(capture, tables=tuple(tables)) if findings else capture), findings
+
+
+def _rows_once(capture: Capture) -> tuple[Capture, list[Finding]]:
+    """The capture without rows that repeat the one before, clock and all.
+
+    A bus or a logger sent such a row twice; it is no second sample.
+    """
+    tables, findings = [], []
+    for table in capture.tables:
+        changed = pl.any_horizontal(cs.numeric().ne_missing(cs.numeric().shift()))
+        kept = table.select(changed).to_series()
+        rows = (~kept).arg_true()
+        if "t_s" not in table.columns or not rows.len():
+            tables.append(table)
+            continue
+        words = f"{rows.len()} of {table.height} rows repeat the row before, clock and all"
+        remedy = "write each row once; they are left out"
+        span = (int(rows[0]), int(rows[-1]))
+        findings.append(warning(capture, "repeated_rows", words, remedy, span))
+        tables.append(table.filter(kept))
     return (replace(capture, tables=tuple(tables)) if findings else capture), findings
 
 

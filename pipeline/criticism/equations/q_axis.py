@@ -23,7 +23,7 @@ from pipeline.criticism.signals.voltage import (
     central,
     recorded_voltage,
     rotor_voltage,
-    within_rows,
+    unresolved,
 )
 from pipeline.numerics.projection import projection, window_starts
 from pipeline.records.capture import Capture
@@ -126,7 +126,9 @@ def predicted(
     """
     turn = x.machine.pole_pairs * x.omega_rad_s * segment.ts_s
     voltage = rotor_voltage(pieces, turn / segment.ts_s, segment.ts_s)
-    voltage = voltage + values[UNSAMPLED] * within_rows(pieces.psi_wb, segment.ts_s)
+    if share := values[UNSAMPLED]:
+        change = share * central(pieces.psi_wb, segment.ts_s)
+        voltage = voltage + unresolved(segment.recorded["iq_a"]) * change
     voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)
     rows = [voltage.imag]
     if SPEED in segment.channels:

@@ -22,7 +22,7 @@ from pipeline.criticism.residuals.channels import (
     reported_unit,
 )
 from pipeline.criticism.residuals.residual import operate, residual
-from pipeline.criticism.signals.voltage import within_rows
+from pipeline.criticism.signals.voltage import central, unresolved
 
 VOLTS = ("vd_v", "vq_v")
 SPEED = "omega_mech_rad_s"
@@ -300,7 +300,8 @@ def _of_voltage(
     total: Array = np.zeros((weak.starts.size, weak.orders.size))
     total = np.hypot(total, _jumps(segment, *VOLTS, policy)[:, None])
     if "unsampled" in errors:
-        change = values["lq_h"] * within_rows(segment.recorded["iq_a"], segment.ts_s)
+        current = segment.recorded["iq_a"]
+        change = values["lq_h"] * unresolved(current) * central(current, segment.ts_s)
         total = np.hypot(total, np.abs(weak.project(change[None])[0]))
     if any(effect.drop is not None for effect in model.effects):
         x = operate(segment, segment.recorded, model, values) if state is None else state

@@ -130,42 +130,40 @@ def central(signal: Any, period_s: float) -> Any:
     return slope
 
 
-def within_rows(signal: Any, period_s: float) -> Any:
-    """The part of a signal's slope that its samples do not resolve.
+def unresolved(signal: Array) -> Array:
+    """The share of a signal's slope that its samples do not resolve.
 
     Parameters
     ----------
     signal
-        [n, any unit], real or complex.
-    period_s
-        Sample period [s].
+        [n, any unit].
 
     Returns
     -------
     array [n]
-        Zero at both ends.
+        From 0 to 1.
 
     Notes
     -----
-    m c of the central difference c. m is the largest of min(|h/c|, 1) at a sample and its two
-    neighbours, h half of what the slopes before and after a sample differ by. Of a line m is zero,
-    beside a step between two samples one.
+    The largest of min(|h/c|, 1) at a sample and its two neighbours, c the central difference and h
+    half of what the slopes before and after a sample differ by. Of a line it is zero, beside a step
+    between two samples one.
 
     Examples
     --------
-    >>> within_rows(np.array([0.0, 0.0, 1.0, 1.0]), 0.5)
-    array([0., 1., 1., 0.])
-    >>> within_rows(np.array([0.0, 1.0, 2.0, 3.0]), 0.5)
+    >>> unresolved(np.array([0.0, 0.0, 1.0, 1.0]))
+    array([1., 1., 1., 1.])
+    >>> unresolved(np.array([0.0, 1.0, 2.0, 3.0]))
     array([0., 0., 0., 0.])
 
     """
-    slope = central(signal, period_s)
-    bend = np.zeros(slope.size)
-    bend[1:-1] = np.abs(np.diff(signal, 2)) / (2 * period_s)
-    size = np.abs(slope)
-    share = np.minimum(bend / np.where(size > 0.0, size, np.inf), 1.0)
-    share[1:-1] = np.maximum(share[1:-1], np.maximum(share[:-2], share[2:]))
-    return share * slope
+    share = np.zeros(signal.size)
+    bend, size = np.abs(np.diff(signal, 2)), np.abs(signal[2:] - signal[:-2])
+    share[1:-1] = np.minimum(bend / np.where(size > 0.0, size, np.inf), 1.0)
+    beside = share.copy()
+    beside[:-1] = np.maximum(beside[:-1], share[1:])
+    beside[1:] = np.maximum(beside[1:], share[:-1])
+    return beside
 
 
 def forward(signal: Any, period_s: float) -> Any:

@@ -11,6 +11,7 @@ import pytest
 from pipeline.contracts.schemas import check_columns, check_tables
 from pipeline.contracts.validate import (
     _filled_rows,
+    _rows_once,
     _slow_columns,
     _streams_apart,
     _without_blanks,
@@ -106,3 +107,15 @@ def test_the_end_of_a_buffer_that_was_not_filled_is_left_out() -> None:
         assert _filled_rows(kept) == (kept, [])
         with pytest.raises(CaptureError, match="does not increase"):
             check_tables(kept)
+
+
+def test_a_row_that_a_bus_sent_twice_is_one_sample() -> None:
+    """Rows that repeat the one before, clock and all, are left out and counted; others are not."""
+    t_s, iq_a = np.arange(40) * 1e-3, np.sin(np.arange(40))
+    rows = np.sort(np.r_[np.arange(40), 3, 17, 17])
+    made, findings = _rows_once(capture("drive", t_s=t_s[rows], iq_a=iq_a[rows]))
+    assert [(f.code, f.rows) for f in findings] == [("repeated_rows", (4, 20))]
+    assert "3 of 43 rows" in findings[0].message
+    assert made.tables[0]["t_s"].to_list() == t_s.tolist()
+    again = capture("drive", t_s=t_s[rows], iq_a=np.arange(43.0))
+    assert _rows_once(again) == (again, [])
