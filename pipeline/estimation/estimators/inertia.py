@@ -116,10 +116,10 @@ class Doubts:
         """What the regimes and the share say, where they say something."""
         names = ("the inertia", "Coulomb friction over inertia", "viscous friction over inertia")
         words = [d.words(n) for d, n in zip(self.regimes, names, strict=True) if d is not None]
-        if logged and self.share > policy().drag.unexplained_share:
+        if self.share > policy().drag.unexplained_share:
             words.append(
                 f"{100.0 * self.share:.2g} % of the square of the drives' acceleration follows "
-                "neither current nor load"
+                f"neither current nor load{'' if logged else ', which nothing logged'}"
             )
         return words
 
@@ -218,10 +218,13 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         note = f"the drive's torque cannot be told from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     strange = _share_of_no_torque(rows, found)
-    if strange > policy().drag.unexplained_share and not _load_logged(rows):
+    if strange > policy().drag.loaded_share and not _load_logged(rows):
         return METHOD.nothing(GIVES, f"{_of_no_torque(strange)}; {LOAD}")
     doubts = Doubts(strange, drag_disagreements(rows, found, options["level"]))
     estimates = _estimates(rows, torque, found, doubts, _left_out(rows, campaign))
+    if strange > policy().drag.unexplained_share and not _load_logged(rows):
+        drags = METHOD.nothing(GIVES[1:], f"{_of_no_torque(strange)}; {LOAD}").estimates
+        estimates = (estimates[0], *drags)
     if len(setups) > 1:
         words = _parted(setups)
         estimates = tuple(replace(e, note=f"{words}; {e.note}") for e in estimates)

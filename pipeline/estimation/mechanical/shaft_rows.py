@@ -18,7 +18,7 @@ from pipeline.estimation.electrical.magnet_temperature import assumed_temperatur
 from pipeline.estimation.policy import policy
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
-from pipeline.numerics.plateaus import white_noise_sigma
+from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.records.capture import Capture
 
@@ -218,18 +218,15 @@ def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
             ),
             policy().shaft_rows.overlap,
         )
-    sigma = white_noise_sigma(theta_rad)
+    sigma, limits = noise_about_cubics(t_s, theta_rad), policy().shaft_rows
     least = (LEAST_SAMPLES + 1) * float(np.median(np.diff(t_s)))
-    widths = policy().shaft_rows.drive_windows_s
-    for width in widths:
-        try:
-            weak = weak_rows(t_s, width, policy().shaft_rows.overlap)
-        except ValueError:
-            continue
+    slower = max(1.0, least / limits.drive_windows_s[0])
+    for usual in limits.drive_windows_s:
+        weak = weak_rows(t_s, slower * usual, limits.overlap)
         noise = sigma * weak.noise_gain(2)
-        if noise < policy().shaft_rows.quiet_share * float(np.std(weak.integral(theta_rad, 2))):
-            return weak
-    return weak_rows(t_s, max(widths[-1], least), policy().shaft_rows.overlap)
+        if noise < limits.quiet_share * float(np.std(weak.integral(theta_rad, 2))):
+            break
+    return weak
 
 
 def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:

@@ -88,6 +88,12 @@ class Drag:
         on="loads of a third of rated torque, which left 0.38 to 0.6 in drives of three motors; "
         "none, on a real bench, 0.006. It is twice what a transducer of unstated gain leaves open",
     )  # fmt: skip
+    loaded_share: float = derived(
+        0.1, "1", "of the acceleration, squared, that may follow no logged torque where J is given "
+        "without drags",
+        source="where a controller works against a load, 1/J comes out too small by this share at "
+        "most, which is in u; a tenth is five times what leaves drags alone",
+    )  # fmt: skip
     speed_share: float = chosen(
         0.02, "1",
         "relative standard uncertainty of J, T_c and B where a bench's own speed is the only "

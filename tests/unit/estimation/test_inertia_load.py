@@ -71,3 +71,21 @@ def test_a_shaft_that_follows_its_current_runs_free() -> None:
     for name, one in estimates.items():
         doubt = {part.source: part.u for part in one.budget}["assumed:free_shaft"]
         assert 0.0 < doubt < DEFAULT.drag.unexplained_share * one.number, name
+
+
+@pytest.mark.parametrize("load", [0.05, 0.1])
+def test_a_small_load_that_no_drive_logs_leaves_the_inertia_with_a_larger_u(load: float) -> None:
+    """What follows no current is in the inertia's u; friction is not parted from the load."""
+    plan = tuple(
+        (stem, test, {**protocol, "load": load} if test == "drive" else protocol)
+        for stem, test, protocol in CAMPAIGN
+        if test in ("torque_map", "spin_down", "drive")
+    )
+    estimates = found(without_load(campaign_of(campaign(MOTOR, EXACT_BENCH, 11, plan)), 2))
+    inertia = estimates["j_rotor_kgm2"]
+    assert abs(inertia.number - MOTOR.j_rotor_kgm2) < 2.0 * inertia.u
+    assert inertia.u < 0.15 * inertia.number
+    assert "which nothing logged" in inertia.note
+    for name in GIVES[1:]:
+        assert not estimates[name].known
+        assert "no drive logs its load" in estimates[name].note
