@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,20 +26,24 @@ REMEDY = (
 )
 
 
-class Limits(Protocol):
-    """When two coasts are compared, and how much their decelerations may differ [1]."""
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When two coasts are compared, and how much their decelerations may differ [1].
 
-    @property
-    def setup_share(self) -> float:
-        """Difference over the mean."""
+    Attributes
+    ----------
+    share
+        Difference over the mean.
+    top
+        Of the lower top speed, from which on they are compared.
+    least
+        Of the speed that they have to have in common.
 
-    @property
-    def setup_top(self) -> float:
-        """Of the lower top speed, from which on they are compared."""
+    """
 
-    @property
-    def setup_least(self) -> float:
-        """Of the speed that they have to have in common."""
+    share: float
+    top: float
+    least: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +111,7 @@ def coast_setups(captures: Sequence[Capture], limits: Limits) -> tuple[Setup, ..
     Notes
     -----
     Two coasts of one sense are held against each other over the upper and the lower half of the
-    speeds that both go through. Their mean decelerations may differ by `setup_share` of their mean.
+    speeds that both go through. Their mean decelerations may differ by `share` of their mean.
     A file joins the first set-up that none of its coasts contradicts.
 
     """
@@ -169,9 +172,9 @@ def _both(one: Fall, other: Fall, limits: Limits) -> Array | None:
     """Speeds [3, rad/s] that part what both coasts go through in halves; None for too little."""
     if one.sense != other.sense:
         return None
-    high = limits.setup_top * min(float(f.speed_rad_s.max()) for f in (one, other))
-    low = max(*(float(f.speed_rad_s.min()) for f in (one, other)), (1.0 - limits.setup_top) * high)
-    if low > (1.0 - limits.setup_least) * high:
+    high = limits.top * min(float(f.speed_rad_s.max()) for f in (one, other))
+    low = max(*(float(f.speed_rad_s.min()) for f in (one, other)), (1.0 - limits.top) * high)
+    if low > (1.0 - limits.least) * high:
         return None
     return np.linspace(high, low, 3)
 
@@ -188,7 +191,7 @@ def _ratios(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> li
 
 
 def _apart(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> bool:
-    share = limits.setup_share
+    share = limits.share
     return any(abs(r - 1.0) > share * 0.5 * (r + 1.0) for r in _ratios(falls, others, limits))
 
 

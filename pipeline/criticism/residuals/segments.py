@@ -15,7 +15,7 @@ from pipeline.criticism.effect import Machine
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equations
 from pipeline.criticism.machine.model import LATE_SPEED, UNLOGGED, UNLOGGED_AT_REST
-from pipeline.numerics.coast_setups import Setup, coast_setups
+from pipeline.numerics.coast_setups import Limits, Setup, coast_setups
 from pipeline.records.capture import Campaign, Capture
 
 
@@ -68,7 +68,9 @@ def mixed_setups(campaign: Campaign, machine: Machine) -> tuple[Setup, ...]:
         Their files.
 
     """
-    found = coast_setups(campaign.of("spin_down"), machine.policy.cutting)
+    policy = machine.policy.cutting
+    limits = Limits(policy.setup_share, policy.setup_top, policy.setup_least)
+    found = coast_setups(campaign.of("spin_down"), limits)
     return found if len(found) > 1 else ()
 
 

@@ -195,7 +195,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     drag curve left free, T = J (a_driven - a_coasting) at each speed.
     """
     torque = _torque(known)
-    setups = coast_setups(campaign.of("spin_down"), policy().coast_down)
+    setups = coast_setups(campaign.of("spin_down"), policy().coast_down.setups)
     if len(setups) > 1:
         campaign = replace(campaign, captures=campaign.of("drive"))
     rows = _rows(known, campaign) if torque is not None else None

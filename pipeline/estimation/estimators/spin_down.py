@@ -137,7 +137,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     """
     del known
     captures = campaign.of("spin_down")
-    setups = coast_setups(captures, policy().coast_down)
+    setups = coast_setups(captures, policy().coast_down.setups)
     if len(setups) > 1:
         each = (_brief(_fit(setup.captures, options)) for setup in setups)
         note = f"{setup_words(setups)}; in this order {' | '.join(each)}; {REMEDY}"
