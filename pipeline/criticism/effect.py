@@ -252,6 +252,10 @@ class Samples:
     freq_hz: Array
 
 
+_MOTION = {"eps_rad", "theta_rad", "omega_rad_s"}
+"""Columns of the motion."""
+
+
 @dataclass(slots=True, kw_only=True)
 class Operating(Samples):
     """Where the machine is at each sample; what hooks are evaluated on.
@@ -282,6 +286,29 @@ class Operating(Samples):
 
         """
         return replace(self, inverter=True, supply=replace(self.supply, **supply))
+
+    def beside(self, other: Operating) -> Operating:
+        """The same state with the arrays of another one where they are equal.
+
+        Parameters
+        ----------
+        other
+            State of the same segment at near values.
+
+        Returns
+        -------
+        Operating
+            What was computed `once` of the other's arrays serves both; the state itself where the
+            motion differs.
+
+        """
+        columns = {
+            name: theirs
+            for name in (one.name for one in fields(Samples))
+            if np.array_equal(getattr(self, name), theirs := getattr(other, name))
+        }
+        same = columns.keys() >= _MOTION and self.ts_s == other.ts_s
+        return replace(self, **columns, kept=dict(other.kept)) if same else self
 
     def once(self, column: Any, name: Hashable, make: Callable[[], Any]) -> Any:
         """What depends on one array alone, computed once for all copies of the state that share the

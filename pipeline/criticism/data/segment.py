@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,6 +105,14 @@ class Unthinned:
     late: Mapping[str, Array] = field(default_factory=dict)
 
 
+class Kept(dict[Hashable, Any]):
+    """What was computed of a segment and may be asked for again; another process has its own."""
+
+    def __reduce__(self) -> tuple[type[Kept], tuple[()]]:
+        """Pickles as one that holds nothing."""
+        return Kept, ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
     """The signals of one capture for one kind of equation, with its weak form.
@@ -136,6 +145,8 @@ class Segment:
     blocks
         Number of the part of a capture that each window [W] belongs to; parts are held out one by
         one where there is no other capture to predict it from.
+    kept
+        What was computed of it and may be asked for again.
 
     """
 
@@ -152,11 +163,41 @@ class Segment:
     disturbances: Disturbances = Disturbances()
     unthinned: Unthinned = Unthinned()
     blocks: NDArray[np.int64] | None = None
+    kept: Kept = field(default_factory=Kept, repr=False, compare=False)
 
     @property
     def size(self) -> int:
         """Samples."""
         return int(next(iter(self.recorded.values())).size)
+
+    def once(self, column: Array, name: Hashable, by: Hashable, make: Callable[[], Any]) -> Any:
+        """What depends on one recorded column, computed once for all copies of the segment.
+
+        Parameters
+        ----------
+        column
+            The column [n]; of one that was not recorded, such as with noise added, it is computed
+            every time.
+        name
+            What is computed from it.
+        by
+            What else it depends on; the last one is kept.
+        make
+            Computes it.
+
+        Returns
+        -------
+        object
+            The result of `make`, of this call or an earlier one.
+
+        """
+        known = self.kept.get(name)
+        if known is not None and known[0] is column and known[1] == by:
+            return known[2]
+        made = make()
+        if any(column is one for one in self.recorded.values()):
+            self.kept[name] = column, by, made
+        return made
 
 
 def segment_of(

@@ -15,7 +15,7 @@ def _drop(x: Operating, q: Values) -> Complex:
     if q["lag_s"]:
         before = before - np.gradient(before) / x.ts_s * q["lag_s"]
         eps = eps - x.machine.pole_pairs * x.omega_rad_s * q["lag_s"]
-    turn = turning(eps)
+    turn = x.once(eps, "turning", lambda: turning(eps))
     phases = phases_of(before * turn)
     if q["ripple"]:
         shares = lost_shares(x, eps, phases, q["loss_v"], q["width_a"])

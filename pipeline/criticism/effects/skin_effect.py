@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -58,14 +59,13 @@ def _in_a_step(x: Operating, q: Values) -> Complex:
     """Voltage [n, V] while the field moves into the conductors: L_i di/dt, late by τ = √bend/ω_max
     as the current in a resistance beside L_i is, straight lines from sample to sample.
     """
-    from scipy.signal import lfilter  # dear to import, and seldom asked for
-
     late = _late_s(x, q)
     kept = math.exp(-x.ts_s / late)
     new = 1.0 - (1.0 - kept) * late / x.ts_s
     current = np.asarray(x.i_a)
-    first = (1.0 - new) * current[:1]
-    inside = lfilter([new, 1.0 - kept - new], [1.0, -kept], current, zi=first)[0]
+    moves = new * current[1:] + (1.0 - kept - new) * current[:-1]
+    inwards = accumulate(moves.tolist(), lambda now, move: kept * now + move, initial=current[0])
+    inside = np.fromiter(inwards, dtype=np.complex128, count=current.size)
     voltage: Complex = _inner_h(x, q) / late * (current - inside)
     return voltage
 

@@ -12,6 +12,8 @@ _ROUNDS = 3
 time hold each other up."""
 _SHARP = 1e-9
 """Width [A] below which a current's sign is as good as a step."""
+_FAR = 20.0
+"""Widths beyond which what smooths a step is below the rounding of doubles: e^-40 is 4e-18."""
 _SIN_120 = 0.5 * 3.0**0.5
 
 
@@ -127,7 +129,7 @@ def lost_shares(
         share: Array = np.tanh(current_a / width)
         return share
     induced = 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
-    turn = turning(eps_rad)
+    turn = x.once(eps_rad, "turning", lambda: turning(eps_rad))
     winding = phases_of((x.base["r_ohm"] * x.i_a + induced) * turn)
     recorded = None if supply.volts_v is None else phases_of(supply.volts_v * turn)
     late = keeps = (current_a > 0.0).astype(float)
@@ -156,18 +158,22 @@ def _beside(volts: Array, loss_v: float, late: Array, side: float) -> tuple[Arra
     before the pulses, 1 at those after.
     """
     low, moved = np.zeros_like(volts), np.zeros_like(volts)
+    behind = late if side < 0.0 else 1.0 - late
+    held = 2.0 * loss_v * late
     for k, others in enumerate(_OTHERS):
         for j in others:
             apart = volts[k] - volts[j]
-            behind = late[j] if side < 0.0 else 1.0 - late[j]
-            low[k] += 0.5 * np.clip(apart / (2.0 * loss_v) + behind, 0.0, 1.0)
-            moved[k] += np.maximum(side * apart - 2.0 * loss_v * late[j], 0.0) / 3.0
+            low[k] += 0.5 * np.clip(apart / (2.0 * loss_v) + behind[j], 0.0, 1.0)
+            moved[k] += np.maximum(side * apart - held[j], 0.0) / 3.0
     return low, moved
 
 
 def _passed(current_a: Array, ramp_a: float, width_a: float) -> Array:
     """A ramp from 0 to 1 of a length [A] about zero, smoothed by sech² of a width [A]."""
     up, down = (np.abs(current_a + part * ramp_a) / width_a for part in (0.5, -0.5))
-    bent = up - down + np.log1p(np.exp(-2.0 * up)) - np.log1p(np.exp(-2.0 * down))
+    bent = up - down
+    for sign, apart in ((1.0, up), (-1.0, down)):
+        near = apart < _FAR
+        bent[near] += sign * np.log1p(np.exp(-2.0 * apart[near]))
     passed: Array = 0.5 + 0.5 * width_a / ramp_a * bent
     return passed

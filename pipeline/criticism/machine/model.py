@@ -442,13 +442,19 @@ def mean_current(x: Operating, values: Values) -> Operating:
     slope[1:-1] = 0.5 * (current[2:] - current[:-2])
     _, below = ripple(x, values["ripple_mean"], values)
     mean = current - values["ripple_slope"] * slope - below
-    turn = x.machine.pole_pairs * x.omega_rad_s * x.ts_s
-    return replace(
-        x,
-        id_a=mean.real,
-        iq_a=mean.imag,
-        eps_rad=x.eps_rad - values["ripple_slope"] * turn,
-    )
+    return replace(x, id_a=mean.real, iq_a=mean.imag, eps_rad=_earlier(x, values["ripple_slope"]))
+
+
+def _earlier(x: Operating, periods: float) -> Array:
+    """Electrical angle [n, rad] so many sample periods ago."""
+    omega = x.omega_rad_s
+
+    def angle() -> tuple[Array, Array]:
+        return omega, x.eps_rad - periods * (x.machine.pole_pairs * omega * x.ts_s)
+
+    _, earlier = x.once(x.eps_rad, ("earlier", periods, id(omega)), angle)
+    found: Array = earlier
+    return found
 
 
 def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]:
@@ -483,7 +489,11 @@ def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]
     return flux, flux.real / l_d + 1j * flux.imag / l_q
 
 
-def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
+HOOKS = frozenset({"flux", "drop", "torque"})
+"""What an equation may have in it of a machine's hooks."""
+
+
+def evaluate(model: Model, x: Operating, values: Values, hooks: frozenset[str] = HOOKS) -> Pieces:
     """Evaluates every hook of a model but those of sensors.
 
     Parameters
@@ -494,6 +504,8 @@ def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
         True state [n]; flux and air-gap torque are stored in it.
     values
         Parameters by full name.
+    hooks
+        What is asked for: without `drop` or `torque`, drops or drags are zero.
 
     Returns
     -------
@@ -518,17 +530,29 @@ def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
             flux = flux - flux_of(beside, values)
     x.psi_wb = flux
     x.torque_em_nm = air_gap_torque(x, flux, slope)
+    drop = _drops(model, x, values) if "drop" in hooks else np.zeros_like(flux)
+    drag = _drags(model, x, values) if "torque" in hooks else np.zeros_like(slope)
+    return Pieces(flux, slope, drop, drag)
+
+
+def _drops(model: Model, x: Operating, values: Values) -> Complex:
+    """Voltage [n, V] of the resistance and of every effect that has a drop."""
     mean = mean_current(x, values)
     lead = values["lead_share"] if x.inverter else 0.0
     drop: Complex = (1.0 + lead) * values["r_ohm"] * mean.i_a
+    for effect in model.effects:
+        if effect.drop is not None:
+            drop = drop + effect.drop(mean, values_of(effect, model.machine, values))
+    return drop
+
+
+def _drags(model: Model, x: Operating, values: Values) -> Array:
+    """Torque [n, N·m] of friction and of every effect that has a drag."""
     drag: Array = values["b_nm_s_rad"] * x.omega_rad_s
     for effect in model.effects:
-        q = values_of(effect, model.machine, values)
-        if effect.drop is not None:
-            drop = drop + effect.drop(mean, q)
         if effect.torque is not None:
-            drag = drag + effect.torque(x, q)
-    return Pieces(flux, slope, drop, drag)
+            drag = drag + effect.torque(x, values_of(effect, model.machine, values))
+    return drag
 
 
 def zero(effect: Effect, model: Model, at: Iterable[tuple[str, float]] = ()) -> dict[str, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linearise import (
     Column,
+    ColumnKey,
     Rows,
     base_columns,
     effect_columns,
@@ -35,7 +37,6 @@ from pipeline.criticism.residuals.channels import of_acceleration
 
 _STEADY = ("psi_wb", "ld_h", "lq_h", "r_ohm")
 """Constants that every column goes with."""
-ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,6 +262,32 @@ class LinearSystem:
         )
         rows = np.column_stack([self.residual, self.matrix[:, along]])
         return NormalEquations.of(rows, self.group, len(self.labels), prior, self.policy.fit)
+
+    def normal_equations_of(self, residuals: Array) -> list[NormalEquations]:
+        """Normal equations of all columns with other residuals in place of its own.
+
+        Parameters
+        ----------
+        residuals
+            Over the noise [T, R].
+
+        Returns
+        -------
+        list of NormalEquations
+            One a residual.
+
+        """
+        known = self.normal_equations()
+        shape = len(self.labels), len(residuals)
+        slope = np.empty((*shape, len(self.columns)))
+        power = np.empty(shape)
+        order = np.argsort(self.group, kind="stable")
+        edges = np.concatenate([[0], np.cumsum(self.counts).astype(np.int64)])
+        for number, (first, end) in enumerate(pairwise(edges.tolist())):
+            mine = residuals[:, order[first:end]]
+            slope[number] = mine @ self.matrix[order[first:end]]
+            power[number] = (mine**2).sum(axis=1)
+        return [replace(known, power=power[:, n], slope=slope[:, n]) for n in range(len(residuals))]
 
     def along(self, places: NDArray[np.int64]) -> LinearSystem:
         """The same system with some of its columns.

@@ -35,10 +35,11 @@ from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.noise_floors import (
     Floor,
     offsets,
+    reading_error,
     window_gain,
 )
 from pipeline.criticism.residuals.channels import of_acceleration, reported_unit
-from pipeline.criticism.residuals.observability import observes, observes_sensor
+from pipeline.criticism.residuals.observability import hooks_in, observes, observes_sensor
 from pipeline.criticism.residuals.residual import measured, operate, predicted, residual
 from pipeline.criticism.signals.shaft import TORQUE_RIPPLES
 from pipeline.criticism.signals.voltage import RIPPLES
@@ -48,6 +49,10 @@ _CHUNK = 8
 takes an eighth longer), fewer are more calls."""
 _NOTHING = 1e-40
 """What complex steps leave of a term that is zero."""
+
+
+ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
+"""What separates columns: name, and the shapes that they are at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +78,7 @@ class Column:
     at: tuple[tuple[str, float], ...] = ()
 
     @property
-    def key(self) -> tuple[str, tuple[tuple[str, float], ...]]:
+    def key(self) -> ColumnKey:
         """What separates columns."""
         return self.name, self.at
 
@@ -138,11 +143,11 @@ def linearise(
 
     """
     group, window, valid, groups = row_index(segment)
-    sampler = _Sampler(segment, model, dict(values))
-    noise, scale = floor.noise_and_scale(segment, model, sampler.x)
+    sampler = _sampler(segment, model, values)
+    noise, scale = floor.noise_and_scale(group[valid], sampler.reading_error(floor.near, valid))
     row_weight = 1.0 / scale
     kept = _weak_columns(segment, sampler, columns, valid)
-    both = np.column_stack([projected(segment, sampler.here)[valid], kept]) * row_weight[:, None]
+    both = np.column_stack([projected(segment, sampler.here)[valid], *kept]) * row_weight[:, None]
     absorb(both, offsets(segment, valid, row_weight, model.policy.noise_floors))
     unit = reported_unit(segment, values) / (row_weight * window_gain(segment))
     noise_ratio = noise * row_weight
@@ -178,7 +183,7 @@ def trial_residuals(
 
     """
     _, _, valid, _ = row_index(segment)
-    sampler = _Sampler(segment, model, dict(values))
+    sampler = _sampler(segment, model, values)
     sampled = (
         sampler.there(effect, model.with_effects(effect), {**sampler.values, **moved})
         for effect, moved in trials
@@ -191,22 +196,23 @@ def trial_residuals(
 
 def _weak_columns(
     segment: Segment, sampler: _Sampler, columns: Sequence[Column], valid: NDArray[np.bool_]
-) -> Array:
-    """Weak samples [R, P] of every column, zero where the segment does not observe it."""
-    kept = np.zeros((int(valid.sum()), len(columns)))
-    for first in range(0, len(columns), _CHUNK):
-        some = enumerate(columns[first : first + _CHUNK], first)
-        changes = {place: sampler.change(column) for place, column in some}
-        observed = {place: change for place, change in changes.items() if change is not None}
-        if not observed:
-            continue
-        stacked = np.concatenate(list(observed.values()))
-        moving = stacked.any(axis=1)
-        weak = np.zeros((stacked.shape[0], *valid.shape[1:]))
-        weak[moving] = projected(segment, stacked[moving])
-        for place, one in zip(observed, weak.reshape(len(observed), *valid.shape), strict=True):
-            kept[:, place] = one[valid]
-    return kept
+) -> list[Array]:
+    """Weak samples [P][R] of every column, zero where the segment does not observe it."""
+    known, nothing = sampler.weak, np.zeros(int(valid.sum()))
+    new = [column for column in columns if known.get(column.key, (None, nothing))[0] != column]
+    for first in range(0, len(new), _CHUNK):
+        changes = {column.key: sampler.change(column) for column in new[first : first + _CHUNK]}
+        observed = {key: change for key, change in changes.items() if change is not None}
+        made = dict.fromkeys(changes, nothing)
+        if observed:
+            stacked = np.concatenate(list(observed.values()))
+            moving = stacked.any(axis=1)
+            weak = np.zeros((stacked.shape[0], *valid.shape[1:]))
+            weak[moving] = projected(segment, stacked[moving])
+            parts = weak.reshape(len(observed), *valid.shape)
+            made |= {key: one[valid] for key, one in zip(observed, parts, strict=True)}
+        known.update({c.key: (c, made[c.key]) for c in new[first : first + _CHUNK]})
+    return [known[column.key][1] for column in columns]
 
 
 def absorb(rows: Array, unknown: Sequence[Array]) -> None:
@@ -280,15 +286,32 @@ _OF_SENSORS = ("bench_angle_rad", *STATE)
 """Constants by which the machine's true state is another."""
 
 
+def _sampler(segment: Segment, model: Model, values: Values) -> _Sampler:
+    """The sampler of a segment at a point. The last one is kept: a fit comes back to where it ended
+    for columns anew, for those of candidates, for other floors.
+    """
+    known: _Sampler | None = segment.kept.get("sampler")
+    if known is not None and known.at(segment, model, values):
+        return known
+    made = segment.kept["sampler"] = _Sampler(segment, model, dict(values))
+    return made
+
+
 class _Sampler:
-    """Sampled change of a segment's residual along columns; hooks are linear, sensors are not."""
+    """Sampled change of a segment's residual along columns; hooks are linear, sensors are not.
+
+    `weak`: the weak samples [R] of columns that were asked for, by their keys.
+    """
 
     def __init__(self, segment: Segment, model: Model, values: dict[str, float]) -> None:
         self.segment, self.model, self.values = segment, model, values
+        self.weak: dict[ColumnKey, tuple[Column, Array]] = {}
+        self.reading: tuple[Values, Array] | None = None
         self.observes = equation_of(segment).observes
         self.recorder = equation_of(segment).recorder
         self.x = operate(segment, segment.recorded, model, values)
-        pieces = self.pieces = evaluate(model, self.x, values)
+        self.hooks = hooks_in(segment)
+        pieces = self.pieces = evaluate(model, self.x, values, self.hooks)
         self.own: dict[str, Pieces] = {}
         self.gains = {c.name for c in base_of(model.machine) if c.hook == "gain"}
         self.paced: dict[float, Array] = {}
@@ -297,6 +320,17 @@ class _Sampler:
         self.here = measured(segment, segment.recorded, model, values) - self.start
         # a hook's own column does without the small terms between samples
         self.quiet = {**values, "j_kgm2": 0.0, **dict.fromkeys(RIPPLES + TORQUE_RIPPLES, 0.0)}
+
+    def at(self, segment: Segment, model: Model, values: Values) -> bool:
+        """Whether this is the sampler of a segment at a point."""
+        return segment is self.segment and values == self.values and model == self.model
+
+    def reading_error(self, near: Values, valid: NDArray[np.bool_]) -> Array:
+        """Error [R] that any model is allowed, with scales and friction of the values `near`."""
+        if self.reading is None or self.reading[0] != near:
+            error = reading_error(self.segment, self.model, near, self.x)
+            self.reading = dict(near), error[valid]
+        return self.reading[1]
 
     def change(self, column: Column) -> Array | None:
         """d(residual)/d(parameter) [C, n]; None where it is zero throughout."""
@@ -310,6 +344,10 @@ class _Sampler:
             return self._anew(column, column.effect)
         return self._hook(column, column.effect)
 
+    def _residual(self, model: Model, values: Values) -> Array:
+        """The residual [C, n] with another model or other values."""
+        return residual(self.segment, model, values, beside=self.x)
+
     def _base(self, column: Column) -> Array | None:
         if column.name in self.gains:
             return self._gain(column)
@@ -321,7 +359,7 @@ class _Sampler:
             step = min(step, _FINE * self.values[column.name])
         moved = {**self.values, column.name: self.values[column.name] + step}
         if column.name in _OF_SENSORS:
-            return (residual(self.segment, self.model, moved) - self.here) / step
+            return (self._residual(self.model, moved) - self.here) / step
         x = replace(self.x, base=moved)
         pieces = self.pieces
         if column.name == "b_nm_s_rad":
@@ -330,7 +368,7 @@ class _Sampler:
             lead = step * self.values["r_ohm"] * self.mean.i_a * float(x.inverter)
             pieces = replace(pieces, drop_v=pieces.drop_v + lead)
         elif column.name not in _BETWEEN:
-            pieces = evaluate(self.model, x, moved)
+            pieces = evaluate(self.model, x, moved, self.hooks)
         there = predicted(self.segment, x, pieces, self.model, moved)
         if column.name == "j_kgm2" and of_acceleration(self.segment, self.segment.channels[-1]):
             # the slope of 1/J, not of its chord: friction over inertia is known better than 1e-3
@@ -359,7 +397,7 @@ class _Sampler:
             LATE_SPEED,
             *UNLOGGED_K,
         ):
-            return (residual(self.segment, self.model, moved) - self.here) / column.step
+            return (self._residual(self.model, moved) - self.here) / column.step
         there = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(there - self.start) / column.step
 
@@ -378,7 +416,7 @@ class _Sampler:
         """d(residual)/d(gain of the clock) [C, n], once for all candidates that turn on it."""
         if step not in self.paced:
             moved = {**self.values, "gain_clock": self.values["gain_clock"] + step}
-            self.paced[step] = (residual(self.segment, self.model, moved) - self.here) / step
+            self.paced[step] = (self._residual(self.model, moved) - self.here) / step
         return self.paced[step]
 
     def there(self, effect: Effect, model: Model, moved: dict[str, float]) -> Array:
@@ -386,8 +424,10 @@ class _Sampler:
         machine's state, and what its hooks gave, as they are.
         """
         if effect.hook != "sensor" or effect.angle is not None or effect.current is not None:
-            return residual(self.segment, model, moved)
-        there = predicted(self.segment, self.x, self.pieces, model, moved)
+            return self._residual(model, moved)
+        there = self.start
+        if any(hook is not None for hook in (effect.voltage, effect.shaft, effect.speed)):
+            there = predicted(self.segment, self.x, self.pieces, model, moved)
         return measured(self.segment, self.segment.recorded, model, moved) - there
 
     def _start(self, column: Column, effect: Effect) -> dict[str, float]:

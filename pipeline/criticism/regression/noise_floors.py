@@ -47,19 +47,15 @@ class Floor:
     near: Values
     tolerance: Array | None = None
 
-    def noise_and_scale(
-        self, segment: Segment, model: Model, state: Operating
-    ) -> tuple[Array, Array]:
+    def noise_and_scale(self, group: NDArray[np.int64], reading: Array) -> tuple[Array, Array]:
         """Noise floor of the weak samples, without and with the tolerance of form.
 
         Parameters
         ----------
-        segment
-            The segment.
-        model
-            The model.
-        state
-            True state of the segment.
+        group
+            Number of each sample's group [R].
+        reading
+            Reading error of each sample [R].
 
         Returns
         -------
@@ -67,12 +63,10 @@ class Floor:
             Both as weak samples of the residual.
 
         """
-        group, _, valid, _ = row_index(segment)
-        reading = reading_error(segment, model, self.near, state)[valid]
-        noise: Array = np.hypot(self.sigma[group[valid]], reading)
+        noise: Array = np.hypot(self.sigma[group], reading)
         if self.tolerance is None:
             return noise, noise
-        return noise, np.hypot(noise, self.tolerance[group[valid]])
+        return noise, np.hypot(noise, self.tolerance[group])
 
 
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
@@ -360,7 +354,7 @@ def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
     known = dict(values)
     for effect in model.effects:
         known = {**zero(effect, model), **known}
-    evaluate(model, x, known)
+    evaluate(model, x, known, frozenset({"flux"}))
     more = 1.0 + model.policy.selection.form_error
     moved = replace(x, id_a=x.id_a * more, iq_a=x.iq_a * more, kept={})
     change = np.zeros(x.omega_rad_s.shape, dtype=complex)
@@ -414,9 +408,10 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
     for effect in model.effects:
         known = {**zero(effect, model), **known}
     there = x.at(finer * creeping)
+    drag = frozenset({"torque"})
     onward, back = (
-        evaluate(model, replace(there, omega_rad_s=np.full(creeping.size, speed)), known).drag_nm
-        for speed in (slow, -slow)
+        evaluate(model, replace(there, omega_rad_s=pace), known, drag).drag_nm
+        for pace in (np.full(creeping.size, speed) for speed in (slow, -slow))
     )
     grip = np.zeros(segment.size)
     grip[creeping] = 0.5 * np.abs(onward - back) / math.sqrt(3.0)

@@ -44,6 +44,25 @@ def observes(segment: Segment, effect: Hooks) -> bool:
     return effect.hook in seen.hooks
 
 
+def hooks_in(segment: Segment) -> frozenset[str]:
+    """Hooks of the machine that a segment's equation has in it: a drag only with its channel.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+
+    Returns
+    -------
+    frozenset of str
+        Of `flux`, `drop` and `torque`.
+
+    """
+    seen = equation_of(segment).observes
+    without = {"torque"} if seen.torque_in and seen.torque_in not in segment.channels else set()
+    return seen.hooks - without
+
+
 def _sensors_of(effect: Hooks) -> tuple[str, ...]:
     hooks = {
         "angle": (effect.angle,),

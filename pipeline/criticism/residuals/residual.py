@@ -10,12 +10,17 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Operating, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, Pieces, evaluate
+from pipeline.criticism.residuals.observability import hooks_in
 from pipeline.criticism.signals.true_state import on_true_clock
 from pipeline.numerics.projection import Projection
 
 
 def residual(
-    segment: Segment, model: Model, values: Values, recorded: Mapping[str, Array] | None = None
+    segment: Segment,
+    model: Model,
+    values: Values,
+    recorded: Mapping[str, Array] | None = None,
+    beside: Operating | None = None,
 ) -> Array:
     """Recorded less predicted signals of a segment, sample by sample.
 
@@ -29,6 +34,8 @@ def residual(
         Parameters by full name.
     recorded
         Other recorded columns in place of the segment's, such as noisy ones.
+    beside
+        State of the segment at near values: what both have in common is not made again.
 
     Returns
     -------
@@ -40,7 +47,8 @@ def residual(
     equation = equation_of(segment)
     segment = on_true_clock(segment, equation.recorder, model, values)
     x = equation.state(segment, signals, model, values)
-    pieces = evaluate(model, x, values)
+    x = x if beside is None else x.beside(beside)
+    pieces = evaluate(model, x, values, hooks_in(segment))
     seen = equation.measured(segment, signals, model, values)
     return seen - equation.predicted(segment, x, pieces, model, values)
 

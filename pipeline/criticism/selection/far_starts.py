@@ -105,7 +105,13 @@ def with_starts(
 def _best_ends(own: LinearSystem, offered: Sequence[Candidate]) -> list[_End]:
     """The best trial of every parameter with starts: of these, then of finer ones beside it."""
     machine, finer = own.fit.machine, own.policy.selection.finer_starts
-    tried = [(c, p) for c in offered for p in c.effect.parameters_of(machine) if p.starts]
+    tried = [
+        (c, p)
+        for c in offered
+        if any(observes(segment, c.effect) for segment in own.segments)
+        for p in c.effect.parameters_of(machine)
+        if p.starts
+    ]
     nearest = [
         _least(ends)
         for ends in _ends(own, [[_Trial(*one, start) for start in one[1].starts] for one in tried])
@@ -137,13 +143,16 @@ def _ends(own: LinearSystem, trials: Sequence[Sequence[_Trial]]) -> list[list[_E
         rows = np.flatnonzero(own.segment == number)
         for place, residual in part.items():
             whole[place, rows] = residual
-    systems = iter([replace(own, residual=residual) for residual in whole])
-    return [[_end(trial, next(systems)) for trial in some] for some in trials]
-
-
-def _end(trial: _Trial, moved: LinearSystem) -> _End:
-    policy = moved.policy.selection
-    return _End(trial, moved, moved.normal_equations().best(*policy.thorough))
+    thorough = own.policy.selection.thorough
+    ends = iter(
+        [
+            _End(trial, replace(own, residual=residual), known.best(*thorough))
+            for trial, residual, known in zip(
+                each, whole, own.normal_equations_of(whole), strict=True
+            )
+        ]
+    )
+    return [[next(ends) for _ in some] for some in trials]
 
 
 def _score(own: LinearSystem, end: _End, before: Standing, significant: NDArray[np.bool_]) -> Score:

@@ -112,12 +112,18 @@ def motion_of(
         [n m], between samples on straight lines; the speed is smoothed.
 
     """
-    theta = signals["theta_mech_rad"]
-    if finer > 1:
-        at = np.arange(theta.size * finer) / finer
-        theta = np.interp(at, np.arange(theta.size), theta)
-    omega = _speed(theta, segment.ts_s, finer, machine.policy.cutting)
-    return Motion(theta, omega, np.abs(omega) * machine.pole_pairs / (2 * math.pi))
+    recorded = signals["theta_mech_rad"]
+
+    def motion() -> Motion:
+        theta = recorded
+        if finer > 1:
+            at = np.arange(theta.size * finer) / finer
+            theta = np.interp(at, np.arange(theta.size), theta)
+        omega = _speed(theta, segment.ts_s, finer, machine.policy.cutting)
+        return Motion(theta, omega, np.abs(omega) * machine.pole_pairs / (2 * math.pi))
+
+    found: Motion = segment.once(recorded, "motion", (segment.ts_s, finer, machine), motion)
+    return found
 
 
 def finer_of(segment: Segment, machine: Machine, finest: int) -> int:
@@ -249,24 +255,28 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
     if late := segment.fixed.get(LATE_SPEED, 0.0) * values[LATE_SPEED]:
         x = _in_time(segment, x, late)
     zero = zero_angle(segment, values)
-    if not zero and not any(effect.angle is not None for effect in model.effects):
-        return x
-    theta, current = x.theta_rad, x.id_a + 1j * x.iq_a
-    error, policy = np.full(theta.size, zero), model.policy.cutting
+    if not any(effect.angle is not None for effect in model.effects):
+        return _turned_back(x, zero) if zero else x
+    error, policy = np.full(x.theta_rad.size, zero), model.policy.cutting
     for _ in range(policy.angle_rounds):
-        nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
+        nearer = replace(x, theta_rad=x.theta_rad - error / model.machine.pole_pairs)
         error = zero + angle_error(nearer, model, values)
-    turned, finer = error / model.machine.pole_pairs, theta.size // segment.size
+    turned, finer = error / model.machine.pole_pairs, x.theta_rad.size // segment.size
+    slower = x.omega_rad_s - _speed(turned, segment.ts_s, finer, policy)
+    return replace(_turned_back(x, error), omega_rad_s=slower)
+
+
+def _turned_back(x: Operating, error: Array | float) -> Operating:
+    """The state less an error [n or one for all, rad] of its electrical angle; the speed stays."""
     ahead = np.exp(1j * error)
-    current, volts = current * ahead, x.supply.volts_v
+    current, volts = x.i_a * ahead, x.supply.volts_v
     return replace(
         x,
         id_a=current.real,
         iq_a=current.imag,
         supply=x.supply if volts is None else replace(x.supply, volts_v=volts * ahead),
         eps_rad=x.eps_rad - error,
-        theta_rad=theta - turned,
-        omega_rad_s=x.omega_rad_s - _speed(turned, segment.ts_s, finer, policy),
+        theta_rad=x.theta_rad - error / x.machine.pole_pairs,
     )
 
 
@@ -309,7 +319,9 @@ def drive_current(
     recorded = _recorded(segment, signals, model)
     zero = values["zero_alpha_a"] + 1j * values["zero_beta_a"]
     if zero and _both_axes(segment):
-        recorded = replace(recorded, i_a=recorded.i_a - zero * np.exp(-1j * recorded.eps_rad))
+        eps, theta, pairs = recorded.eps_rad, signals["theta_mech_rad"], model.machine.pole_pairs
+        back = segment.once(theta, "back", pairs, lambda: np.exp(-1j * eps))
+        recorded = replace(recorded, i_a=recorded.i_a - zero * back)
     current = true_current(recorded, segment.instrument.ammeter, model, values)
     if current.size < size:
         at = np.arange(size) * (current.size / size)
@@ -391,13 +403,18 @@ def _run(signals: Mapping[str, Array], size: int) -> NDArray[np.int64]:
 
 
 def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> Recorded:
-    theta = signals["theta_mech_rad"]
-    eps = model.machine.pole_pairs * theta
+    theta, pairs = signals["theta_mech_rad"], model.machine.pole_pairs
+
+    def turning() -> tuple[Array, Array]:
+        eps = pairs * theta
+        return eps, np.gradient(eps, segment.ts_s)
+
+    eps, omega = segment.once(theta, "turning", (segment.ts_s, pairs), turning)
     return Recorded(
         i_a=signals.get("id_a", np.zeros(theta.size)) + 1j * signals["iq_a"],
         torque_nm=signals.get("torque_shaft_nm", np.zeros(theta.size)),
         eps_rad=eps,
-        omega_e_rad_s=np.gradient(eps, segment.ts_s),
+        omega_e_rad_s=omega,
         ts_s=segment.ts_s,
         inverter=True,
         instrument=segment.instrument.name,
@@ -429,10 +446,9 @@ def ahead_in(
     log, rows = segment.unthinned.late, segment.recorded.get("t_s")
     if not log or rows is None:
         return None
-    steps = np.diff(rows)
-    if not (steps > 0.0).any():
+    at: Array | None = segment.once(rows, "places", None, lambda: _places(rows))
+    if at is None:
         return None
-    at = np.rint(rows / float(np.median(steps[steps > 0.0])))
     places = at.astype(np.int64)
 
     def ahead(delay_s: float) -> tuple[Complex, Array, Array]:
@@ -446,6 +462,15 @@ def ahead_in(
         return current, change.get("torque_shaft_nm", zero), pole_pairs * change["theta_mech_rad"]
 
     return ahead if at.size == next(iter(signals.values())).size else None
+
+
+def _places(rows: Array) -> Array | None:
+    """Places [n] of times [n, s] on the even clock that they were taken from."""
+    steps = np.diff(rows)
+    if not (steps > 0.0).any():
+        return None
+    places: Array = np.rint(rows / float(np.median(steps[steps > 0.0])))
+    return places
 
 
 def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values) -> Complex:

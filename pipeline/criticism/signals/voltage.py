@@ -103,9 +103,11 @@ def recorded_voltage(
         if effect.voltage is not None:
             q = values_of(effect, model.machine, values)
             voltage = effect.voltage(voltage, x, q, segment.instrument.name)
-    zero = zero_angle(segment, values)
-    if in_frame and (zero or any(effect.angle is not None for effect in model.effects)):
-        voltage = voltage * np.exp(-1j * (zero + angle_error(x, model, values)))
+    if in_frame:
+        error: Array | float = zero_angle(segment, values)
+        if any(effect.angle is not None for effect in model.effects):
+            error = error + angle_error(x, model, values)
+        voltage = voltage * np.exp(-1j * error)
     return voltage * (1.0 + values[segment.instrument.meter])
 
 

@@ -7,12 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.criticism.data.segment import row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linearise import Column
-from pipeline.criticism.regression.noise_floors import Floor, noise_floor
+from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error
 from pipeline.criticism.regression.normal_equations import Prior
 from pipeline.criticism.residuals.residual import operate
 from tests.unit.criticism.machines import BASE, log, machine
@@ -60,8 +61,10 @@ def test_a_tolerance_of_form_joins_the_scale_and_not_the_noise() -> None:
     segment, plain = log(), Model(machine(), ())
     sigma = noise_floor(segment, plain, BASE, 1)
     x = operate(segment, segment.recorded, plain, BASE)
-    noise, same = Floor(sigma, BASE).noise_and_scale(segment, plain, x)
+    group, _, valid, _ = row_index(segment)
+    rows = group[valid], reading_error(segment, plain, BASE, x)[valid]
+    noise, same = Floor(sigma, BASE).noise_and_scale(*rows)
     wrong = Floor(sigma, BASE, np.full(sigma.size, 0.25))
-    still, scale = wrong.noise_and_scale(segment, plain, x)
+    still, scale = wrong.noise_and_scale(*rows)
     assert np.array_equal(noise, same) and np.array_equal(noise, still)
     assert scale == pytest.approx(np.hypot(noise, 0.25))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.segment import row_index
+from pipeline.criticism.data.segment import Kept, row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
@@ -15,11 +15,12 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.linear_system import _kept, linear_system, own_columns
 from pipeline.criticism.regression.linearise import _Sampler, absorb, effect_columns, whitened_anew
 from pipeline.criticism.regression.noise_floors import offsets
-from pipeline.criticism.residuals.residual import residual
-from tests.unit.criticism.machines import BASE, log, machine
+from pipeline.criticism.residuals.residual import operate, residual
+from tests.unit.criticism.machines import BASE, coasting, log, machine
 
 PLAIN = Model(machine(), ())
 LIBRARY = effects()
+WINDAGE = zero(LIBRARY["windage"], PLAIN)
 
 
 def test_rows_over_another_noise_have_their_offsets_absorbed_by_that():
@@ -141,3 +142,54 @@ def test_a_drag_s_column_has_the_gain_of_the_transducer_in_it():
     expected = residual(segment, with_it, moved) - residual(segment, with_it, still)
     found = _Sampler(segment, PLAIN, values).change(column)
     assert found * column.step == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_a_fit_that_comes_back_to_where_it_was_computes_nothing_again(monkeypatch):
+    """Other floors ask for the same columns; elsewhere, or of another model, they are others."""
+    segments = (log(noise=1.0),)
+    start = Fit(segments, PLAIN, {**BASE}, floors(segments, PLAIN, BASE), BASE)
+    offered = effect_columns(LIBRARY["angle_eccentricity"], PLAIN)
+    linear_system(start, offered)
+    asked, change = [], _Sampler.change
+    monkeypatch.setattr(
+        _Sampler, "change", lambda self, one: asked.append(one.name) or change(self, one)
+    )
+    louder = replace(start, sigma=tuple(3.0 * sigma for sigma in start.sigma))
+    again = linear_system(louder, offered)
+    assert asked == []
+    new = linear_system(replace(louder, segments=(replace(segments[0], kept=Kept()),)), offered)
+    assert np.array_equal(again.matrix, new.matrix)
+    assert np.array_equal(again.residual, new.residual)
+    asked.clear()
+    linear_system(replace(start, values={**BASE, "psi_wb": 1.1 * BASE["psi_wb"]}), offered)
+    assert "psi_wb" in asked
+    asked.clear()
+    linear_system(replace(start, model=PLAIN.with_effects(LIBRARY["windage"])).at(WINDAGE), offered)
+    assert "psi_wb" in asked
+
+
+@pytest.mark.parametrize("name", ["current_gain", "angle_eccentricity", "clock_scale"])
+def test_a_residual_beside_another_state_is_the_one_without_it(name):
+    """What two states have in common is taken over, and nothing else."""
+    one, model = log(noise=1.0), PLAIN.with_effects(LIBRARY[name], LIBRARY["unbalance"])
+    values = {n: v for effect in model.effects for n, v in zero(effect, model).items()}
+    values = {**BASE, **values, "unbalance.cos_nm": 1e-3, "gain_clock": 1e-3}
+    state = operate(one, one.recorded, model, values)
+    residual(one, model, values, beside=state)
+    for parameter in model.parameters():
+        moved = {**values, parameter: values[parameter] + 1e-3}
+        alone = residual(replace(one, kept=Kept()), model, moved)
+        assert np.array_equal(residual(one, model, moved, beside=state), alone)
+
+
+def test_a_free_shaft_asks_for_no_voltage(monkeypatch):
+    """Drops are in no equation of a shaft without current."""
+    model = PLAIN.with_effects(LIBRARY["dead_time"])
+    values = {**BASE, **zero(LIBRARY["dead_time"], model), "dead_time.loss_v": 1.0}
+    asked = []
+    counted = replace(LIBRARY["dead_time"], drop=lambda x, _: asked.append(1) or 0.0 * x.i_a)
+    model = PLAIN.with_effects(counted)
+    residual(coasting(), model, values)
+    assert not asked
+    residual(log(), model, values)
+    assert asked
