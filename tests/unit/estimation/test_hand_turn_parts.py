@@ -317,6 +317,23 @@ def test_by_swings_one_voltage_alone(p: int) -> None:
     assert turn.u_psi_wb >= turn.psi_wb * step**2 / 12.0
 
 
+@pytest.mark.parametrize("offset", [-0.005, 0.005])
+def test_the_flux_of_a_voltage_that_never_rests_is_shown_without_its_drift(offset: float) -> None:
+    """Its extremes lie at +A and -A in turn, whatever the amplifier adds."""
+    t, theta, vab, _ = turning(5)
+    moving = np.flatnonzero(np.abs(np.gradient(theta, t)) > 0.1)
+    rows = slice(int(moving[0]), int(moving[-1]))
+    made = spin(t[rows], vab_v=vab[rows] + offset)
+    turn = _by_swings(made, made.channels[0])
+    assert turn is not None
+    found = _extremes(turn.flux_wb, 2e-3)
+    assert found.size >= 8
+    assert np.ptp(np.abs(np.diff(turn.flux_wb[found]))) < 0.01 * 2e-3
+    level = turn.flux_wb[found][1:] + turn.flux_wb[found][:-1]
+    assert np.ptp(level) < 0.01 * 2e-3
+    assert turn.psi_wb == pytest.approx(2e-3, rel=2e-3)
+
+
 def test_the_uncertainty_of_an_amplitude_counts_correlated_steps() -> None:
     """U = sqrt(slope C slope tau), with what a cubic of few rows a cycle leaves."""
     t, theta, vab, _ = turning(3)
