@@ -113,16 +113,17 @@ def motion_of(
 
     """
     recorded = signals["theta_mech_rad"]
+    policy, pairs = machine.policy.cutting, machine.pole_pairs
 
     def motion() -> Motion:
         theta = recorded
         if finer > 1:
             at = np.arange(theta.size * finer) / finer
             theta = np.interp(at, np.arange(theta.size), theta)
-        omega = _speed(theta, segment.ts_s, finer, machine.policy.cutting)
-        return Motion(theta, omega, np.abs(omega) * machine.pole_pairs / (2 * math.pi))
+        omega = _speed(theta, segment.ts_s, finer, policy)
+        return Motion(theta, omega, np.abs(omega) * pairs / (2 * math.pi))
 
-    found: Motion = segment.once(recorded, "motion", (segment.ts_s, finer, machine), motion)
+    found: Motion = segment.once(recorded, "motion", (segment.ts_s, finer, pairs, policy), motion)
     return found
 
 
