@@ -27,7 +27,9 @@ class Machine:
     ld_slope_h_a, lq_slope_h_a2
         How the inductances change with their own current and its square.
     within_d_a, within_q_a
-        Currents up to which that was measured, and beyond which they stay constant.
+        Currents up to which that was measured.
+    beyond
+        Share of the change that goes on beyond them, 0 to 1: nobody has seen it.
     coulomb_nm, viscous_nm_s_rad
         Drag of rotation.
 
@@ -42,6 +44,7 @@ class Machine:
     lq_slope_h_a2: Array
     within_d_a: float
     within_q_a: float
+    beyond: Array
     coulomb_nm: Array
     viscous_nm_s_rad: Array
 
@@ -70,6 +73,7 @@ class Machine:
             self.lq_slope_h_a2[at],
             self.within_d_a,
             self.within_q_a,
+            self.beyond[at],
             self.coulomb_nm[at],
             self.viscous_nm_s_rad[at],
         )
@@ -93,14 +97,21 @@ def inductances_h(machine: Machine, id_a: Array, iq_a: Array) -> tuple[Array, Ar
     -----
     L_d = L_d0 + s_d i_d and L_q = L_q0 + s_q i_q²: the lowest terms that the axes' symmetry allows,
     for the d axis is biased by the magnet and the q axis is not. What one axis does to the other
-    (cross saturation) is not in them.
+    (cross saturation) is not in them. Beyond the currents that were measured an inductance may stay
+    as it is or go on as it did; the draws hold every share of that.
 
     """
-    d = np.clip(id_a, -machine.within_d_a, machine.within_d_a)
-    q = np.clip(iq_a, -machine.within_q_a, machine.within_q_a)
+    d = _seen(machine, id_a, machine.within_d_a)
+    q = _seen(machine, iq_a, machine.within_q_a)
     ld = _wide(machine.ld_h, d) + _wide(machine.ld_slope_h_a, d) * d
     lq = _wide(machine.lq_h, q) + _wide(machine.lq_slope_h_a2, q) * q**2
     return ld, lq
+
+
+def _seen(machine: Machine, current_a: Array, within_a: float) -> Array:
+    """The current by which an inductance changes: all of it within what was measured [A]."""
+    inside = np.clip(current_a, -within_a, within_a)
+    return inside + _wide(machine.beyond, inside) * (current_a - inside)
 
 
 def torque_nm(machine: Machine, id_a: Array, iq_a: Array) -> Array:

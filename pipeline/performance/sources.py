@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.performance.draws import joint_draws
+from pipeline.performance.draws import joint_draws, uniform_draws
 from pipeline.performance.heat import Heat
 from pipeline.performance.machine import Machine
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
@@ -129,6 +129,7 @@ def machine_at(sources: Sources, temp_winding_degc: Array, temp_magnet_degc: Arr
         lq_slope_h_a2=lq_slope,
         within_d_a=within_d,
         within_q_a=within_q,
+        beyond=uniform_draws("saturation beyond the recorded currents", 0.0, 1.0),
         coulomb_nm=d.get("torque_coulomb_nm", zero),
         viscous_nm_s_rad=d.get("b_visc_nm_s_rad", zero),
     )

@@ -68,17 +68,20 @@ class Held:
         return (self.value - self.truth) / ((self.high - self.low) / 3.92)
 
 
-def motor_of(seed: int) -> Motor:
-    """The motor of the recovery tests with its constants within a tenth of what they are."""
+def motor_of(seed: int, saturation: float = 0.0) -> Motor:
+    """The motor of the recovery tests with its constants within a tenth of what they are, and with
+    iron by which L_q falls by a share at rated current.
+    """
     rng = np.random.default_rng(seed)
     names = ("r_phase_ohm", "ld_h", "lq_h", "psi_pm_wb", "b_visc_nm_s_rad", "torque_coulomb_nm")
     drawn = {name: getattr(MOTOR, name) * rng.uniform(0.9, 1.1) for name in names}
-    return replace(MOTOR, **drawn)
+    effects = dict(MOTOR.effects) | ({"saturation": saturation} if saturation else {})
+    return replace(MOTOR, effects=effects, **drawn)
 
 
 @cache
-def published(seed: int) -> Performance:
-    campaign, _ = recorded(PLAN, seed, motor_of(seed), BENCH)
+def published(seed: int, saturation: float = 0.0) -> Performance:
+    campaign, _ = recorded(PLAN, seed, motor_of(seed, saturation), BENCH)
     return performance_of(sheet_of(fit_all(campaign, {})[0].chosen()), OPERATION)
 
 
@@ -129,9 +132,9 @@ def most_torque(motor: Motor, omega: float, near: tuple[float, float]) -> float:
     return float(torque[volts <= LIMIT_V].max())
 
 
-def held(seed: int) -> Iterator[Held]:
+def held(seed: int, saturation: float = 0.0) -> Iterator[Held]:
     """Points of the torque curve, in both regimes, and of the efficiency map of one motor."""
-    motor, told = motor_of(seed), published(seed)
+    motor, told = motor_of(seed, saturation), published(seed, saturation)
     torque = told.curve("torque_peak")
     assert torque is not None
     rng = np.random.default_rng(seed)
@@ -165,13 +168,21 @@ def currents_near(motor: Motor, omega: float) -> tuple[float, float]:
 
 
 @cache
-def all_held() -> tuple[Held, ...]:
-    return tuple(one for seed in range(1, MOTORS + 1) for one in held(seed))
+def all_held(saturation: float = 0.0) -> tuple[Held, ...]:
+    return tuple(one for seed in range(1, MOTORS + 1) for one in held(seed, saturation))
 
 
 def test_forty_operating_points_lie_within_their_intervals() -> None:
     """95 % of 40, five of each of eight motors, each with gains of its own."""
     found = all_held()
+    assert len(found) == 40
+    assert sum(one.inside for one in found) >= 38, [one for one in found if not one.inside]
+
+
+@pytest.mark.slow
+def test_so_they_do_where_the_iron_saturates() -> None:
+    """L_q falls by 12 % at rated current, in a form that the datasheet's is not."""
+    found = all_held(0.12)
     assert len(found) == 40
     assert sum(one.inside for one in found) >= 38, [one for one in found if not one.inside]
 

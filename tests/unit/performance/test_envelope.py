@@ -25,6 +25,7 @@ ONE = np.ones(1)
 SALIENT = Machine(
     pole_pairs=4.0, r_ohm=0.05 * ONE, psi_wb=0.01 * ONE, ld_h=1e-4 * ONE, lq_h=2e-4 * ONE,
     ld_slope_h_a=0.0 * ONE, lq_slope_h_a2=0.0 * ONE, within_d_a=math.inf, within_q_a=math.inf,
+    beyond=0.0 * ONE,
     coulomb_nm=0.02 * ONE, viscous_nm_s_rad=1e-5 * ONE,
 )  # fmt: skip
 ROUND = replace(SALIENT, lq_h=SALIENT.ld_h)
@@ -112,6 +113,9 @@ def test_saturation_bends_its_own_axis_and_stops_where_it_was_measured() -> None
     ld, lq = inductances_h(bent, np.array([[-10.0, -90.0]]), np.array([[50.0, 500.0]]))
     assert ld[0] == pytest.approx([1e-4 - 2e-6, 1e-4 - 6e-6])
     assert lq[0] == pytest.approx([2e-4 - 2.5e-5] * 2)
+    further = inductances_h(replace(bent, beyond=ONE), np.array([[-90.0]]), np.array([[-500.0]]))
+    assert further[0][0] == pytest.approx([1e-4 - 18e-6]), "as it went on"
+    assert further[1][0] == pytest.approx([2e-4 - 2.5e-3])
     # the voltage limit holds for the bent flux, not for the straight one
     found = most_torque(bent, 60.0 * ONE, 10.0, 500.0)
     volts = voltage_v(bent, found.id_a, found.iq_a, np.array([500.0]))
