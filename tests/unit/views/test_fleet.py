@@ -165,6 +165,9 @@ def test_motors_that_lack_the_same_effect_have_one_reason() -> None:
     assert "2 motors, a most: The standard model lacks cogging torque of 7 mN·m" in text
     assert "with it, the error falls from 15 to 0.6 noise floors" in text
     assert next_command(alike, "in", "out") == "run input=in 'model.effects=[cogging]' output=out"
+    others = [make_datasheet(name) for name in "cde"]
+    looked = "diagnose input=in motor=a output=out"
+    assert next_command([*alike, *others], "in", "out") == looked, "it is no matter of the design"
 
 
 def test_the_next_command_is_what_most_motors_need() -> None:
