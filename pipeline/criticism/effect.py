@@ -210,6 +210,8 @@ class ShaftState:
         Number of reversals before a sample [n].
     runs_rad
         Angle turned from each reversal to the next [runs, rad], negative backwards.
+    behind_nm
+        Recorded torque over one that follows it with a play [n], where a transducer recorded it.
 
     """
 
@@ -218,6 +220,7 @@ class ShaftState:
     finer: int = 1
     run: NDArray[np.int64] | None = None
     runs_rad: Array | None = None
+    behind_nm: Array | None = None
 
 
 @dataclass(slots=True, kw_only=True)
@@ -406,10 +409,11 @@ class Operating(Samples):
         """
         samples = {one.name: getattr(self, one.name)[rows] for one in fields(Samples)}
         run = None if self.shaft.run is None else self.shaft.run[rows]
+        behind = None if self.shaft.behind_nm is None else self.shaft.behind_nm[rows]
         return replace(
             self,
             **samples,
-            shaft=replace(self.shaft, run=run, finer=1),
+            shaft=replace(self.shaft, run=run, behind_nm=behind, finer=1),
             supply=replace(self.supply, volts_v=None),
             psi_wb=None,
             torque_em_nm=None,

@@ -12,12 +12,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pipeline.criticism.discovery.changed_constants import Change, changed_constant
+from pipeline.criticism.discovery.changed_within import ChangeWithin, changed_within
 from pipeline.criticism.discovery.unknown_structure import SHAFT, unknown_structure
 from pipeline.criticism.effect import Effect, Machine
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.drift import drifting_segments
 from pipeline.criticism.selection.one_capture import rests_on
@@ -115,7 +117,7 @@ class SearchResult:
     ladder: Ladder
     left: tuple[Remainder, ...]
     sketch: UnknownStructure | None
-    change: Change | None
+    change: Change | ChangeWithin | None
     notes: tuple[str, ...]
 
 
@@ -170,11 +172,19 @@ def search_ladder(
         sketch, gain = _sketched(ladder, left, name, in_parts=True)
         left = left if sketch else ladder.large()
         notes += [_WITHIN] if sketch else []
-    change = None if ladder.explains(left) else changed_constant(ladder.steps[-1].system)
+    change = None if ladder.explains(left) else _changed(ladder.steps[-1].system)
     if change is not None and (sketch is None or change.gain > gain):
         return SearchResult(ladder, left or ladder.left, None, change, (change.words,))
     notes += _beside(sketch, left)
     return SearchResult(ladder, left, sketch, None, tuple(notes))
+
+
+def _changed(system: LinearSystem) -> Change | ChangeWithin | None:
+    """The constant that changed between captures, or within one where that explains more."""
+    between, within = changed_constant(system), changed_within(system)
+    if between is None or within is None:
+        return between or within
+    return within if within.gain > between.gain else between
 
 
 def _beside(sketch: UnknownStructure | None, left: Sequence[Remainder]) -> list[str]:

@@ -408,7 +408,8 @@ def prepared(found: dict[str, Array], period: float, policy: Policy) -> Sensors:
     Parameters
     ----------
     found
-        Columns [n]; temperatures are smoothed in place, and `travel_rad` and `run` are added.
+        Columns [n]; temperatures are smoothed in place; `travel_rad`, `run` and `behind_nm` are
+        added.
     period
         Sample period [s].
     policy
@@ -429,7 +430,37 @@ def prepared(found: dict[str, Array], period: float, policy: Policy) -> Sensors:
     runs = np.array([math.inf])
     if "theta_mech_rad" in found:
         runs = with_travel(found, noise, policy.cutting)
+    if "torque_shaft_nm" in found:
+        found["behind_nm"] = behind(found["torque_shaft_nm"], policy.cutting.play_share)
     return Sensors(noise, steps, runs)
+
+
+def behind(signal: Array, share: float) -> Array:
+    """What a signal is over one that follows it with a play: its past, of hysteresis.
+
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit].
+    share
+        Half of the play, of the largest size of the signal [1].
+
+    Returns
+    -------
+    array [n]
+        Same unit, at most half of the play; that where it rises, less that where it falls.
+
+    References
+    ----------
+    Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer, 1989 (play operator).
+
+    """
+    half = share * float(np.abs(signal).max(initial=0.0))
+    found, follows = np.empty(signal.size), float(signal[0]) if signal.size else 0.0
+    for n, value in enumerate(signal.tolist()):
+        follows = min(max(follows, value - half), value + half)
+        found[n] = value - follows
+    return found
 
 
 def noise_and_steps(

@@ -13,6 +13,8 @@ from pipeline.criticism.effect import Array, Machine, Operating
 from pipeline.criticism.policy.discovery import Discovery
 from pipeline.physics.units import TURN_RAD
 
+PAST = "torque_past_nm"
+"""Name of the variable that a transducer's hysteresis is a curve of."""
 _EDGE = 1e-9
 """First hat, as a share of the range: beside zero and not at it, where friction jumps."""
 
@@ -125,6 +127,7 @@ def variables(machine: Machine) -> Mapping[str, Variable]:
         ),
         _warmth("temp_winding_degc", "winding_k"),
         _warmth("temp_magnet_degc", "magnet_k"),
+        _past(machine),
         _turn("theta_mech_rad", "theta_rad"),
         _turn("theta_elec_rad", "eps_rad"),
     )
@@ -141,6 +144,18 @@ def _axis(name: str, top_a: float) -> Variable:
     read = attrgetter(name)
     code = f"np.real(x.{name})"
     return Variable(name, (name,), "A", "signed", top_a, code, lambda x: np.real(read(x)))
+
+
+def _past(machine: Machine) -> Variable:
+    """Past of the recorded torque: over one that follows it with a play; 0 without a transducer."""
+    top = machine.policy.cutting.play_share * machine.scales["torque_nm"]
+
+    def read(x: Operating) -> Array:
+        past = x.shaft.behind_nm
+        return np.zeros(x.theta_rad.size) if past is None else past
+
+    code = "0.0 * x.theta_rad if x.shaft.behind_nm is None else x.shaft.behind_nm"
+    return Variable(PAST, ("torque_shaft_nm",), "N·m", "signed", top, f"({code})", read)
 
 
 def _warmth(column: str, field: str) -> Variable:

@@ -26,7 +26,14 @@ at."""
 _A_WAVE = 8
 """Points a wave of a curve that is reported over a turn: with fewer its lines cut the tops off, and
 with less than two another order is seen."""
-_SYMBOLS = {"torque": "drag", "drop": "drop", "flux": "co-energy/1.5"}
+_SYMBOLS = {
+    "torque": "drag",
+    "drop": "drop",
+    "flux": "co-energy/1.5",
+    "angle": "recorded - true angle",
+}
+_DIRECTION = {"omega_mech_rad_s": "rotation", "iq_a": "the torque"}
+"""What the sign of a variable is a direction of."""
 
 
 def describe(
@@ -245,6 +252,12 @@ def _run(
     if variable.kind == "turn":
         return f"at most {place}"
     parity = _parity(dense, values, policy) if variable.kind == "signed" else ""
+    step = _step(dense, values, policy)
+    if port.hook == "angle" and parity == "odd, " and step:
+        return (
+            f"it depends on the direction of {_DIRECTION[variable.name]}, like an angle error of "
+            f"±{1e3 * step:.3g} mrad, as of an encoder that sits loose"
+        )
     return f"{parity}{'largest,' if warm else _ending(dense, np.abs(values), policy)} {place}"
 
 
@@ -259,6 +272,13 @@ def _ending(at: Array, size: Array, policy: Discovery) -> str:
     if abs(at[top]) < policy.inside_share * abs(at[end]):
         return "largest," if top == 0 else "with its maximum"
     return "largest," if level else "still growing at the end of the range,"
+
+
+def _step(at: Array, values: Array, policy: Discovery) -> float:
+    """Size of a curve that goes by the sign alone beside zero; 0 of any other."""
+    size = np.abs(values)[np.abs(at) >= policy.jump_share * float(np.abs(at).max())]
+    level = float(np.median(size))
+    return level if float(np.abs(size - level).max()) <= policy.parity_share * level else 0.0
 
 
 def _parity(at: Array, values: Array, policy: Discovery) -> str:

@@ -10,8 +10,9 @@ from pipeline.criticism.discovery.matching_pursuit import Expression
 from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.policy.discovery import Discovery
 
-_SUFFIX = {"torque": "nm", "drop": "v", "flux": "wb"}
-_TESTS = {"torque": "torque_map", "drop": "torque_map", "flux": "torque_map"}
+_SUFFIX = {"torque": "nm", "drop": "v", "flux": "wb", "angle": "rad"}
+_KINDS = {"torque": "Array", "drop": "Complex", "flux": "Any", "angle": "Array"}
+_TESTS = {"torque": "torque_map", "drop": "torque_map", "flux": "torque_map", "angle": "drive"}
 _HEAD = '''"""{title}
 
 Written by `diagnose` as a start: no effect of the library explains what this does.
@@ -62,7 +63,7 @@ def effect_source(
 
     """
     lines = [*_body(port, found, current_a), "", "", *_effect(port, found, name, shape, policy)]
-    kinds = {"torque": "Array", "drop": "Complex", "flux": "Any"}[port.hook]
+    kinds = _KINDS[port.hook]
     listed = ["Effect", "Operating", "Parameter", "Values"]
     head = _HEAD
     if kinds == "Any":
@@ -85,7 +86,7 @@ def _wrapped(text: str) -> str:
 
 
 def _body(port: Port, found: Expression, current_a: float) -> Iterator[str]:
-    kind = {"torque": "Array", "drop": "Complex", "flux": "Any"}[port.hook]
+    kind = _KINDS[port.hook]
     yield f"def _value(x: Operating, q: Values) -> {kind}:"
     if port.variable is None:
         yield f"    d, i = x.id_a / {current_a:.6g}, x.iq_a / {current_a:.6g}"
@@ -94,8 +95,8 @@ def _body(port: Port, found: Expression, current_a: float) -> Iterator[str]:
     yield f"    total: {kind} = np.zeros(np.shape(x.omega_rad_s))"
     for n, term in enumerate(found.terms):
         yield f"    total = total + {_summand(port, n, term, current_a)}"
-    if port.hook == "drop":
-        yield "    # a drive's own log only: a drop that the motor has itself needs no factor"
+    if port.hook in ("drop", "angle"):
+        yield "    # a drive's own log only: what the motor has itself needs no factor"
         yield "    return total * (1.0 if x.inverter else 0.0)"
     else:
         yield "    return total"
@@ -141,7 +142,7 @@ def _effect(
     for n, term in enumerate(found.terms):
         yield from _parameters(port, n, term, float(found.amplitudes[n]), policy)
     yield "    ),"
-    hook = {"torque": "torque", "drop": "drop", "flux": "coenergy"}[port.hook]
+    hook = {"flux": "coenergy"}.get(port.hook, port.hook)
     yield f"    {hook}=_value,"
     yield ")"
 

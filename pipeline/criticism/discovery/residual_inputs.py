@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.discovery.bases import Basis, Variable, coarse, fine, variables
+from pipeline.criticism.discovery.bases import PAST, Basis, Variable, coarse, fine, variables
 from pipeline.criticism.effect import Effect, Machine, Operating, Parameter, Values
 from pipeline.criticism.policy.discovery import Discovery
 
@@ -23,6 +23,7 @@ _SCALES = {
     "torque": ("torque_nm", "N·m"),
     "drop": ("voltage_v", "V"),
     "flux": ("flux_wb", "Wb"),
+    "angle": ("1", "rad"),
 }
 
 
@@ -105,7 +106,12 @@ def ports(
         Where they act.
 
     """
-    makers = {"torque": _torque_ports, "drop": _drop_ports, "flux": _flux_ports}
+    makers = {
+        "torque": _torque_ports,
+        "drop": _drop_ports,
+        "flux": _flux_ports,
+        "angle": _angle_ports,
+    }
     return tuple(port for hook in hooks for port in makers[hook](machine, policy))
 
 
@@ -147,6 +153,7 @@ def _torque_ports(machine: Machine, policy: Discovery) -> list[Port]:
         *((sense, name) for name in (*warm, turn[0], "i_a")),
         *((iq, name) for name in (*warm, *turn, "omega_mech_rad_s")),
         (load, turn[0]),
+        (one, PAST),
     )
     known = variables(machine)
     shaft = ("torque_shaft_nm",)
@@ -154,6 +161,14 @@ def _torque_ports(machine: Machine, policy: Discovery) -> list[Port]:
         _port("torque", known[name], coarse(known[name], machine, policy), (carrier,), shaft)
         for carrier, name in pairs
     ]
+
+
+def _angle_ports(machine: Machine, policy: Discovery) -> list[Port]:
+    """Errors of the angle that an encoder records: by its direction, the torque, the turn."""
+    one, known = _torque_carriers(machine)[0], variables(machine)
+    names = ("omega_mech_rad_s", "iq_a", "theta_mech_rad")
+    curves = [(known[name], coarse(known[name], machine, policy)) for name in names]
+    return [_port("angle", variable, basis, (one,), ("vd_v",)) for variable, basis in curves]
 
 
 def _torque_carriers(machine: Machine) -> tuple[Carrier, ...]:
@@ -291,8 +306,16 @@ def _port(
         "torque": {"torque": value},
         "drop": {"drop": lambda x, q: value(x, q).astype(complex) * (1.0 if x.inverter else 0.0)},
         "flux": {"coenergy": value},
+        "angle": {"angle": lambda x, q: value(x, q) * (1.0 if x.inverter else 0.0)},
     }[hook]
-    word = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}[hook]
+    word = {
+        "torque": "drag",
+        "drop": "voltage drop",
+        "flux": "flux linkage",
+        "angle": "error of the electrical angle that the encoder records",
+    }[hook]
+    if variable.name == PAST:
+        word = "error of the torque's transducer (hysteresis)"
     times = carriers[0].words
     words = f"{word} as a curve of {variable.name}" + (f" times {times}" if times else "")
     title = f"port:{hook}:{'+'.join(signals)}:{variable.name}:{times}:{count}"

@@ -114,13 +114,14 @@ def unknown_structure(
 
 def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
     """Hooks that can reach the first of the signals that miss, and others with it: a shaft's own
-    torque is not in the voltage, a winding's drop not in the torque, flux is in both.
+    torque is not in the voltage, a winding's drop not in the torque, flux and angle are in both.
     """
     if not signals:
-        return ("torque", "drop", "flux")
+        return ("torque", "drop", "flux", "angle")
     if signals[0] not in SHAFT:
-        return ("drop", "flux")
-    return ("torque",) if all(signal in SHAFT for signal in signals) else ("torque", "flux")
+        return ("drop", "flux", "angle")
+    alone = all(signal in SHAFT for signal in signals)
+    return ("torque",) if alone else ("torque", "flux", "angle")
 
 
 def _ranked(

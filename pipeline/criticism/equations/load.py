@@ -65,12 +65,12 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     window = window_of(period, size, policy)
     sensors = evened(capture, found, prepared(found, period, machine.policy), machine, window)
     found["t_s"] = period * np.arange(size, dtype=np.float64)
-    found["row"] = np.arange(size, dtype=np.float64)
     cut_out, starts = thinned(found, keep, window, policy.windows)
     by_angle = "omega_mech_rad_s" not in angle
     orders = electrical_orders(machine) if by_angle else ()
     weak = projection(cut_out["theta_mech_rad"], starts, window, orders)
-    blocks = in_time(cut_out.pop("row")[weak.starts + window // 2], size)
+    middle = np.rint(cut_out["t_s"][weak.starts + window // 2] / period)
+    blocks = in_time(middle, size)
     made = segment_of(
         capture,
         "load",

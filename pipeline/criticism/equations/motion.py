@@ -54,12 +54,13 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if log is None or not log.angle or not runs_free(log, machine):
         return None
     shaft = {name: log.columns[name] for name in _USED if name in log.columns}
-    shaft["row"] = np.arange(log.keep.size, dtype=float)
+    shaft["t_s"] = log.period_s * np.arange(log.keep.size)
     policy = machine.policy.cutting
     window = window_of(log.period_s, log.keep.size, policy)
     shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
-    blocks = in_time(shaft.pop("row")[starts + window // 2], log.keep.size)
+    middle = np.rint(shaft["t_s"][starts + window // 2] / log.period_s)
+    blocks = in_time(middle, log.keep.size)
     return segment_of(
         capture,
         "motion",

@@ -68,6 +68,10 @@ class Cutting:
         "change of a terminal's voltage or current from which on it is a step",
         why="white noise comes to 6 in a log of 1e5 samples",
     )  # fmt: skip
+    play_share: float = chosen(
+        0.25, "1", "half of the play by which a torque's past is told, of its largest size",
+        why="loops of half of the range are seen, and steps of noise are not",
+    )  # fmt: skip
     turning_rad: float = chosen(
         0.1, "rad", "travel of a shaft from which on it turns",
         why="a held shaft twists and its encoder is rounded by less",

@@ -27,6 +27,10 @@ class Discovery:
         3, "1", "fewest captures that hold a constant which changed between some of them",
         why="of two that disagree nobody knows which one is odd",
     )  # fmt: skip
+    change_windows: int = chosen(
+        4, "windows", "fewest windows before and after a change within a capture",
+        why="what lasts for less is an event and no other value",
+    )  # fmt: skip
     knot_exponent: float = chosen(
         1.6, "1", "exponent that crowds the knots of a curve near zero, where friction bends most",
         why="at 1 they are even, at 3 the upper half of the range has two",

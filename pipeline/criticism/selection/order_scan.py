@@ -272,23 +272,39 @@ def _parts(theta: Array, weight: Array, policy: OrderScan) -> Iterator[NDArray[n
 def _lines(log: Log, policy: OrderScan) -> list[float]:
     """Orders that stand out of the twelve steps at either side by 20 in power and have an rms that
     matters; the clearest is taken out before the next is looked for.
+
+    What is beside a line is judged with the line taken out: a few turns with gaps between them
+    spread a clear line over its neighbours.
     """
     parts = log.parts
     seen_to = (_seen_to(part.theta_rad, policy.samples) for part in parts)
     count = int(min(policy.highest, *seen_to) / policy.step)
+    if count <= 2 * policy.beside:
+        return []
     grid = policy.step * np.arange(1, count + 1)
+    power, beside = _spectrum(parts, count, policy)
     found: list[float] = []
-    while len(found) < policy.most and count > 2 * policy.beside:
-        power = np.mean([part.spectrum(count, policy.step) for part in parts], axis=0)
-        beside = median_filter(power, (1, 2 * policy.beside + 1), mode="nearest")
-        clear = power / np.maximum(beside, 1e-300)
-        clear = np.where((power > log.least**2) & (grid >= policy.lowest), clear, 0.0).max(axis=0)
-        best = int(np.argmax(clear))
-        if clear[best] <= policy.stands_out:
+    while len(found) < policy.most:
+        matters = (power > log.least**2) & (grid >= policy.lowest)
+        best = int(np.argmax(np.where(matters, power / beside, 0.0).max(axis=0)))
+        if not matters[:, best].any():
             break
-        found.append(_peak(parts, float(grid[best]), policy))
-        parts = tuple(part.without(found[-1]) for part in parts)
+        order = _peak(parts, float(grid[best]), policy)
+        parts = tuple(part.without(order) for part in parts)
+        left, beside = _spectrum(parts, count, policy)
+        clear = np.where(matters[:, best], power[:, best] / beside[:, best], 0.0)
+        if float(clear.max()) <= policy.stands_out:
+            break
+        found.append(order)
+        power = left
     return found
+
+
+def _spectrum(parts: Sequence[Part], count: int, policy: OrderScan) -> tuple[Array, Array]:
+    """Mean power [2, K] of the parts at every order of the grid, and its median beside each."""
+    power: Array = np.mean([part.spectrum(count, policy.step) for part in parts], axis=0)
+    beside = median_filter(power, (1, 2 * policy.beside + 1), mode="nearest")
+    return power, np.maximum(beside, 1e-300)
 
 
 def _peak(parts: Sequence[Part], near: float, policy: OrderScan) -> float:

@@ -209,6 +209,7 @@ def operating(
             finer=theta.size // segment.size,
             run=_run(signals, theta.size),
             runs_rad=segment.sensors.runs_rad,
+            behind_nm=_behind(signals, theta.size),
         ),
     )
 
@@ -401,6 +402,11 @@ def _run(signals: Mapping[str, Array], size: int) -> NDArray[np.int64]:
     if run is None:
         return np.zeros(size, dtype=np.int64)
     return np.repeat(run.astype(np.int64), size // run.size)
+
+
+def _behind(signals: Mapping[str, Array], size: int) -> Array | None:
+    behind = signals.get("behind_nm")
+    return None if behind is None else np.repeat(behind, size // behind.size)
 
 
 def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> Recorded:

@@ -127,3 +127,25 @@ def test_a_part_is_rid_of_a_wave_of_one_size_or_as_the_current_or_its_size_goes(
     rid = part.without(16.0)
     assert np.abs(rid.left - other).max() < 0.005
     assert np.abs(part.left - other).max() > 0.9
+
+
+@pytest.mark.parametrize("grows", ["never", "with the current", "with its size"])
+@pytest.mark.parametrize("order", [1.27, 2.37, 3.14, 7.62])
+def test_a_clear_line_is_found_wherever_it_is_and_however_it_grows(order, grows):
+    """Few turns spread a line over its neighbours: these are no noise beside it."""
+    waved = []
+    for one in (spinning(seed) for seed in (1, 2)):
+        theta, current, torque = (one.recorded[n] for n in ("theta_mech_rad", "iq_a", TORQUE))
+        size = {"never": 6.0, "with the current": current, "with its size": np.abs(current)}[grows]
+        torque = torque + 6e-3 * size * np.cos(order * theta + 0.7)
+        waved.append(replace(one, recorded={**one.recorded, TORQUE: torque}))
+    assert left(*waved) == pytest.approx((order,), abs=5e-3)
+
+
+def test_two_lines_at_once_are_told_apart():
+    waved = []
+    for one in (spinning(seed) for seed in (1, 2)):
+        theta, current, torque = (one.recorded[n] for n in ("theta_mech_rad", "iq_a", TORQUE))
+        both = 6e-3 * np.abs(current) * np.cos(1.73 * theta) + 0.024 * np.sin(6.41 * theta)
+        waved.append(replace(one, recorded={**one.recorded, TORQUE: torque + both}))
+    assert left(*waved) == pytest.approx((1.73, 6.41), abs=0.02)

@@ -1,0 +1,242 @@
+"""A constant that changed within a capture: a magnet that lost flux in a log, and when.
+
+No state of the machine predicts the time of such a change. Every time between two windows of a
+capture is tried, to first order, with a value of the constant of its own in every other capture;
+the others then have the value from before or from after it, whichever is nearer. A constant that
+moves slowly is no such change: a ramp over the capture must do worse.
+
+Reference: Quandt, J. Am. Stat. Assoc. 53 (1958) 873, doi:10.1080/01621459.1958.10501484, a linear
+regression that obeys two regimes; the interval is that of times whose likelihood is near the best.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import clock
+from pipeline.criticism.discovery.changed_constants import End, by_words, may_change, unit_of
+from pipeline.criticism.effect import Array
+from pipeline.criticism.regression.goodness import significant_groups
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.normal_equations import pseudo_inverse
+from pipeline.criticism.selection.score_test import clears
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeWithin:
+    """A constant with another value from some time in a capture on.
+
+    Attributes
+    ----------
+    name, unit
+        Of the constant.
+    value
+        In most of the campaign, before or after.
+    difference, u
+        What it is more afterwards, and its standard uncertainty [unit].
+    capture
+        In which it changed.
+    at_s
+        When, from the first sample of that capture: no earlier and no later than these.
+    after
+        Further captures that have the later value.
+    gain
+        Deviance that it takes, its penalty paid.
+
+    """
+
+    name: str
+    unit: str
+    value: float
+    difference: float
+    u: float
+    capture: str
+    at_s: tuple[float, float]
+    after: tuple[str, ...]
+    gain: float
+
+    @property
+    def words(self) -> str:
+        """What changed, by how much, where and when, in a sentence."""
+        further = f", as in {', '.join(self.after)}" if self.after else ""
+        first, last = self.at_s
+        return (
+            f"{self.name} is {by_words(self.value, self.difference, self.u, self.unit)} in "
+            f"{self.capture} from a time between {first:.4g} and {last:.4g} s on{further}: it "
+            "changed within that capture, with no state of the machine"
+        )
+
+
+def changed_within(system: LinearSystem) -> ChangeWithin | None:
+    """The constant whose change within a capture explains most of what is over the floor.
+
+    Parameters
+    ----------
+    system
+        Around a fit that leaves something over the floor.
+
+    Returns
+    -------
+    ChangeWithin or None
+        None where no change takes half of the power over the floor, is worth its penalty and does
+        better than a ramp.
+
+    """
+    significant = significant_groups(system)
+    over = {
+        system.segments[place].capture
+        for (place, _, _), some in zip(system.labels, significant, strict=True)
+        if some
+    }
+    places = [n for n in system.own.tolist() if may_change(system, system.columns[n].name)]
+    rows = _Rows.of(system)
+    tried = [
+        found
+        for capture in sorted(over)
+        for found in _found(system, rows, capture, places, significant)
+    ]
+    return max(tried, key=lambda change: change.gain, default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Capture [R] and time [R, s] of every row; NaN in tables. `reach_s` [R]: half a window."""
+
+    capture: NDArray[np.str_]
+    time_s: Array
+    reach_s: Array
+
+    @classmethod
+    def of(cls, system: LinearSystem) -> _Rows:
+        times, reach = np.full((2, system.residual.size), np.nan)
+        for number, segment in enumerate(system.segments):
+            mine = system.segment == number
+            if segment.weak is not None:
+                middle = segment.weak.starts + segment.weak.length // 2
+                times[mine] = clock(segment)[middle][system.window[mine]]
+                reach[mine] = 0.5 * segment.weak.length * segment.ts_s
+        names = np.array([segment.capture for segment in system.segments])[system.segment]
+        return cls(names, times, reach)
+
+
+@dataclass(frozen=True, slots=True)
+class _Steps:
+    """Changes of one constant within a capture, at any of its window times [T, s]; captures that
+    are `away` [R] have the later value.
+    """
+
+    system: LinearSystem
+    time_s: Array
+    here: NDArray[np.bool_]
+    away: NDArray[np.bool_]
+    column: Array
+    times: Array
+
+    def end(self, cut: int) -> End:
+        """The best fit with another value behind a time."""
+        later = self.away | (self.here & (self.time_s > self.times[cut]))
+        return End.of(self.system, np.where(later, self.column, 0.0)[:, None])
+
+    def ramp(self) -> End:
+        """The best fit with a value that moves evenly over the capture."""
+        passed = (self.time_s - self.times[0]) / (self.times[-1] - self.times[0])
+        share = np.where(self.here, np.clip(np.nan_to_num(passed), 0.0, 1.0), self.away)
+        return End.of(self.system, (share * self.column)[:, None])
+
+    def near(self, cut: int, deviance: float, least: int) -> tuple[int, int]:
+        """First and last cut beside the best one that captures do not discriminate from it."""
+        ends, tie = [cut, cut], self.system.policy.selection.tie
+        for side, step in enumerate((-1, 1)):
+            beside = cut + step
+            while least - 1 <= beside < self.times.size - least:
+                if self.end(beside).deviance > deviance + tie:
+                    break
+                ends[side] = beside
+                beside += step
+        return ends[0], ends[1]
+
+
+def _found(
+    system: LinearSystem,
+    rows: _Rows,
+    capture: str,
+    places: list[int],
+    significant: NDArray[np.bool_],
+) -> Iterator[ChangeWithin]:
+    """The best change of every constant within one capture that passes."""
+    here, tie = rows.capture == capture, system.policy.selection.tie
+    least = system.policy.discovery.change_windows
+    before = End.of(system, np.empty((system.size, 0)))
+    for place in places:
+        column, name = system.matrix[:, place], system.columns[place].name
+        seen = here & (column != 0.0) & np.isfinite(rows.time_s)
+        times = np.unique(rows.time_s[seen])
+        if times.size < 2 * least:
+            continue
+        cut, after = _scanned(system, rows, seen, place, times, least)
+        steps = _Steps(system, rows.time_s, here, np.isin(rows.capture, after), column, times)
+        end = steps.end(cut)
+        penalty = 2.0 * math.log(system.size) + 2.0 * math.log(times.size * len(places))
+        gain = before.deviance - end.deviance - penalty
+        most = clears(system, significant, before.reduced_chi2, end.reduced_chi2)
+        if gain <= tie or not most or steps.ramp().deviance < end.deviance + tie:
+            continue
+        first, last = steps.near(cut, end.deviance, least)
+        reach = float(rows.reach_s[seen].max())
+        at_s = float(times[first] - reach), float(times[last + 1] + reach)
+        value = system.fit.values[name] + float(end.step[place])
+        difference, unit = float(end.step[-1]), unit_of(system, name)
+        yield ChangeWithin(name, unit, value, difference, end.u, capture, at_s, tuple(after), gain)
+
+
+def _scanned(
+    system: LinearSystem,
+    rows: _Rows,
+    seen: NDArray[np.bool_],
+    place: int,
+    times: Array,
+    least: int,
+) -> tuple[int, list[str]]:
+    """Number of the last time before the best change, and the captures that have the later value.
+
+    Every other capture that has the constant in it has a value of its own meanwhile.
+    """
+    column = system.matrix[:, place]
+    capture = rows.capture[seen][0]
+    held = [n for n in np.unique(rows.capture[column != 0.0]).tolist() if n != capture]
+    own = [np.where(rows.capture == name, column, 0.0) for name in held]
+    known = np.column_stack([system.matrix[:, system.own], *own])
+    weight = system.weights(system.reduced_chi2(system.residual))
+    precision = np.concatenate([system.prior_precision[system.own], np.zeros(len(own))])
+    gradient = np.concatenate([system.prior_gradient[system.own], np.zeros(len(own))])
+    weighted = known * weight[:, None]
+    inverse = pseudo_inverse(weighted.T @ known + np.diag(precision))
+    slope = weighted.T @ system.residual + gradient
+    bins = np.searchsorted(times, rows.time_s[seen])
+    mine = column[seen]
+
+    def after(parts: Array) -> Array:
+        """Sums [T - 1] over what is later than each time but the last."""
+        summed = np.zeros((times.size, *parts.shape[1:]))
+        np.add.at(summed, bins, parts)
+        total: Array = np.cumsum(summed[::-1], axis=0)[::-1][1:]
+        return total
+
+    cross = after(weighted[seen] * mine[:, None])
+    left = after(weight[seen] * mine * system.residual[seen]) - cross @ inverse @ slope
+    free = after(weight[seen] * mine**2) - np.einsum("ti,ij,tj->t", cross, inverse, cross)
+    gain = np.where(free > 0.0, left**2 / np.maximum(free, 1e-300), 0.0)
+    inside = np.arange(gain.size)
+    gain[(inside < least - 1) | (inside >= times.size - least)] = -1.0
+    cut = int(np.argmax(gain))
+    difference = -left[cut] / max(float(free[cut]), 1e-300)
+    step = -inverse @ (slope + cross[cut] * difference)
+    apart = step[step.size - len(held) :]
+    return cut, [
+        n for n, one in zip(held, apart.tolist(), strict=True) if abs(one - difference) < abs(one)
+    ]
