@@ -54,7 +54,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if log is None or not log.angle or not runs_free(log, machine):
         return None
     shaft = {name: log.columns[name] for name in _USED if name in log.columns}
-    shaft["t_s"] = log.period_s * np.arange(log.keep.size)
+    shaft["t_s"] = log.period_s * np.arange(log.keep.size, dtype=np.float64)
     policy = machine.policy.cutting
     window = window_of(log.period_s, log.keep.size, policy)
     shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion)
