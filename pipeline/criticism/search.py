@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from pipeline.criticism.discovery.changed_constants import Change, changed_constant
 from pipeline.criticism.discovery.changed_within import ChangeWithin, changed_within
-from pipeline.criticism.discovery.unknown_structure import SHAFT, unknown_structure
+from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.effect import Effect, Machine
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.policy.policy import policy_of
@@ -26,7 +26,7 @@ from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.order_scan import orders_left
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of
 from pipeline.criticism.selection.stepwise import LadderStep, search
-from pipeline.criticism.selection.truncation import contradiction, explained, truncated
+from pipeline.criticism.selection.truncation import SHAFT, contradiction, explained, truncated
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.diagnosis import Remainder, UnknownStructure

@@ -18,10 +18,8 @@ from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column, effect_columns
+from pipeline.criticism.selection.truncation import SHAFT
 from pipeline.records.diagnosis import UnknownStructure
-
-SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
-"""Signals of the shaft, to which a torque comes."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,7 @@ class Cutting:
         why="white noise comes to 6 in a log of 1e5 samples",
     )  # fmt: skip
     play_share: float = chosen(
-        0.25, "1", "half of the play by which a torque's past is told, of its largest size",
+        0.25, "1", "half of the play by which the past of a torque goes, of its largest size",
         why="loops of half of the range are seen, and steps of noise are not",
     )  # fmt: skip
     turning_rad: float = chosen(

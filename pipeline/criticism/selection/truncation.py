@@ -7,10 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.criticism.machine.model import values_of
-from pipeline.criticism.regression.goodness import HeldOut, remainder, significant_groups
+from pipeline.criticism.regression.goodness import (
+    HeldOut,
+    predicted_chi2,
+    remainder,
+    significant_groups,
+)
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.records.diagnosis import Remainder
+
+SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
+"""Signals of the shaft; the others are of the winding."""
 
 
 def truncated(
@@ -36,7 +44,8 @@ def truncated(
     effects found do not explain what is left; 2. lowered the held-out error by less than
     `guess_share`, where they do not explain it, unless the step cleared a signal of all waves of
     the angle; 3. came after the first effect and lowered the held-out error by less than
-    `little_share`.
+    `little_share`. A step stays that takes most of what its own side, winding or shaft, misses in
+    captures held out: a misfit of the other side is no evidence against it.
 
     """
     policy = steps[0].fit.policy.selection
@@ -52,6 +61,8 @@ def truncated(
         if held[count - 1].total < (1.0 - policy.guess_share) * held[count - 2].total:
             break
         if not worse and _clears_orders(steps[count - 2].system, system):
+            break
+        if _clears_its_own(steps[count - 2 : count], held[count - 2 : count]):
             break
     return kept, left
 
@@ -95,6 +106,30 @@ def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:
     nobody's library leaves at order nought, or another capture in a voltage.
     """
     return bool(_waved(before) - _waved(after))
+
+
+def _clears_its_own(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> bool:
+    """Whether the newest effect of two steps takes most of the held-out power over the floor of its
+    own side, winding or shaft, while the other side misses as well.
+
+    A bump of friction is no guess where coasts and torques need it, whatever an inverter leaves in
+    the voltages.
+    """
+    before, after = (step.system for step in steps)
+    name = f"{after.fit.model.effects[-1].name}." if after.fit.model.effects else ""
+    own = [n for n, c in enumerate(after.columns[: after.own_count]) if c.name.startswith(name)]
+    acts = np.bincount(after.group, np.any(after.matrix[:, own] != 0.0, axis=1), len(after.labels))
+    shaft = np.array([channel in SHAFT for _, channel, _ in after.labels])
+    was, now = (
+        step.system.counts * np.maximum(predicted_chi2(step.system, one) - 1.0, 0.0)
+        for step, one in zip(steps, held, strict=True)
+    )
+    falls = [float((was - now)[(acts > 0) & side].sum()) for side in (shaft, ~shaft)]
+    side = shaft if falls[0] >= falls[1] else ~shaft
+    mine = (acts > 0) & side
+    beside = bool(significant_groups(before)[~side].any())
+    share = before.policy.selection.clears_share
+    return beside and float(now[mine].sum()) < share * float(was[mine].sum())
 
 
 def _waved(system: LinearSystem) -> set[str]:

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+import pipeline
 from pipeline.criticism.diagnosis import base_fit
 from pipeline.criticism.effect import ShaftState
 from pipeline.criticism.library.registry import effects
@@ -123,3 +124,20 @@ def test_without_a_transducer_it_does_not_matter_where_one_would_stand():
     assert drags[1] == pytest.approx(drags[2])
     between = effects()["compliance"].torque(x, q | {"between": 1.0})
     assert np.abs(between - drags[2]).max() > 0.1 * np.abs(drags[2]).max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "coupled"), [("servo-ipm", True), ("gimbal-5208", False)])
+def test_telemetry_without_a_transducer_names_a_spring_and_nothing_else(name, coupled):
+    """A fast motor that hides nothing named iron_eddy: its torque lacked the vector's ripple."""
+    motor = replace(design(name), effects={})
+    motor = motor.having(compliance={}) if coupled else motor
+    plan = (("resistance_ab", "resistance", {"pair": "ab"}), *PLAN, ("drive_2", *PLAN[2][1:]))
+    whole = campaign_of(campaign(motor, Bench(), 3, plan))
+    captures = tuple(
+        replace(one, tables=tuple(t.drop("torque_shaft_nm", strict=False) for t in one.tables))
+        for one in whole.captures
+    )
+    free = pipeline.Recordings({whole.motor_id: replace(whole, captures=captures)})
+    (found,) = pipeline.diagnose(free).motors.values()
+    assert found.missing == (("compliance",) if coupled else ())

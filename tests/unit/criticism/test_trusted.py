@@ -257,3 +257,37 @@ def test_beside_an_unknown_a_name_must_take_a_fifth_of_the_error(after, kept):
     steps, left = truncated((first, second), totals)
     assert len(steps) == kept
     assert {one.signal for one in left} >= {"torque_shaft_nm"}
+
+
+@pytest.mark.parametrize(("torque", "kept"), [(4.0, 2), (8e3, 1)])
+def test_a_misfit_of_the_voltage_is_no_evidence_against_a_friction(torque, kept, monkeypatch):
+    """What an inverter leaves in a voltage drowns the gain of a drag in the total, not in its own
+    signal; a drag that leaves most of that is a guess all the same.
+    """
+    voltage = 1e6
+    first = missing_by(vq_v=voltage, torque_shaft_nm=1e4)
+    bump = effects()["stribeck"]
+    model = first.fit.model.with_effects(bump)
+    columns = own_columns(model)
+    matrix = np.zeros((200, len(columns)))
+    matrix[100:, [c.name.startswith("stribeck.") for c in columns]] = 1.0
+    step = missing_by(vq_v=voltage, torque_shaft_nm=torque)
+    fit = Fit((log(),), model, {**BASE, **zero(bump, model)}, (), BASE)
+    system = replace(
+        step.system, columns=tuple(columns), matrix=matrix, fit=fit, own_count=len(columns)
+    )
+    steps = (first, LadderStep(("stribeck",), system, ()))
+    over = (
+        Remainder("one", "vq_v", 0, voltage, 1.0),
+        Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),
+    )
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
+    monkeypatch.setattr(
+        "pipeline.criticism.selection.truncation.significant_groups",
+        lambda one: one.reduced_chi2(one.residual) > 2.0,
+    )
+    held = [
+        HeldOut(one.system.residual, math.sqrt(0.5 * (voltage + q)))
+        for one, q in zip(steps, (1e4, torque), strict=True)
+    ]
+    assert len(truncated(steps, held)[0]) == kept
