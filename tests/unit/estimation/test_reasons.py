@@ -11,12 +11,16 @@ from pipeline.estimation.electrical.terminals import pair_of, voltage_columns
 from pipeline.estimation.estimators import (
     cogging,
     current_step,
+    feedforward,
     hand_turn,
     holding_current,
     open_circuit,
     resistance,
+    torque_table,
 )
+from pipeline.estimation.mechanical.shaft_rows import DRIVE, _windows
 from pipeline.estimation.mechanical.torque_constant import torque_constant
+from pipeline.numerics.weak_rows import LEAST_SAMPLES
 from pipeline.records.constants import Constants
 from tests.unit.estimation.signals import capture, estimates, known_value
 from tests.unit.estimation.test_scales import campaign
@@ -140,3 +144,27 @@ def test_slow_turns_without_an_angle_or_a_torque_are_no_turns() -> None:
     t = np.arange(500) * 1e-2
     found = estimates(cogging.ESTIMATOR, capture("cogging", t_s=t, torque_shaft_nm=t))
     assert all(e.note.startswith("0 whole turns") for e in found.values())
+
+
+def test_a_clamped_shaft_without_torque_has_no_torque_constant() -> None:
+    """A transducer that is not connected reads exactly nought."""
+    amps = np.linspace(-10.0, 10.0, 21)
+    made = capture("torque_table", iq_a=amps, id_a=0.0 * amps, torque_shaft_nm=0.0 * amps)
+    assert not estimates(torque_table.ESTIMATOR, made)["kt_peak_nm_a"].known
+
+
+def test_a_drive_whose_angle_is_noisy_in_all_windows_has_the_longest() -> None:
+    """0.08 s of 1 ms rows, with both ends."""
+    t = np.arange(4000) * 1e-3
+    rng = np.random.default_rng(2)
+    quiet = np.sin(20.0 * t)
+    for noise, rows in ((0.0, 21), (0.3, 81)):
+        weak = _windows(t, quiet + noise * rng.standard_normal(t.size), DRIVE)
+        assert abs(int(weak.sizes[0]) - rows) <= 1
+
+
+@pytest.mark.parametrize(("rows", "there"), [(3 * LEAST_SAMPLES - 1, False), (200, True)])
+def test_a_log_of_a_few_rows_is_left_out(rows: int, there: bool) -> None:
+    t = np.arange(rows) * 0.01
+    made = capture("drive", t_s=t, vq_v=np.sin(t), theta_mech_rad=np.sin(t))
+    assert (feedforward._part(made) is not None) is there
