@@ -51,6 +51,7 @@ def _in_range(column: str) -> pl.Expr:
     return inside | value.is_nan() | value.is_infinite() | value.is_null()
 
 
+_MOTION = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
 RULES: dict[str, Rule] = {
     "time_not_finite": _is_time,
     "time_not_increasing": _increases,
@@ -219,10 +220,21 @@ def check_columns(capture: Capture) -> None:
         raise CaptureError(
             "missing_column",
             f"{test} needs {needs}; the file has {', '.join(sorted(there)) or 'none'}{blank}",
-            "record what is missing, or map it in conf/source",
+            _remedy(test, there),
         )
     if test not in TESTS_WITHOUT_CLOCK:
         _every_table_has_a_clock(capture)
+
+
+def _remedy(test: str, there: frozenset[str]) -> str:
+    """How a capture that lacks a column may come to one."""
+    if test == "drive" and "torque_shaft_nm" in there and there.intersection(_MOTION):
+        return (
+            "where the drive computes that torque from its current, map it to iq_a "
+            "(`inspect ... column.NAME=iq_a`) and run with `constants={kt_peak_nm_a: 1}`; "
+            "else record the current too"
+        )
+    return "record what is missing, or map it in conf/source"
 
 
 def _filled(table: pl.DataFrame) -> list[str]:

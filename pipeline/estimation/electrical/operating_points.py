@@ -25,6 +25,8 @@ from pipeline.records.constants import Constants
 Array = NDArray[np.float64]
 MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
 TURN_RAD = 2.0 * np.pi
+FEWEST_ROWS = 3
+"""Rows of a mean in which a step is sought, at the least (`find_plateaus`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,9 +173,7 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
         total += n
         if n < policy().evidence.rows:
             continue
-        for rows in _settled(data, ("id_a", "iq_a", "torque_shaft_nm")) or _settled(
-            data, ("id_a", "iq_a")
-        ):
+        for rows in _stretches(data):
             kept = _whole_cycles(rows, data, pole_pairs)
             found.append(_point(capture, data, kept))
     numbered = _numbered(found)
@@ -241,7 +241,28 @@ def _columns(capture: Capture) -> dict[str, Array]:
     return {name: column[ok] for name, column in data.items()}
 
 
-def _settled(data: Mapping[str, Array], names: Sequence[str]) -> list[slice]:
+def _stretches(data: Mapping[str, Array]) -> list[slice]:
+    """Settled stretches of a capture; of a slow log, whose levels are of few rows, by few rows.
+
+    Where the means before and after each step leave less than half of the rows, means of the fewest
+    rows are taken, which find the same steps in a signal that is larger than its noise.
+    """
+    for names in (("id_a", "iq_a", "torque_shaft_nm"), ("id_a", "iq_a")):
+        wide = _settled(data, names)
+        little = 2 * _rows_in(wide) < data["iq_a"].size
+        found = max(wide, _settled(data, names, FEWEST_ROWS) if little else [], key=_rows_in)
+        if found:
+            return found
+    return []
+
+
+def _rows_in(stretches: Sequence[slice]) -> int:
+    return sum(rows.stop - rows.start for rows in stretches)
+
+
+def _settled(
+    data: Mapping[str, Array], names: Sequence[str], window: int | None = None
+) -> list[slice]:
     """Rows after each step of these columns, less twice the time that the step took to settle."""
     size = data["iq_a"].size
     flags = np.ones(size, dtype=bool)
@@ -251,7 +272,7 @@ def _settled(data: Mapping[str, Array], names: Sequence[str]) -> list[slice]:
             continue
         inside = np.zeros(size, dtype=bool)
         for plateau in find_plateaus(
-            data[name], policy().evidence.rows, tolerance=policy().points.step_share
+            data[name], policy().evidence.rows, window, tolerance=policy().points.step_share
         ):
             inside[plateau.rows] = True
             edges |= {plateau.start, plateau.stop}

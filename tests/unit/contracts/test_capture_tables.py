@@ -119,3 +119,12 @@ def test_a_row_that_a_bus_sent_twice_is_one_sample() -> None:
     assert made.tables[0]["t_s"].to_list() == t_s.tolist()
     again = capture("drive", t_s=t_s[rows], iq_a=np.arange(43.0))
     assert _rows_once(again) == (again, [])
+
+
+def test_a_drive_of_torque_and_motion_says_how_its_torque_is_a_current() -> None:
+    """Efforts of a robot's joint states are computed from the current."""
+    columns = {"t_s": np.arange(9.0), "theta_mech_rad": np.arange(9.0)}
+    with pytest.raises(CaptureError, match=r"column\.NAME=iq_a"):
+        check_columns(capture("drive", torque_shaft_nm=np.ones(9), **columns))
+    with pytest.raises(CaptureError, match="record what is missing"):
+        check_columns(capture("drive", **columns))

@@ -224,3 +224,20 @@ def test_temperature_and_pole_pairs_where_nobody_measured_them() -> None:
     one = _point(bare, {**{n: np.full(1000, np.nan) for n in ("temp_magnet_degc", "id_a")},
                         **bare.arrays(*bare.tables[0].columns)}, slice(0, 1000))  # fmt: skip
     assert one.temp_magnet_degc == 25.0
+
+
+def test_a_slow_log_whose_levels_are_of_few_rows() -> None:
+    """A logger of 50 rows a second: 24 levels of 60 rows, of which one was settled."""
+    rng = np.random.default_rng(3)
+    levels = [(w, q, d) for w in (30.0, 90.0) for q in (-6, -3, 0, 3, 6, 4) for d in (-4.0, 0.0)]
+    speed, iq, id_ = (np.repeat([float(one[k]) for one in levels], 60) for k in range(3))
+    noise = 0.01 * rng.standard_normal((3, iq.size))
+    torque = 0.28 * iq - 0.1 - 5e-4 * speed + noise[2]
+    columns = {"omega_mech_rad_s": speed, "iq_a": iq + noise[0], "id_a": id_ + noise[1]}
+    t_s = 0.02 * np.arange(iq.size)
+    one = capture("torque_map", "map", t_s=t_s, torque_shaft_nm=torque, **columns)
+    table = operating_points([one], None)
+    assert len(table.points) == len(levels)
+    assert table.settled_rows > 0.5 * table.rows
+    got = [(p.omega_mech_rad_s, round(p.iq_a), round(p.id_a)) for p in table.points]
+    assert got == [(w, q, round(d)) for w, q, d in levels]
