@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.criticism.data.holding_cells import holding_cells
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
 from pipeline.criticism.effect import Array, Machine, Operating, Recorded, Values
-from pipeline.criticism.equation import Channel, Equation, Observes
+from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.signals.shaft import net_torque
 from pipeline.criticism.signals.true_state import (
@@ -176,4 +176,5 @@ EQUATION = Equation(
         sensors=frozenset({"current"}),
         form="affine",
     ),
+    use=Use(shows=frozenset({"current", "turning"})),
 )
