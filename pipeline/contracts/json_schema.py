@@ -100,6 +100,25 @@ def _check() -> Schema:
     )
 
 
+def _provenance() -> Schema:
+    """What a datasheet was computed from: captures, configuration, code."""
+    capture = {"path": NAME, "sha256": SHA256, "test": {"enum": [*TESTS]}}
+    capture["integrity"] = one_of(Integrity)
+    stated = {
+        "station": or_null(TEXT),
+        "started_at": or_null(TEXT),
+        "read_sha256": or_null(SHA256),
+    }
+    return object_of(
+        {
+            "captures": list_of(object_of(capture, stated)),
+            "config_sha256": SHA256,
+            "code_version": NAME,
+        },
+        {"libraries": TEXT},
+    )
+
+
 def _model() -> Schema:
     """The residual test of a datasheet: numbers where a model was fitted."""
     quantity = object_of({"value": or_null(NUMBER), "u": or_null(SPREAD), "unit": TEXT})
@@ -134,8 +153,6 @@ def _model() -> Schema:
 
 def datasheet_schema() -> Schema:
     """`datasheets/MOTOR.json`."""
-    capture = {"path": NAME, "sha256": SHA256, "test": {"enum": [*TESTS]}}
-    capture["integrity"] = one_of(Integrity)
     constants: Schema = {
         "type": "object",
         "properties": {name: _constant(term) for name, term in sorted(CONSTANTS.items())},
@@ -148,23 +165,7 @@ def datasheet_schema() -> Schema:
             "lot": or_null(TEXT),
             "version": SHA256,
             "status": one_of(DatasheetStatus),
-            "provenance": object_of(
-                {
-                    "captures": list_of(
-                        object_of(
-                            capture,
-                            {
-                                "station": or_null(TEXT),
-                                "started_at": or_null(TEXT),
-                                "read_sha256": or_null(SHA256),
-                            },
-                        )
-                    ),
-                    "config_sha256": SHA256,
-                    "code_version": NAME,
-                },
-                {"libraries": TEXT},
-            ),
+            "provenance": _provenance(),
             "constants": constants,
             "checks": list_of(_check()),
         },
@@ -256,22 +257,16 @@ def _combination() -> Schema:
     )
 
 
-def comparison_schema() -> Schema:
-    """`comparison/MOTOR.json`."""
-    signals = ["vd_v", "vq_v", "torque_shaft_nm", "omega_mech_rad_s", "iq_a", "psi_d_wb"]
-    signal: Schema = {"enum": [*signals, "psi_q_wb"]}
-    parameter = object_of(
+_SIGNAL: Schema = {
+    "enum": ["vd_v", "vq_v", "torque_shaft_nm", "omega_mech_rad_s", "iq_a", "psi_d_wb", "psi_q_wb"]
+}
+
+
+def _signal_error() -> Schema:
+    """Error of a model in one signal of one capture."""
+    return object_of(
         {
-            "value": or_null(NUMBER),
-            "u": or_null(SPREAD),
-            "unit": NAME,
-            "at_bound": {"type": "boolean"},
-        },
-        {"status": {"enum": ["measured", "stated", "not_identifiable"]}},
-    )
-    error = object_of(
-        {
-            "signal": signal,
+            "signal": _SIGNAL,
             "capture": NAME,
             "split": {"enum": ["fit", "held_out"]},
             "rmse": or_null(SPREAD),
@@ -280,6 +275,19 @@ def comparison_schema() -> Schema:
             "n_eff": or_null(SPREAD),
         },
         {"unit": TEXT, "kind": {"enum": ["equation", "free_run"]}},
+    )
+
+
+def comparison_schema() -> Schema:
+    """`comparison/MOTOR.json`."""
+    parameter = object_of(
+        {
+            "value": or_null(NUMBER),
+            "u": or_null(SPREAD),
+            "unit": NAME,
+            "at_bound": {"type": "boolean"},
+        },
+        {"status": {"enum": ["measured", "stated", "not_identifiable"]}},
     )
     before = object_of({"value": NUMBER, "u": SPREAD})
     moved = object_of(
@@ -292,7 +300,7 @@ def comparison_schema() -> Schema:
         }
     )
     where = object_of(
-        {"signal": signal, "variable": NAME, "explained": SHARE, "p_value": or_null(SHARE)}
+        {"signal": _SIGNAL, "variable": NAME, "explained": SHARE, "p_value": or_null(SHARE)}
     )
     body = object_of(
         {
@@ -301,7 +309,7 @@ def comparison_schema() -> Schema:
                 {"name": NAME, "effects": list_of(NAME), "parameters": map_of(parameter)},
                 {"combinations": list_of(_combination())},
             ),
-            "errors": list_of(error),
+            "errors": list_of(_signal_error()),
             "total": object_of({"held_out": or_null(SPREAD)}),
             "where": list_of(where),
         },
@@ -310,10 +318,9 @@ def comparison_schema() -> Schema:
     return document("model-comparison/1", "A model held against a motor's captures", body)
 
 
-def diagnosis_schema() -> Schema:
-    """`diagnosis/MOTOR.json`."""
-    sized = object_of({"value": or_null(NUMBER), "u": or_null(SPREAD), "unit": NAME})
-    rank = object_of(
+def _ranked_effect(sized: Schema) -> Schema:
+    """One effect of a diagnosis; `sized` is a value with its uncertainty and unit."""
+    return object_of(
         {
             "effect": NAME,
             "score": or_null(NUMBER),
@@ -325,6 +332,11 @@ def diagnosis_schema() -> Schema:
         },
         {"parameters": map_of(sized)},
     )
+
+
+def diagnosis_schema() -> Schema:
+    """`diagnosis/MOTOR.json`."""
+    sized = object_of({"value": or_null(NUMBER), "u": or_null(SPREAD), "unit": NAME})
     step = object_of(
         {
             "effects": list_of(NAME),
@@ -347,7 +359,7 @@ def diagnosis_schema() -> Schema:
             "model": {"type": ["string", "object"]},
             "verdict": {"enum": ["adequate", "missing", "unknown", "insufficient"]},
             "missing": list_of(NAME),
-            "ranking": list_of(rank),
+            "ranking": list_of(_ranked_effect(sized)),
             "ladder": list_of(step),
             "unknown": or_null(unknown),
         },

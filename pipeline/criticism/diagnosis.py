@@ -11,7 +11,7 @@ from scipy.special import gammaincc
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.design.experiments import separations
-from pipeline.criticism.effect import Effect
+from pipeline.criticism.effect import Effect, Machine
 from pipeline.criticism.ladder import parameters_of, step_record
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.library.headline import headline
@@ -144,13 +144,11 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
     name = f"{file_stem(campaign.motor_id)}_unknown"
     end = search_ladder(campaign, model, machine, base, library, name)
     ladder, last = end.ladder, end.ladder.steps[-1].system
-    found = last.segments
     offered = candidates(library, last.fit.model)
     ranking = _ranking(ladder, offered, library)
     unseen = unexcited(campaign, library, ladder.steps[-1], offered)
     verdict = _verdict_of(end, unseen)
     together = reported_combinations(last, ladder.held[-1])
-    stateless = verdict == "unknown" and end.sketch is None and end.change is None
     diagnosis = Diagnosis(
         campaign.motor_id,
         model.name,
@@ -160,27 +158,40 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
         _records(ladder.steps, ladder.held),
         end.sketch if verdict == "unknown" else None,
         _as_reported(last, end.left),
-        (
-            *unused(campaign, found),
-            *loaded(campaign, machine),
-            *mixed(campaign, machine),
-            *at_ambient(found, last.fit.model),
-            *against_stated(last, ladder.held[-1]),
-            *hum_notes(ladder.base.hum),
-            *frame_notes(found),
-            *end.notes,
-            *_together(together, ladder.steps[-1].added),
-            *(note for note in ladder.cut.values() if note),
-            *_rests_on_one(ladder),
-            *((_STATELESS,) if stateless else ()),
-            *ladder.held[0].notes,
-        ),
+        _notes(campaign, machine, end, verdict, together),
         unseen,
         model.effects,
         together,
         policy_digest(last.policy),
     )
     return diagnosis, ladder.base
+
+
+def _notes(
+    campaign: Campaign,
+    machine: Machine,
+    end: SearchResult,
+    verdict: Verdict,
+    together: Sequence[KnownCombination],
+) -> tuple[str, ...]:
+    """What a reader of the diagnosis has to know besides: data, frame, hum, combinations."""
+    ladder, last = end.ladder, end.ladder.steps[-1].system
+    stateless = verdict == "unknown" and end.sketch is None and end.change is None
+    return (
+        *unused(campaign, last.segments),
+        *loaded(campaign, machine),
+        *mixed(campaign, machine),
+        *at_ambient(last.segments, last.fit.model),
+        *against_stated(last, ladder.held[-1]),
+        *hum_notes(ladder.base.hum),
+        *frame_notes(last.segments),
+        *end.notes,
+        *_together(together, ladder.steps[-1].added),
+        *(note for note in ladder.cut.values() if note),
+        *_rests_on_one(ladder),
+        *((_STATELESS,) if stateless else ()),
+        *ladder.held[0].notes,
+    )
 
 
 def _records(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> tuple[LadderRung, ...]:

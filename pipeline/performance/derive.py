@@ -200,25 +200,28 @@ def _numbers(case: _Case, stall: Point, corner: Array) -> list[Derived]:
             corner_torque * float(corner[0]), "T ω",
         ),
     ]  # fmt: skip
-    if case.sources.has(*MECHANICAL):
-        speed, current = _no_load(case)
-        words = "IEEE Std 1812-2014, no-load test"
-        found += [
-            _derived(
-                "omega_no_load_rad_s", "no-load speed without field weakening", "rad/s", speed,
-                "|v(0, i_q, ω)| = share · V_dc/√3 with 1.5 p ψ i_q = T_c + B ω", words,
-            ),
-            _derived(
-                "current_no_load_a", "no-load current, phase peak", "A", current,
-                "(T_c + B ω)/(1.5 p ψ)", words,
-            ),
-            _derived(
-                "loss_no_load_w", "no-load loss: friction, windage and iron", "W",
-                (machine.coulomb_nm + machine.viscous_nm_s_rad * speed) * speed,
-                "(T_c + B ω) ω at no-load speed", "IEC 60034-2-1, no-load and retardation tests",
-            ),
-        ]  # fmt: skip
-    return found
+    return found + (_without_load(case) if case.sources.has(*MECHANICAL) else [])
+
+
+def _without_load(case: _Case) -> list[Derived]:
+    """Speed, current and loss of a motor that drives nothing."""
+    machine, (speed, current) = case.machine, _no_load(case)
+    words = "IEEE Std 1812-2014, no-load test"
+    return [
+        _derived(
+            "omega_no_load_rad_s", "no-load speed without field weakening", "rad/s", speed,
+            "|v(0, i_q, ω)| = share · V_dc/√3 with 1.5 p ψ i_q = T_c + B ω", words,
+        ),
+        _derived(
+            "current_no_load_a", "no-load current, phase peak", "A", current,
+            "(T_c + B ω)/(1.5 p ψ)", words,
+        ),
+        _derived(
+            "loss_no_load_w", "no-load loss: friction, windage and iron", "W",
+            (machine.coulomb_nm + machine.viscous_nm_s_rad * speed) * speed,
+            "(T_c + B ω) ω at no-load speed", "IEC 60034-2-1, no-load and retardation tests",
+        ),
+    ]  # fmt: skip
 
 
 def _thermal(

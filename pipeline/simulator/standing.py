@@ -122,22 +122,26 @@ def current_step(session: Session, how: protocols.CurrentStep) -> Recording:
         degc,
         plant,
     )
-    scope = session.bench.scope
-    if scope is None:
-        volts = session.voltage(true[:, 0], t_s)
-        amps = session.line_current(true[:, 1], first, t_s)
-        stated = {}
-    else:
-        volts = session.probe(true[:, 0], scope)
-        amps = session.clamp(true[:, 1], scope)
-        stated = {
-            "u_rel_voltage": f"{scope.u_rel_probe:g}",
-            "u_rel_current": f"{scope.u_rel_clamp:g}",
-        }
+    volts, amps, stated = _measured(session, true, first, t_s)
     table = {"t_s": stamps, f"v{how.pair}_v": volts, f"i{'abc'[first]}_a": amps}
     place = f"{how.theta_elec_deg % 360.0:.2f}"
     meta = session.meta("current_step", pair=how.pair, theta_elec_deg=place, **stated)
     return Recording(f"current_step_{how.pair}", meta, (table,))
+
+
+def _measured(
+    session: Session, true: Array, phase: int, t_s: Array
+) -> tuple[Array, Array, dict[str, str]]:
+    """Voltage and current [n, 2] of a pair by the bench or its scope, and what the scope states."""
+    scope = session.bench.scope
+    if scope is None:
+        volts = session.voltage(true[:, 0], t_s)
+        return volts, session.line_current(true[:, 1], phase, t_s), {}
+    stated = {
+        "u_rel_voltage": f"{scope.u_rel_probe:g}",
+        "u_rel_current": f"{scope.u_rel_clamp:g}",
+    }
+    return session.probe(true[:, 0], scope), session.clamp(true[:, 1], scope), stated
 
 
 def pair_inductance(session: Session, pair: str, eps: Array, degc: float) -> Array:

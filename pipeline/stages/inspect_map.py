@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
@@ -130,10 +130,8 @@ def finish(
 
     Files that a map reads already, the `known`, get that map with the answers in its metadata.
     """
-    from pipeline.io.inspection.adopted import adopted_text
     from pipeline.io.inspection.file_names import name_patterns
     from pipeline.io.inspection.starter_map import map_text
-    from pipeline.io.maps.places import map_file
 
     lines: list[str] = []
     text = ""
@@ -148,16 +146,10 @@ def finish(
             lines += _shape_lines(groups, names)
         asked = _questions(groups, names, settings)
         lines += [_ASKED, *(f"  {key}=  {words}" for key, words in asked.items())] if asked else []
-        firsts = [files[0] for _, files in groups]
-        tasks = [PreviewTask(root, file, _read_limits(settings), text) for file in firsts]
-        for preview in in_workers(preview_of, tasks):
-            lines += preview
-    sources = {
-        name: None for one in known for name in (one.report.source or "").split(", ") if name
-    }
-    files = {name.partition("/")[0]: None for name in sources}
-    if files and (metadata or settings.map or text):
-        text = adopted_text([map_file(name, settings.config_dir) for name in files], metadata, text)
+        tasks = [PreviewTask(root, files[0], _read_limits(settings), text) for _, files in groups]
+        lines += [line for preview in in_workers(preview_of, tasks) for line in preview]
+    if metadata or settings.map or text:
+        text = _with_known(known, settings.config_dir, metadata, text)
     if text and settings.map:
         write_whole(Path(settings.map), text.encode())
         lines.append(f"written: {settings.map}; `run input={root} source={settings.map}`")
@@ -170,6 +162,20 @@ def finish(
     text = "\n".join([*lines, checked.text]) + "\n"
     result |= checked.result
     return Outcome(checked.exit_code, text, checked.errors, result=result)
+
+
+def _with_known(
+    known: Sequence[Looked], config_dir: str | None, metadata: Mapping[str, str], text: str
+) -> str:
+    """The source map with the maps that read the `known` files in it, if any."""
+    from pipeline.io.inspection.adopted import adopted_text
+    from pipeline.io.maps.places import map_file
+
+    sources = (name for one in known for name in (one.report.source or "").split(", ") if name)
+    files = list(dict.fromkeys(name.partition("/")[0] for name in sources))
+    if not files:
+        return text
+    return adopted_text([map_file(name, config_dir) for name in files], metadata, text)
 
 
 def _groups(strangers: Sequence[Looked]) -> list[tuple[Shape, list[str]]]:

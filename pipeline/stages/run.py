@@ -42,6 +42,7 @@ from pipeline.io.storage.limits import limits_file, release_conditions
 from pipeline.io.storage.publish import output_folder
 from pipeline.performance.conditions import check_stated
 from pipeline.records.comparison import ModelSpec
+from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Event, Revocation
@@ -128,13 +129,22 @@ def _run(
     batch = _batch_key(settings, plain, found, registry)
     if (cached := _cached_outcome(settings, registry, cache, batch)) is not None:
         return replace(cached, timings=watch.table())
+    return _computed(settings, registry, (workers, cache, watch), found, plain)
+
+
+def _computed(
+    settings: RunSettings,
+    registry: Registry | None,
+    means: tuple[WorkerPool, RunCache, Stopwatch],
+    found: Survey,
+    plain: Sequence[MotorJob],
+) -> Outcome:
+    """Motors worked on, registered and published; `plain` are the jobs without revocations."""
+    (workers, cache, watch), output = means, Path(settings.output)
     revoked = _revocations(registry)
     jobs = _with_revoked(plain, revoked)
     with watch.stage("motors"):
         results, died = _process(settings, jobs, workers, cache)
-    findings = tuple(
-        sorted({*found.findings, *(f for r in results for f in r.finished.findings)}, key=_order)
-    )
     others = other_motors(output, [job.motor_id for job in jobs], prune=settings.prune)
     with watch.stage("registry"):
         registered = _register(registry, output, results)
@@ -146,34 +156,51 @@ def _run(
         fleet = fleet_of(output, results, others)
         datasheets = fleet.datasheets
         there = {one.motor_id: status_now(output, one, histories) for one in fleet.others}
-        files, removed = publish(settings, results, fleet, findings, {**there, **statuses}, others)
+        findings = sorted(
+            {f for r in results for f in r.finished.findings}.union(found.findings), key=_order
+        )
+        files, removed = publish(
+            settings, results, fleet, tuple(findings), {**there, **statuses}, others
+        )
         outcome = outcome_of(datasheets, findings, found, statuses, report=settings.report)
     lasting = not died and all(result.lasting for result in results)
     if lasting and registered.code == 0 and _revocations(registry) == revoked:
-        made = (file for result in results for file in result.finished.files)
-        digests = [sha256 for name, sha256 in made if name.startswith("datasheets/")]
-        contents = tuple(
-            ((sheet.motor_id, sheet.version), sha256)
-            for sheet, sha256 in zip(datasheets, digests, strict=True)
-        )
+        contents = _contents(datasheets, results)
         cache.keep_outcome(batch, Batch(outcome, contents), files)
     cache.forget_others([*others, *(job.motor_id for job in jobs)])
     outcome = with_folder_names(outcome, settings)
-    for result in results:
-        for name, seconds in result.seconds.items():
-            watch.seconds[f"  {name}"] = watch.seconds.get(f"  {name}", 0.0) + seconds
+    for name, seconds in (item for result in results for item in result.seconds.items()):
+        watch.seconds[f"  {name}"] = watch.seconds.get(f"  {name}", 0.0) + seconds
+    notes = (*removed_note(removed, settings.output), *others_note(others, settings.output))
+    return _final(outcome, registered, notes, died, watch)
+
+
+def _final(
+    outcome: Outcome,
+    registered: Registered,
+    notes: Sequence[str],
+    died: Sequence[MachineError],
+    watch: Stopwatch,
+) -> Outcome:
+    """The outcome of a run with what the registry and the workers report."""
     return Outcome(
         first_that_applies(outcome.exit_code, registered.code, *(e.exit_code for e in died)),
         "\n".join(filter(None, [outcome.text, registered.text])),
-        (
-            *outcome.errors,
-            *removed_note(removed, settings.output),
-            *others_note(others, settings.output),
-            *registered.errors,
-            *(f"error: {e}" for e in died),
-        ),
+        (*outcome.errors, *notes, *registered.errors, *(f"error: {e}" for e in died)),
         watch.table(),
         next=outcome.next,
+    )
+
+
+def _contents(
+    datasheets: Sequence[Datasheet], results: Sequence[MotorResult]
+) -> tuple[tuple[tuple[str, str], str], ...]:
+    """Motor and version of each datasheet, and the digest of its file."""
+    made = (file for result in results for file in result.finished.files)
+    digests = [sha256 for name, sha256 in made if name.startswith("datasheets/")]
+    return tuple(
+        ((sheet.motor_id, sheet.version), sha256)
+        for sheet, sha256 in zip(datasheets, digests, strict=True)
     )
 
 

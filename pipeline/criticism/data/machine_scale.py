@@ -68,33 +68,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         pole_pairs = 1
     captures = tuple(c for c in map(with_values, campaign.captures) if c is not None)
     campaign = replace(campaign, captures=captures)
-    logs, tables = campaign.of(*_TRACED), campaign.of(*_TABLES)
-    current = _largest(logs, ("id_a", "iq_a")) or _largest(campaign.captures, _LINES_A)
-    current = current or _largest(tables, ("id_a", "iq_a"))
-    voltage = _largest(logs, ("vd_v", "vq_v")) or _largest(campaign.captures, LINES_V)
-    voltage = voltage or _largest(tables, ("vq_v",))
-    speed = max((_speed(c) for c in campaign.captures), default=0.0) or 1.0
-    flux = 0.0 if voltage else _largest(tables, ("psi_d_wb", "psi_q_wb"))
-    voltage = voltage or flux * pole_pairs * speed
-    # without a winding on record the torque's own size is all there is
     known = stated_parameters(stated_constants(campaign), pole_pairs, counted=counted)
-    shaft = 0.0 if current and voltage else _largest(campaign.captures, ("torque_shaft_nm",))
-    shaft = shaft or (0.0 if current and voltage else _stated_torque(known, speed))
-    clamped = _largest(tables, ("torque_shaft_nm",))
-    current, voltage = current or 1.0, voltage or 1.0
-    psi = voltage / (pole_pairs * speed)
-    fitted = start.best("psi_pm_wb")
-    psi = fitted.number if fitted is not None else known.get("psi_wb", (psi, 0.0))[0]
-    period = min((_period(c) for c in logs), default=1e-4)
-    scales = {
-        "current_a": current,
-        "voltage_v": voltage,
-        "speed_rad_s": speed,
-        "freq_hz": max(pole_pairs * speed / (2 * math.pi), 1.0),
-        "torque_nm": max(shaft or 1.5 * pole_pairs * psi * current, clamped),
-        "period_s": period,
-        "flux_wb": psi,
-    }
     bases = tuple(int(str(n)) for n in (pole_pairs, slots) if n)
     harmonics, usual = policy.cutting.harmonics, policy.cutting.highest_order
     highest = harmonics * math.lcm(int(str(slots)), 2 * pole_pairs) if slots else 0
@@ -104,7 +78,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
     return Machine(
         pole_pairs,
         int(str(slots)) if slots else None,
-        scales,
+        _scales(campaign, start, known, pole_pairs),
         orders,
         stated,
         encoder_step(campaign, policy),
@@ -113,6 +87,43 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         stated=known,
         policy=policy,
     )
+
+
+def _scales(
+    campaign: Campaign,
+    start: Constants,
+    known: Mapping[str, tuple[float, float]],
+    pole_pairs: int,
+) -> dict[str, float]:
+    """Typical size of each quantity: the largest on record, 1 where there is none.
+
+    `known` are stated parameters with their uncertainties.
+    """
+    logs, tables = campaign.of(*_TRACED), campaign.of(*_TABLES)
+    current = _largest(logs, ("id_a", "iq_a")) or _largest(campaign.captures, _LINES_A)
+    current = current or _largest(tables, ("id_a", "iq_a"))
+    voltage = _largest(logs, ("vd_v", "vq_v")) or _largest(campaign.captures, LINES_V)
+    voltage = voltage or _largest(tables, ("vq_v",))
+    speed = max((_speed(c) for c in campaign.captures), default=0.0) or 1.0
+    flux = 0.0 if voltage else _largest(tables, ("psi_d_wb", "psi_q_wb"))
+    voltage = voltage or flux * pole_pairs * speed
+    # without a winding on record the torque's own size is all there is
+    shaft = 0.0 if current and voltage else _largest(campaign.captures, ("torque_shaft_nm",))
+    shaft = shaft or (0.0 if current and voltage else _stated_torque(known, speed))
+    clamped = _largest(tables, ("torque_shaft_nm",))
+    current, voltage = current or 1.0, voltage or 1.0
+    psi = voltage / (pole_pairs * speed)
+    fitted = start.best("psi_pm_wb")
+    psi = fitted.number if fitted is not None else known.get("psi_wb", (psi, 0.0))[0]
+    return {
+        "current_a": current,
+        "voltage_v": voltage,
+        "speed_rad_s": speed,
+        "freq_hz": max(pole_pairs * speed / (2 * math.pi), 1.0),
+        "torque_nm": max(shaft or 1.5 * pole_pairs * psi * current, clamped),
+        "period_s": min((_period(c) for c in logs), default=1e-4),
+        "flux_wb": psi,
+    }
 
 
 def _stated_torque(stated: Mapping[str, tuple[float, float]], speed: float) -> float:

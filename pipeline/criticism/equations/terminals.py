@@ -41,7 +41,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if pair is None or not capture.has(f"v{pair}_v"):
         return None
     current = next((n for n in (f"i{pair[0]}_a", f"i{pair[1]}_a") if capture.has(n)), None)
-    if current is None:
+    place, stepped = capture.meta.theta_elec_deg, capture.meta.test == "current_step"
+    if current is None or (stepped and place is None):
         return None
     sign = 1.0 if current[1] == pair[0] else -1.0
     extra = ["temp_winding_degc"] if capture.has("temp_winding_degc") else []
@@ -51,10 +52,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     found = {"v_pair_v": volts, "i_pair_a": amps, **found}
     sensors = prepared(found, period, machine.policy)
     fixed = {"pair_rad": PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
-    if capture.meta.test == "current_step":
-        if capture.meta.theta_elec_deg is None:
-            return None
-        fixed["theta_elec_rad"] = math.radians(capture.meta.theta_elec_deg)
+    if stepped and place is not None:
+        fixed["theta_elec_rad"] = math.radians(place)
         edges = np.abs(np.diff(volts)) > policy.change_u * sensors.noise["v_pair_v"]
         keep[:-1] &= ~edges
         keep[1:] &= ~edges

@@ -411,17 +411,10 @@ def flux_of(spin: Spin, stretch: Stretch, orders: Sequence[int]) -> StretchFlux:
     omega = np.abs(stretch.omega_elec_rad_s)
     waves = [omega * np.exp(1j * k * stretch.phase_rad) for k in ranks]
     width = 2 * len(ranks)
-    total = width + len(spin.channels)
+    designs = _designs(spin, waves)
+    total = designs[0].shape[1]
     normal, right = np.zeros((total, total)), np.zeros(total)
-    designs = []
-    for index, channel in enumerate(spin.channels):
-        design = np.zeros((stretch.rows.size, total))
-        turn = channel.gain * np.exp(-1j * channel.angle_rad)
-        for k, wave in enumerate(waves):
-            design[:, 2 * k] = (turn * wave).real
-            design[:, 2 * k + 1] = -(turn * wave).imag
-        design[:, width + index] = 1.0
-        designs.append(design)
+    for channel, design in zip(spin.channels, designs, strict=True):
         normal += design.T @ design
         right += design.T @ channel.v_v[stretch.rows]
     scale = np.sqrt(np.diag(normal))
@@ -448,6 +441,21 @@ def flux_of(spin: Spin, stretch: Stretch, orders: Sequence[int]) -> StretchFlux:
         None if temps is None or not np.isfinite(temps).any() else float(np.nanmean(temps)),
         float(psi * omega.mean()),
     )
+
+
+def _designs(spin: Spin, waves: Sequence[Array]) -> list[Array]:
+    """Design [n, 2 waves + channels] of each channel: Re, -Im of each wave [n], and its offset."""
+    width = 2 * len(waves)
+    designs = []
+    for index, channel in enumerate(spin.channels):
+        design = np.zeros((waves[0].size, width + len(spin.channels)))
+        turn = channel.gain * np.exp(-1j * channel.angle_rad)
+        for k, wave in enumerate(waves):
+            design[:, 2 * k] = (turn * wave).real
+            design[:, 2 * k + 1] = -(turn * wave).imag
+        design[:, width + index] = 1.0
+        designs.append(design)
+    return designs
 
 
 def electrical_per_mechanical(spin: Spin, stretches: Sequence[Stretch]) -> tuple[float, bool]:

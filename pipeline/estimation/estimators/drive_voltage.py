@@ -35,7 +35,7 @@ from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns
-from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed, weak_rows
+from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
@@ -47,6 +47,8 @@ Array = NDArray[np.float64]
 
 METHOD = Method("drive_voltage")
 GIVES = ("ke_phase_peak_v_s_rad", "r_phase_ohm")
+PLACE = dict(zip(GIVES, ("temp_magnet_degc", "temp_winding_degc"), strict=True))
+"""Thermometer of what each constant is of."""
 EXPERIMENT = (
     "record a drive with vq_v, iq_a and theta_mech_rad over a wide range of speed and current, or "
     "better an open_circuit and a resistance test"
@@ -159,11 +161,7 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
     angle = "theta_mech_rad" if capture.has("theta_mech_rad") else "omega_mech_rad_s"
     if not capture.has("t_s", "vq_v", "iq_a", angle):
         return None
-    optional = ("id_a", "vd_v", "temp_winding_degc", "temp_magnet_degc")
-    names = ["t_s", "vq_v", "iq_a", angle, *(n for n in optional if capture.has(n))]
-    data = capture.arrays(*names)
-    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    data = {name: column[fine] for name, column in data.items()}
+    data = _finite(capture, angle)
     t, theta = data["t_s"], data[angle]
     if t.size < 10 * LEAST_SAMPLES:
         return None
@@ -177,35 +175,54 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
         speed = smooth_speed(t, theta, max(0.005, 10.0 * period))
     except ValueError:
         return None
-    i_q = data["iq_a"]
-    i_d = data.get("id_a", np.zeros(t.size))
     v_d, v_q = _instant(capture, data, speed, pole_pairs, period)
-    winding = data.get("temp_winding_degc", np.full(t.size, 25.0)) - 25.0
-    rotor = data.get("temp_magnet_degc", np.full(t.size, 25.0)) - 25.0
-    modulus = np.hypot(i_d, i_q)
-    noise = 0.02 * float(np.max(modulus)) if modulus.size else 0.0
     found = {
         "capture": np.full(weak.count, float(index)),
         "cluster": np.floor((weak.centres_s - weak.centres_s[0]) / policy().evidence.cluster_s)
         + 1e6 * index,
         "time_s": weak.centres_s,
         "voltage_v": weak.integral(v_q),
+        **_integrals(weak, data, theta, speed),
+        "zero": np.ones(weak.count),
+        "period": np.full(weak.count, period),
+        "hold": np.full(weak.count, _hold_doubt(capture, speed, pole_pairs, period)),
+    }
+    if v_d is not None:
+        found["turned"] = weak.integral(speed * v_d)
+    return found
+
+
+def _finite(capture: Capture, angle: str) -> dict[str, Array]:
+    """Columns of a drive log, those samples that are finite in all of them."""
+    optional = ("id_a", "vd_v", "temp_winding_degc", "temp_magnet_degc")
+    names = ["t_s", "vq_v", "iq_a", angle, *(n for n in optional if capture.has(n))]
+    data = capture.arrays(*names)
+    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    return {name: column[fine] for name, column in data.items()}
+
+
+def _integrals(
+    weak: WeakRows, data: Mapping[str, Array], theta: Array, speed: Array
+) -> dict[str, Array]:
+    """Columns of the q-axis voltage equation, each as its integral over a window."""
+    t, i_q = data["t_s"], data["iq_a"]
+    i_d = data.get("id_a", np.zeros(t.size))
+    winding = data.get("temp_winding_degc", np.full(t.size, 25.0)) - 25.0
+    rotor = data.get("temp_magnet_degc", np.full(t.size, 25.0)) - 25.0
+    modulus = np.hypot(i_d, i_q)
+    noise = 0.02 * float(np.max(modulus)) if modulus.size else 0.0
+    found = {
         "current_a": weak.integral(i_q),
         "speed_rad_s": weak.integral(theta, 1),
         "warm_current_k_a": weak.integral(i_q * winding),
         "warm_speed_k_rad_s": weak.integral(speed * rotor),
         "inductive": weak.integral(i_q, 1),
         "drop": weak.integral(i_q / np.sqrt(modulus**2 + noise**2 + 1e-300)),
-        "zero": np.ones(weak.count),
-        "period": np.full(weak.count, period),
-        "hold": np.full(weak.count, _hold_doubt(capture, speed, pole_pairs, period)),
         "cross flux": weak.integral(speed * i_q**2),
         LATE: weak.integral(theta, 2),
     }
-    if capture.has("id_a"):
+    if "id_a" in data:
         found[D_FLUX] = weak.integral(speed * i_d)
-    if v_d is not None:
-        found["turned"] = weak.integral(speed * v_d)
     return found
 
 
@@ -344,8 +361,6 @@ def _estimates(
         words.append(allowed_for(chosen))
     unstated = unstated_note(rows.captures, ("voltage", "current"))
     words += [unstated] if unstated else []
-    per_kelvin = {GIVES[0]: abs(magnet), GIVES[1]: COPPER_COEFFICIENT_25_1_K}
-    place = {GIVES[0]: "temp_magnet_degc", GIVES[1]: "temp_winding_degc"}
     estimates = []
     for i, name in enumerate(GIVES):
         value, u = float(found.coefficients[i]), float(deviation[i])
@@ -359,19 +374,28 @@ def _estimates(
         doubt = doubts[i]
         parts += [] if doubt is None else [doubt.part(f"{METHOD.name}:{name}", value)]
         remarks = [] if doubt is None else [doubt.words("the value")]
-        note = "; ".join([*remarks, *words])
-        if not all(c.has(place[name]) for c in rows.captures):
-            unsure = value * per_kelvin[name] * policy().magnet.unlogged_k
-            parts.append(Contribution(f"assumed:{place[name]}", unsure, "B"))
-            note += f"; {place[name]} not logged, taken as 25 ± {policy().magnet.unlogged_k:g} K"
-        if i == 0:
-            parts.append(Contribution(HOLD, value * rows.hold_doubt, "B"))
-            if flux := _unlogged_flux(rows, found.residuals):
-                parts.append(Contribution("assumed:id_a:flux", flux, "B"))
-                note += "; id_a not logged, taken as 0 but for what varies"
-        at = {place[name]: 25.0, "omega_mech_rad_s": float(np.max(np.abs(rows.speed_rad_s)))}
-        estimates.append(METHOD.measured(name, value, parts, paths, at, note))
+        assumed, assumptions = _unlogged(rows, found, name, value, magnet)
+        note = "; ".join([*remarks, *words, *assumptions])
+        at = {PLACE[name]: 25.0, "omega_mech_rad_s": float(np.max(np.abs(rows.speed_rad_s)))}
+        estimates.append(METHOD.measured(name, value, [*parts, *assumed], paths, at, note))
     return tuple(estimates)
+
+
+def _unlogged(
+    rows: VoltageRows, found: LinearFit, name: str, value: float, magnet: float
+) -> tuple[list[Contribution], list[str]]:
+    """What is assumed for the temperatures and the d current that are not logged, and in words."""
+    parts, words, kelvin = [], [], policy().magnet.unlogged_k
+    if not all(c.has(PLACE[name]) for c in rows.captures):
+        per_kelvin = abs(magnet) if name == GIVES[0] else COPPER_COEFFICIENT_25_1_K
+        parts.append(Contribution(f"assumed:{PLACE[name]}", value * per_kelvin * kelvin, "B"))
+        words.append(f"{PLACE[name]} not logged, taken as 25 ± {kelvin:g} K")
+    if name == GIVES[0]:
+        parts.append(Contribution(HOLD, value * rows.hold_doubt, "B"))
+        if flux := _unlogged_flux(rows, found.residuals):
+            parts.append(Contribution("assumed:id_a:flux", flux, "B"))
+            words.append("id_a not logged, taken as 0 but for what varies")
+    return parts, words
 
 
 def _moved(

@@ -313,9 +313,7 @@ def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Esti
         return [
             METHOD.missing(n, f"voltage and speed do not go together; {EXPERIMENT}") for n in GIVES
         ]
-    period = max(float(np.median(np.diff(p.t_s))) for p in parts)
-    resolved = values[2] > policy().shaft_rows.resolved_periods * period * values[1]
-    clear = seen[2] and resolved and all(p.quiet for p in parts)
+    clear = seen[2] and _resolved(parts, values) and all(p.quiet for p in parts)
     missing = {} if clear else _hidden(parts)
     estimates = []
     for k, (name, value) in enumerate(zip(GIVES, values, strict=True)):
@@ -331,11 +329,16 @@ def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Esti
             contributions.append(doubt.part(f"{METHOD.name}:{name}", value))
             words.append(doubt.words("the value"))
         if k < 3:
-            contributions += [
-                Contribution(s, value * u_rel * float(shares[s]), "B") for s, u_rel in gains.items()
-            ]
+            scaled = {s: value * u_rel * float(shares[s]) for s, u_rel in gains.items()}
+            contributions += [Contribution(s, u_gain, "B") for s, u_gain in scaled.items()]
         estimates.append(METHOD.measured(name, value, contributions, used, at, [*words, *notes]))
     return estimates
+
+
+def _resolved(parts: Sequence[Part], values: Sequence[float]) -> bool:
+    """Whether the third coefficient is more than a few sampling periods of the second."""
+    period = max(float(np.median(np.diff(p.t_s))) for p in parts)
+    return values[2] > policy().shaft_rows.resolved_periods * period * values[1]
 
 
 def _hidden(parts: Sequence[Part]) -> dict[str, str]:

@@ -104,17 +104,9 @@ def _flux(
     captures = tuple({c.path: c for c, _ in turns}.values())
     coefficient = known.best("temp_coeff_magnet_1_k")
     alpha = options["alpha_assumed_1_k"] if coefficient is None else coefficient.number
-    values, weights, excesses = [], [], []
-    notes = []
-    for capture, turn in turns:
-        column = magnet_column(capture)
-        temp = assumed_temperature(capture, options["temp_assumed_degc"])
-        if column is not None:
-            temp = float(np.nanmean(capture.arrays(column)[column]))
-        excesses.append(temp - 25.0)
-        values.append(turn.psi_wb / (1.0 + alpha * (temp - 25.0)))
-        weights.append(1.0 / max(turn.u_psi_wb, 1e-12) ** 2)
-    notes.append(unlogged_note(captures))
+    excesses = [_temperature(c, options["temp_assumed_degc"]) - 25.0 for c, _ in turns]
+    values = [t.psi_wb / (1.0 + alpha * e) for (_, t), e in zip(turns, excesses, strict=True)]
+    weights = [1.0 / max(turn.u_psi_wb, 1e-12) ** 2 for _, turn in turns]
     share = np.array(weights) / np.sum(weights)
     value = float(share @ np.array(values))
     own = tuple(
@@ -136,9 +128,17 @@ def _flux(
     for source, offset in magnet_uncertainties(captures).items():
         mine = [magnet_source(c) == source for c, _ in turns]
         parts.append(Contribution(source, -value * alpha * offset * float(share[mine].sum()), "B"))
-    notes.append(unstated_note(captures, ("voltage", "temperature")))
+    notes = [unlogged_note(captures), unstated_note(captures, ("voltage", "temperature"))]
     at = {"temp_magnet_degc": 25.0, "temp_measured_degc": round(excess + 25.0, 2)}
     return METHOD.measured("psi_pm_wb", value, parts, captures, at, notes)
+
+
+def _temperature(capture: Capture, assumed_degc: float) -> float:
+    """Mean temperature of the magnet as recorded, else its ambient or what is assumed [degC]."""
+    column = magnet_column(capture)
+    if column is None:
+        return assumed_temperature(capture, assumed_degc)
+    return float(np.nanmean(capture.arrays(column)[column]))
 
 
 def _evidence(turns: Sequence[tuple[Capture, Turn]]) -> Evidence:

@@ -202,16 +202,13 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if torque is None or rows is None or not np.any(rows.kind == DRIVE):
         missing = "a torque constant is not known" if torque is None else "no usable drive log"
         missing = f"{missing}; {_parted(setups)}" if len(setups) > 1 else missing
-        note = f"{missing}; {EXPERIMENT}"
-        return METHOD.nothing(GIVES, note)
+        return METHOD.nothing(GIVES, f"{missing}; {EXPERIMENT}")
     nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
     nuisances += [] if torque.reluctance_known else [RELUCTANCE]
     y, driving = rows.acceleration_rad_s2, driving_torque(rows, torque, {})
     if float(np.ptp(driving)) == 0.0:
-        note = f"the drive log holds no torque; {EXPERIMENT}"
-        return METHOD.nothing(GIVES, note)
-    short = too_short(rows)
-    if short:
+        return METHOD.nothing(GIVES, f"the drive log holds no torque; {EXPERIMENT}")
+    if short := too_short(rows):
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
     found = drag_of(rows, acceleration(rows, driving), nuisances, options["level"])
     if not torque_is_parted(found.design, found.sigma):

@@ -161,34 +161,26 @@ def _flux_estimates(
     options: Mapping[str, float],
 ) -> dict[str, Estimate]:
     used = tuple({g.capture.path: g.capture for g in groups}.values())
-    logged = all(magnet_column(c) == "temp_magnet_degc" for c in used)
     psi = np.array([g.flux.psi_wb for g in groups])
     sigma = np.array([max(g.flux.u_psi_wb, 1e-9 * g.flux.psi_wb) for g in groups])
     design = flux_linkage(np.array([g.temp_degc for g in groups]))
     excess = design[:, 1]
     free = linear_fit(design, psi, sigma)
     alpha, u_alpha = _slope(free)
-    wide = float(np.ptp(excess)) >= options["least_span_k"] and free.full_rank
-    measured = logged and wide and u_alpha <= options["worst_u_alpha_1_k"]
+    wide = float(np.ptp(excess)) >= options["least_span_k"]
+    logged = all(magnet_column(c) == "temp_magnet_degc" for c in used)
+    measured = logged and wide and free.full_rank and u_alpha <= options["worst_u_alpha_1_k"]
     shared = _instrument_shares(groups, used)
-    at = {
-        "temp_magnet_degc": 25.0,
-        "temp_measured_low_degc": round(float(excess.min()) + 25.0, 3),
-        "temp_measured_high_degc": round(float(excess.max()) + 25.0, 3),
-        "speed_elec_low_rad_s": min(abs(g.flux.speed_elec_rad_s) for g in groups),
-        "speed_elec_high_rad_s": max(abs(g.flux.speed_elec_rad_s) for g in groups),
-    }
+    at = _conditions(groups, excess)
     extra: list[Contribution] = []
     words = [*notes, unlogged_note(used)]
-    if measured:
-        value, chosen = float(free.coefficients[0]), free
-    else:
+    value, chosen = float(free.coefficients[0]), free
+    if not measured:
         alpha = options["alpha_assumed_1_k"]
         factor = 1.0 + alpha * excess
-        fixed = linear_fit(factor[:, None], psi, sigma)
-        value, chosen = float(fixed.coefficients[0]), fixed
-        weight = 1.0 / sigma**2
-        lever = float(np.sum(weight * excess * factor) / np.sum(weight * factor**2))
+        chosen = linear_fit(factor[:, None], psi, sigma)
+        value = float(chosen.coefficients[0])
+        lever = _lever(excess, factor, sigma)
         extra = [Contribution(SOURCE, -value * lever * options["u_alpha_assumed_1_k"], "B")]
         words.append(f"magnet coefficient {alpha:g} 1/K assumed to reach 25 degC")
     widened, dof = _birge(chosen)
@@ -203,6 +195,24 @@ def _flux_estimates(
     offset = [Contribution(s, alpha**2 * u, "B") for s, u in shared["temperature"]]
     coefficient = METHOD.measured(name, alpha, [scatter, *offset], used, at, words)
     return {psi_25.name: psi_25, name: coefficient}
+
+
+def _lever(excess_k: Array, factor: Array, sigma: Array) -> float:
+    """Mean excess temperature [K] by the weights with which a fit of `factor` [n] has its rows."""
+    weight = 1.0 / sigma**2
+    return float(np.sum(weight * excess_k * factor) / np.sum(weight * factor**2))
+
+
+def _conditions(groups: Sequence[Group], excess_k: Array) -> dict[str, float]:
+    """Where the flux was measured: temperatures over 25 degC [n, K] and electrical speeds."""
+    speeds = [abs(g.flux.speed_elec_rad_s) for g in groups]
+    return {
+        "temp_magnet_degc": 25.0,
+        "temp_measured_low_degc": round(float(excess_k.min()) + 25.0, 3),
+        "temp_measured_high_degc": round(float(excess_k.max()) + 25.0, 3),
+        "speed_elec_low_rad_s": min(speeds),
+        "speed_elec_high_rad_s": max(speeds),
+    }
 
 
 def _slope(fit: LinearFit) -> tuple[float, float]:

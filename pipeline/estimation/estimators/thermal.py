@@ -313,9 +313,7 @@ def _two_nodes(
     if not math.isfinite(u):
         return None
     outward, back = a + b, c + d
-    slopes = np.zeros((4, 7))
-    slopes[0], slopes[1, 0] = slope, -1.0 / k**2
-    slopes[2, 1:3], slopes[3, 3:5] = -1.0 / outward**2, -1.0 / back**2
+    slopes = np.array([slope, *_time_slopes(k, outward, back)])
     covariance = slopes[:, free] @ fit.covariance @ slopes[:, free].T * spread
     values = np.array([rth, 1.0 / k, 1.0 / outward, 1.0 / back])
     words = f"winding {1.0 / outward:.3g} s and body {1.0 / back:.3g} s, two nodes"
@@ -323,6 +321,14 @@ def _two_nodes(
     covered = float(t[-1] - t[0]) * outward
     fitted = winding + halves[0] * sigmas[0]
     return Balance(rth, u, dof, fitted, covered, words, values, _common_scatter(covariance))
+
+
+def _time_slopes(k: float, outward: float, back: float) -> Array:
+    """Derivatives [3, 7] of 1/k, 1/(a + b) and 1/(c + d) by k, a, b, c, d and both starts."""
+    slopes = np.zeros((3, 7))
+    slopes[0, 0] = -1.0 / k**2
+    slopes[1, 1:3], slopes[2, 3:5] = -1.0 / outward**2, -1.0 / back**2
+    return slopes
 
 
 def network(t_s: Array, losses_w: Array, variants: Array) -> Array:

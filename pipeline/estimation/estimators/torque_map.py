@@ -245,14 +245,12 @@ def _estimates(
         why = f"d current did not vary enough to show reluctance torque; {EXPERIMENT}"
         found.append(METHOD.missing(GIVES[1], why))
     drag, covariance, dof, why = _drag(points, model)
+    if why:
+        return (*found, *(METHOD.missing(name, why) for name in DRAG))
     for index, name in enumerate(DRAG):
-        if why:
-            found.append(METHOD.missing(name, why))
-        else:
-            u_drag = float(np.sqrt(covariance[index, index]))
-            form = _untested_form(points, model, index)
-            parts = [*type_b[2 + index], *form]
-            found.append(estimate(name, float(drag[index]), u_drag, dof, parts))
+        u_drag = float(np.sqrt(covariance[index, index]))
+        parts = [*type_b[2 + index], *_untested_form(points, model, index)]
+        found.append(estimate(name, float(drag[index]), u_drag, dof, parts))
     return tuple(found)
 
 

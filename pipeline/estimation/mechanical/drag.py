@@ -217,16 +217,12 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
     rich = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in usable)])
     if rows.disjoint(DRIVE) < rich.shape[1]:
         rich = base
-    most = min(
-        policy().drag.most_nuisances,
-        max(0, rows.disjoint(DRIVE) // policy().drag.rows_a_column - _drive_columns(rows)),
-    )
     sigma = _balanced(rows, rich, y)
     tau = autocorrelation_time(
         linear_fit(rich, y, sigma).residuals / sigma, policy().evidence.memory_rows
     )
     pool = {n: candidates[n] for n in [*usable, "windage"]}
-    chosen = needed_columns(base, pool, y, sigma, level, most, tau)
+    chosen = needed_columns(base, pool, y, sigma, level, _most_nuisances(rows), tau)
     start = np.column_stack([base, *(candidates[n] for n in chosen)])
     bumps = {n: candidates[n] for n in STRIBECK}
     chosen += needed_columns(start, bumps, y, sigma, level, 1, tau)
@@ -252,6 +248,12 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
         names, found.coefficients, covariance, found.residuals, dof, free, u_form, reasons,
         design, sigma, y, rows.fastest_rad_s,
     )  # fmt: skip
+
+
+def _most_nuisances(rows: ShaftRows) -> int:
+    """How many nuisances the disjoint drive windows can carry."""
+    carried = rows.disjoint(DRIVE) // policy().drag.rows_a_column - _drive_columns(rows)
+    return min(policy().drag.most_nuisances, max(0, carried))
 
 
 def freedom(rows: ShaftRows) -> int:

@@ -396,12 +396,11 @@ def _parse(
         found[name] = values.to_numpy() if values.null_count() == 0 else _with_nan(values)
         infinite = np.flatnonzero(np.isinf(found[name]))
         if infinite.size:
-            row = int(infinite[0])
             raise _refuse(
                 "infinite",
                 f"the column {name!r} holds an infinite number",
                 "leave the field empty where nothing was measured",
-                (row, int(infinite[-1])),
+                (int(infinite[0]), int(infinite[-1])),
             )
     return found, clocks
 
