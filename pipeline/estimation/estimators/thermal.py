@@ -169,10 +169,7 @@ def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | N
         double = _winding_fit(np.column_stack([*balanced[:, :2].T, across, outward]), winding)
         body = linear_fit(np.column_stack([ones, -across, -trapezoid(t, second - ambient)]), second)
         start, direct = _start(double, body)
-        found = None
-        if start is not None:
-            found = _two_nodes(record, losses_w, ambient, start, direct)
-        if found is not None:
+        if start is not None and (found := _two_nodes(record, losses_w, ambient, start, direct)):
             return found
     noise = max(white_noise_sigma(winding), 1e-4 * float(np.ptp(winding)))
     if float(np.std(single.residuals)) > policy().heat_record.unexplained * noise:
