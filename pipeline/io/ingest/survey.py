@@ -397,19 +397,6 @@ def _entry(
         return None
     if source is not None and source.reader is not None:
         form, own = "foreign", dict(find_reader(source.reader).metadata(data))
-    stated = _metadata(path, source, own, beside, listed, findings)
-    return Entry(path, digest, form, source, tuple(sorted(stated.items())), recovered)
-
-
-def _metadata(
-    path: str,
-    source: SourceMap | None,
-    own: Mapping[str, str],
-    beside: Mapping[str, str],
-    listed: Mapping[str, str],
-    findings: list[Finding],
-) -> dict[str, str]:
-    """Metadata of a capture from its file, sidecar, manifest and source map, checked."""
     fixed = {} if source is None else source.metadata_for(path)
     if source is not None:
         own = {key: value for key, value in own.items() if key in METADATA}
@@ -420,10 +407,10 @@ def _metadata(
     ]
     stated, contradictions = merge(path, statements)
     findings += contradictions
-    stated = {**fixed, **stated}
+    stated = fixed | stated
     check_texts(stated)
     belongs(stated)
-    return stated
+    return Entry(path, digest, form, source, tuple(sorted(stated.items())), recovered)
 
 
 def _may_read(
