@@ -203,6 +203,9 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     A log that is slower than the PWM has the mean of such vectors in the rotor frame. `ripple_edge`
     and `ripple_shift` are what the log samples otherwise. A vector that is held may also be in the
     frame of the instant from which on it is (`Instrument.frame`).
+
+    A drive turns its next vector to where the rotor will be, by a speed of its own. That speed lags
+    (`frame_lag_s`), so as the shaft gathers speed the vector is behind the frame it is logged in.
     """
     period, held = segment.ts_s, segment.instrument.timing == "held"
     difference = forward if held else central
@@ -215,6 +218,8 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     mean: Complex = kept * voltage
     if segment.instrument.frame:
         mean = mean * np.exp(1j * segment.instrument.frame * turn)
+    if lag := values["frame_lag_s"]:
+        mean = mean * np.exp(1j * lag * x.once(x.theta_rad, "behind", lambda: _behind(segment, x)))
     if shift:
         psi = ahead(pieces.psi_wb) if held else pieces.psi_wb
         mean = mean - shift * 1j * psi * np.gradient(x.machine.pole_pairs * x.omega_rad_s)
@@ -244,6 +249,14 @@ def _pace(
     return difference(x.machine.pole_pairs * x.theta_rad, segment.ts_s), turn
 
 
+def _behind(segment: Segment, x: Operating) -> Array:
+    """Angle [n, rad/s] by which a voltage vector is behind its logged frame for every second that
+    the drive's speed lags: a vector is computed one and a half periods before its middle.
+    """
+    speed = x.machine.pole_pairs * x.omega_rad_s
+    return 1.5 * x.supply.hold_s * np.gradient(speed, segment.ts_s)
+
+
 def _reading(segment: Segment, channel: str, model: Model, values: Values) -> Array:
     """Length of the voltage [n, V], or the torque of the current's length [n, N·m]."""
     if channel == TORQUE:
@@ -269,7 +282,7 @@ EQUATION = Equation(
     observes=Observes(
         (
             *("r_ohm", "lead_share", "ld_h", "lq_h", *STATE),
-            *("ripple_slope", "ripple_mean", "ripple_edge", "ripple_shift"),
+            *("ripple_slope", "ripple_mean", "ripple_edge", "ripple_shift", "frame_lag_s"),
             *("ripple_torque", "ripple_held", "psi_wb", "j_kgm2", "b_nm_s_rad"),
         ),
         hooks=frozenset({"flux", "drop", "torque"}),

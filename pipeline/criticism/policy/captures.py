@@ -277,6 +277,10 @@ class Priors:
     ripple_shift: float = chosen(
         0.15, "T_s dω_e/dt ψ", "angle against voltage", why="a sixth of a sample"
     )
+    frame_lag_s: float = chosen(
+        5e-3, "s", "lag of the speed by which a drive turns its voltage ahead",
+        why="as `priors.late_speed_s`: it is the same observer",
+    )  # fmt: skip
     ripple_torque: float = chosen(
         0.3, "sample periods", "current in the torque", why="a third of a sample"
     )

@@ -11,8 +11,8 @@ from pipeline.criticism.effect import Array, Complex, Operating, Values
 from pipeline.criticism.machine.model import Model, Pieces, values_of
 from pipeline.criticism.signals.true_state import angle_error, zero_angle
 
-RIPPLES = ("ripple_edge", "ripple_shift")
-"""Nuisances of the current's ripple that are in the voltage (`model.BASE`)."""
+RIPPLES = ("ripple_edge", "ripple_shift", "frame_lag_s")
+"""Nuisances of held vectors and their frame that are in the voltage (`model.BASE`)."""
 
 
 def rotor_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Complex:
