@@ -54,6 +54,8 @@ class Point:
         Sampling period [s].
     capture
         Where the point comes from.
+    alpha_mech_rad_s2
+        Acceleration of the shaft, of a bench that gives way; 0 where no motion was recorded.
 
     """
 
@@ -73,6 +75,7 @@ class Point:
     sin_turn: float
     period_s: float
     capture: Capture
+    alpha_mech_rad_s2: float = 0.0
 
     @property
     def standing(self) -> bool:
@@ -321,8 +324,11 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
     if has_angle:
         cos_turn, sin_turn = float(np.mean(np.cos(theta))), float(np.mean(np.sin(theta)))
         omega = float(np.polyfit(t - t.mean(), theta - theta.mean(), 1)[0])
+        alpha = _acceleration(t, theta, 2)
     else:
-        omega = float(np.mean(data["omega_mech_rad_s"][rows]))
+        speed = data["omega_mech_rad_s"][rows]
+        omega = float(np.mean(speed))
+        alpha = _acceleration(t, speed, 1)
     travel = abs(omega) * np.array([t[-1] - t[0], data["t_s"][-1] - data["t_s"][0]]) / TURN_RAD
     still = policy().points
     if travel[0] < still.still_turn and (not has_angle or travel[1] < still.still_capture_turn):
@@ -348,7 +354,17 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
         sin_turn=sin_turn,
         period_s=float(np.median(np.diff(t))),
         capture=capture,
+        alpha_mech_rad_s2=alpha,
     )
+
+
+def _acceleration(t_s: Array, motion: Array, power: int) -> float:
+    """Mean acceleration [rad/s²]: the curvature of an angle, `power` 2, or the slope of a speed, 1;
+    0 where it is not known.
+    """
+    if motion.size <= power or not np.all(np.isfinite(motion)):
+        return 0.0
+    return float(power * np.polyfit(t_s - t_s.mean(), motion - motion.mean(), power)[0])
 
 
 def _error_of_mean(part: Array) -> float:

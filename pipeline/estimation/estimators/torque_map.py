@@ -142,7 +142,8 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
     candidates : dict of array [n]
         Columns that enter where a test asks for them: saturation (odd powers of i_q, even and odd
         ones of i_d), a frame that is turned (i_d, i_q² - i_d²) or wobbles (an eccentric encoder:
-        i_d cos θ, i_d sin θ), friction in proportion to torque.
+        i_d cos θ, i_d sin θ), friction in proportion to torque, and the acceleration of a
+        shaft that the dynamometer lets give way, whose coefficient is -J.
 
     Notes
     -----
@@ -160,6 +161,9 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
     base = {f"speed {g}": (group == g).astype(float) for g in sorted({p.group for p in points})}
     base["iq"] = i_q * warm
     candidates = {"iq^3": i_q**3, "iq^5": i_q**5, "|iq| sense": np.abs(i_q) * sense}
+    alpha = _column(points, "alpha_mech_rad_s2")
+    if np.ptp(alpha) > 0.0:
+        candidates["acceleration"] = alpha
     if np.ptp(i_d) > policy().aligned.least_d_share * np.ptp(i_q):
         base["id iq"] = i_d * i_q
         candidates |= {
