@@ -13,6 +13,7 @@ from pipeline.criticism.data.unlogged_load import runs_free
 from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
+from pipeline.criticism.machine.two_masses import reach
 from pipeline.criticism.signals.shaft import (
     net_torque,
     torque_between,
@@ -57,7 +58,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     shaft["t_s"] = log.period_s * np.arange(log.keep.size, dtype=np.float64)
     policy = machine.policy.cutting
     window = window_of(log.period_s, log.keep.size, policy)
-    shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion)
+    pad = max(policy.motion_pad, reach(log.period_s, machine.policy.torsion))
+    shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion, pad)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     middle = np.rint(shaft["t_s"][starts + window // 2] / log.period_s)
     blocks = in_time(middle, log.keep.size)

@@ -33,6 +33,7 @@ from pipeline.criticism.effect import (
     Values,
 )
 from pipeline.criticism.machine.torsion import Shaft, law_of_twist
+from pipeline.criticism.policy.machine import Torsion
 
 
 def passed_on(x: Operating, share: float) -> Array:
@@ -80,9 +81,7 @@ def _at_points(x: Operating, signal: Array) -> Array:
 
 def _smoothed(x: Operating, inner: Array) -> Array:
     """A signal without its first and last sample [n − 2], as `passed_on` smooths it [n]."""
-    policy = x.machine.policy.torsion
-    block = max(min(round(policy.mean_s / x.ts_s), policy.mean_samples), 1)
-    block -= 1 - block % 2
+    block = _block(x.ts_s, x.machine.policy.torsion)
     box = np.full(block, 1.0 / block)
     smooth = np.convolve(np.convolve(box, box), box)
     kernel = 2.0 * np.pad(smooth, smooth.size // 2) - np.convolve(smooth, smooth)
@@ -92,6 +91,31 @@ def _smoothed(x: Operating, inner: Array) -> Array:
     first = kernel.size // 2 + 1
     found[first : found.size - first] = np.convolve(inner, kernel, mode="valid")
     return found
+
+
+def _block(period_s: float, policy: Torsion) -> int:
+    """Samples of each running mean of `passed_on`, odd."""
+    block = max(min(round(policy.mean_s / period_s), policy.mean_samples), 1)
+    return block - (1 - block % 2)
+
+
+def reach(period_s: float, policy: Torsion) -> int:
+    """Samples to either side of one that a drag of two masses there is made of.
+
+    Parameters
+    ----------
+    period_s
+        Sample period.
+    policy
+        Of a coupling.
+
+    Returns
+    -------
+    int
+        Six half means of `passed_on`, and a second difference before and behind them.
+
+    """
+    return 3 * (_block(period_s, policy) - 1) + 2
 
 
 def linear_far_drag(x: Operating, q: Values) -> Array:

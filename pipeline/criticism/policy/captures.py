@@ -36,6 +36,10 @@ class Cutting:
     windows_motion: int = chosen(
         160, "windows", "windows of a shaft's motion at the most", why=COST
     )
+    motion_pad: int = derived(
+        8, "samples", "samples kept at either side of a window of a shaft's motion at least",
+        source="the angle's second difference, and a mean of its speed, need a few",
+    )  # fmt: skip
     rough_windows: int = chosen(
         12, "windows", "windows of a segment in a rough fit",
         why="enough to meet a sound J to a tenth",

@@ -12,7 +12,7 @@ import pipeline
 from pipeline.criticism.diagnosis import base_fit
 from pipeline.criticism.effect import ShaftState
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.two_masses import far_drag, linear_far_drag, passed_on
+from pipeline.criticism.machine.two_masses import far_drag, linear_far_drag, passed_on, reach
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.linear_start import with_linear_start
@@ -103,6 +103,22 @@ def test_a_state_of_more_points_a_sample_has_the_same_coupling():
     assert far_drag(fine, 0.4, 1.0, lambda: twist)[::3] == pytest.approx(
         far_drag(x, 0.4, 1.0, lambda: twist)
     )
+
+
+@pytest.mark.parametrize("period_s", [5e-5, 1e-4, 1e-3])
+def test_a_drag_of_two_masses_reaches_so_far_and_no_farther(period_s):
+    t = period_s * np.arange(201)
+    x = replace(
+        operating(t.size),
+        theta_rad=np.zeros(t.size),
+        torque_em_nm=(np.arange(t.size) == 100) * 1.0,
+        ts_s=period_s,
+        shaft=ShaftState(alone=True),
+    )
+    moved = np.flatnonzero(linear_far_drag(x, {"torque_s2": 1e-5, "angle_s2": 0.0}))
+    far = reach(period_s, x.machine.policy.torsion) - 1
+    assert moved.min() == 100 - far
+    assert moved.max() == 100 + far
 
 
 def test_some_samples_of_it_are_a_state_of_their_own():
