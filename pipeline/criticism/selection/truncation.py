@@ -113,12 +113,13 @@ def _clears_its_own(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> boo
     own side, winding or shaft, while the other side misses as well.
 
     A bump of friction is no guess where coasts and torques need it, whatever an inverter leaves in
-    the voltages.
+    the voltages. A capture that alone carries the effect is never held out, and shows nothing.
     """
     before, after = (step.system for step in steps)
     name = f"{after.fit.model.effects[-1].name}." if after.fit.model.effects else ""
     own = [n for n, c in enumerate(after.columns[: after.own_count]) if c.name.startswith(name)]
-    acts = np.bincount(after.group, np.any(after.matrix[:, own] != 0.0, axis=1), len(after.labels))
+    out = np.isfinite(held[-1].residual) & np.any(after.matrix[:, own] != 0.0, axis=1)
+    acts = np.bincount(after.group, out, len(after.labels))
     shaft = np.array([channel in SHAFT for _, channel, _ in after.labels])
     was, now = (
         step.system.counts * np.maximum(predicted_chi2(step.system, one) - 1.0, 0.0)
