@@ -158,7 +158,7 @@ def _falls(capture: Capture) -> list[Fall]:
     data = capture.arrays("t_s", column)
     fine = np.isfinite(data["t_s"]) & np.isfinite(data[column])
     t, y = data["t_s"][fine], data[column][fine]
-    if t.size < 3 * LEAST_SAMPLES:
+    if t.size < 3 * LEAST_SAMPLES or not (np.diff(t) > 0.0).all():
         return []
     angle = y if column == "theta_mech_rad" else trapezoid(t, y)
     try:

@@ -205,7 +205,8 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     frame of the instant from which on it is (`Instrument.frame`).
 
     A drive turns its next vector to where the rotor will be, by a speed of its own. That speed lags
-    (`frame_lag_s`), so as the shaft gathers speed the vector is behind the frame it is logged in.
+    (`frame_lag_s`, of commanded voltages), so as the shaft gathers speed the vector is behind the
+    frame it is logged in.
     """
     period, held = segment.ts_s, segment.instrument.timing == "held"
     difference = forward if held else central
@@ -218,7 +219,8 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     mean: Complex = kept * voltage
     if segment.instrument.frame:
         mean = mean * np.exp(1j * segment.instrument.frame * turn)
-    if lag := values["frame_lag_s"]:
+    commanded = segment.instrument.meter == "gain_commanded"
+    if commanded and (lag := values["frame_lag_s"]):
         mean = mean * np.exp(1j * lag * x.once(x.theta_rad, "behind", lambda: _behind(segment, x)))
     if shift:
         psi = ahead(pieces.psi_wb) if held else pieces.psi_wb

@@ -25,8 +25,6 @@ from pipeline.records.constants import Constants
 Array = NDArray[np.float64]
 MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
 TURN_RAD = 2.0 * np.pi
-FEWEST_ROWS = 3
-"""Rows of a mean in which a step is sought, at the least (`find_plateaus`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,10 +248,11 @@ def _stretches(data: Mapping[str, Array]) -> list[slice]:
     Where the means before and after each step leave less than half of the rows, means of the fewest
     rows are taken, which find the same steps in a signal that is larger than its noise.
     """
+    fewest = policy().points.fewest_rows
     for names in (("id_a", "iq_a", "torque_shaft_nm"), ("id_a", "iq_a")):
         wide = _settled(data, names)
         little = 2 * _rows_in(wide) < data["iq_a"].size
-        found = max(wide, _settled(data, names, FEWEST_ROWS) if little else [], key=_rows_in)
+        found = max(wide, _settled(data, names, fewest) if little else [], key=_rows_in)
         if found:
             return found
     return []

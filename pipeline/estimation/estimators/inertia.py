@@ -21,6 +21,7 @@ from pipeline.estimation.mechanical.drag import (
     too_short,
     torque_is_parted,
 )
+from pipeline.estimation.mechanical.setups import setups_of
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
@@ -36,7 +37,7 @@ from pipeline.estimation.uncertainty.instruments import (
     unstated_note,
 )
 from pipeline.estimation.uncertainty.regimes import Disagreement
-from pipeline.numerics.coast_setups import Setup, coast_setups, setup_words
+from pipeline.numerics.coast_setups import Setup, setup_words
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
@@ -195,7 +196,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     drag curve left free, T = J (a_driven - a_coasting) at each speed.
     """
     torque = _torque(known)
-    setups = coast_setups(campaign.of("spin_down"), policy().coast_down.setups)
+    setups = setups_of(campaign.of("spin_down"))
     if len(setups) > 1:
         campaign = replace(campaign, captures=campaign.of("drive"))
     rows = _rows(known, campaign) if torque is not None else None

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.mechanical.drag import DRAG_FORMS, STRIBECK
+from pipeline.estimation.mechanical.setups import setups_of
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.nuisances import allowed_for
-from pipeline.numerics.coast_setups import REMEDY, coast_setups, setup_words
+from pipeline.numerics.coast_setups import REMEDY, setup_words
 from pipeline.numerics.coasting import coast_down, coasting_rows
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import (
@@ -137,7 +138,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     """
     del known
     captures = campaign.of("spin_down")
-    setups = coast_setups(captures, policy().coast_down.setups)
+    setups = setups_of(captures)
     if len(setups) > 1:
         each = (_brief(_fit(setup.captures, options)) for setup in setups)
         note = f"{setup_words(setups)}; in this order {' | '.join(each)}; {REMEDY}"

@@ -79,6 +79,10 @@ class Points:
         0.8, "1", "least share of a point's rows that whole turns may leave",
         why="whole turns, or cycles, are kept where they cost no more than a fifth of the rows",
     )  # fmt: skip
+    fewest_rows: int = derived(
+        3, "rows", "of a mean before and after a step of a slow log",
+        source="two means and what is between them: the least that has a middle",
+    )  # fmt: skip
     step_share: float = derived(
         0.03, "1", "of a signal's span, above which a change is a step",
         source="ten levels a side step by a twentieth of the span; less than this is ripple",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.numerics.coast_setups import Limits
 from pipeline.physics.conventions import UNLOGGED_D_SHARE
 from pipeline.records.policy import calibrated, chosen, derived
 
@@ -136,11 +135,6 @@ class CoastDown:
         0.2, unit="1", meaning="of the speed that two coasts have to have in common",
         why="by judgement: the noise of a smoothed speed is a hundredth of that",
     )  # fmt: skip
-
-    @property
-    def setups(self) -> Limits:
-        """When coasts are of two set-ups."""
-        return Limits(self.setup_share, self.setup_top, self.setup_least)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import select
 import sys
 import time
@@ -79,4 +80,5 @@ def test_an_interrupt_is_one_line_and_exit_130(started: tuple[int, int]) -> None
     assert interrupted
     assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 130
     assert b"Traceback" not in shown
-    assert shown.rstrip().endswith(b"error: interrupted; rerun the same command to go on")
+    plain = re.sub(rb"\x1b\[[0-9;]*[mK]", b"", shown)
+    assert plain.rstrip().endswith(b"error: interrupted; rerun the same command to go on")

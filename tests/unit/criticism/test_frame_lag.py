@@ -26,20 +26,29 @@ def lagging(noise: float = 0.0, seed: int = 5) -> Segment:
     """A plain machine's log, whose drive turns every vector ahead by a speed that lags."""
     plain = log(noise=noise, seed=seed)
     volts = (plain.recorded["vd_v"] + 1j * plain.recorded["vq_v"]) * np.exp(1j * ANGLE_RAD)
-    return replace(plain, recorded={**plain.recorded, "vd_v": volts.real, "vq_v": volts.imag})
+    drive = replace(plain.instrument, meter="gain_commanded")
+    recorded = {**plain.recorded, "vd_v": volts.real, "vq_v": volts.imag}
+    return replace(plain, instrument=drive, recorded=recorded)
 
 
-def left(**changed: float) -> float:
+def left(segment: Segment, **changed: float) -> float:
     """Largest voltage [V] that is left away from the ends."""
-    found = residual(lagging(), Model(machine(), ()), {**BASE, **changed})
+    found = residual(segment, Model(machine(), ()), {**BASE, **changed})
     return float(np.abs(found[:2, 60:-60]).max())
 
 
 def test_the_lag_of_a_drives_speed_turns_the_frame_of_its_voltage() -> None:
-    speed = 7 * 100.0
-    assert left() == pytest.approx(ANGLE_RAD * speed * BASE["psi_wb"], rel=0.4)
-    assert left(frame_lag_s=LAG_S) < 0.02 * left()
-    assert left(frame_lag_s=-LAG_S) > 1.9 * left()
+    speed, drive = 7 * 100.0, lagging()
+    plain = left(drive)
+    assert plain == pytest.approx(ANGLE_RAD * speed * BASE["psi_wb"], rel=0.4)
+    assert left(drive, frame_lag_s=LAG_S) < 0.02 * plain
+    assert left(drive, frame_lag_s=-LAG_S) > 1.9 * plain
+
+
+def test_a_voltmeter_knows_of_no_drives_speed() -> None:
+    """Measured voltages are turned by the angle beside them."""
+    measured = replace(lagging(), instrument=log().instrument)
+    assert left(measured, frame_lag_s=LAG_S) == left(measured)
 
 
 def test_a_lag_is_a_nuisance_and_no_name() -> None:

@@ -46,6 +46,7 @@ def climbs(monkeypatch):
     monkeypatch.setattr(search, "_sketched", sketched)
     monkeypatch.setattr(search, "_beside", lambda *_: [])
     monkeypatch.setattr(search, "changed_constant", lambda _: made.change)
+    monkeypatch.setattr(search, "changed_within", lambda _: None)
     monkeypatch.setattr(search, "segments", lambda _, of: of.load_orders)
     monkeypatch.setattr(search, "fit_of", lambda found, _: tuple(found))
     monkeypatch.setattr(search, "model_of", lambda *_: None)
