@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -159,8 +160,18 @@ def test_windage_of_coasts_alone_is_named_without_a_size(tmp_path, capsys):
     assert "windage.drag_nm/j_kgm2" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("plan", [COASTS, CURRENT_MAP])
-def test_nothing_is_diagnosed_of_what_is_not_known(plan, tmp_path):
-    document = made(recorded(tmp_path / "few", plan), "diagnose")
+def test_nothing_is_diagnosed_of_coasts_that_show_nothing(tmp_path):
+    document = made(recorded(tmp_path / "few", COASTS), "diagnose")
     assert (document["verdict"], document["missing"]) == ("insufficient", [])
     assert all(one["parameters"] == {} for one in document["ranking"])
+
+
+def test_cogging_of_holding_currents_is_named_without_a_torque(tmp_path):
+    """No constant makes torque of these currents: cogging is known over the flux linkage."""
+    document = made(recorded(tmp_path / "few", CURRENT_MAP), "diagnose")
+    assert (document["verdict"], document["missing"]) == ("missing", ["cogging"])
+    sizes = [size for one in document["ranking"] for size in one["parameters"].values()]
+    assert {(size["value"], size["u"]) for size in sizes} == {(None, None)}
+    parts = [combined(document)[f"cogging.{part}_84_nm/psi_wb"]["value"] for part in ("sin", "cos")]
+    true = design("gimbal-5208").effects["cogging"]["size"] / TRUE["psi_pm_wb"]
+    assert math.hypot(*parts) == pytest.approx(true, rel=0.01)
