@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.estimation.estimators import spin_down
-from pipeline.estimation.policy import policy
-from pipeline.numerics.coast_setups import coast_setups
+from pipeline.estimation.mechanical.setups import setups_of
 from pipeline.records.capture import Capture
 from tests.unit.estimation.signals import capture, estimates
 
@@ -28,7 +27,7 @@ def _coast(name: str, coulomb: float, viscous: float, top: float, *, angle: bool
 def test_a_chain_on_and_off_are_two_set_ups_and_none_is_averaged(angle: bool) -> None:
     free = [_coast(f"off_{k}", 20.0, 0.1, 300.0 + 40.0 * k, angle=angle) for k in range(2)]
     chain = [_coast(f"on_{k}", 35.0, 0.15, 320.0 + 10.0 * k, angle=angle) for k in range(2)]
-    setups = coast_setups([free[0], chain[0], free[1], chain[1]], policy().coast_down.setups)
+    setups = setups_of([free[0], chain[0], free[1], chain[1]])
     assert [{c.path for c in s.captures} for s in setups] == [
         {c.path for c in free},
         {c.path for c in chain},
@@ -44,7 +43,7 @@ def test_a_chain_on_and_off_are_two_set_ups_and_none_is_averaged(angle: bool) ->
 def test_a_bearing_that_warms_is_no_other_set_up() -> None:
     cold = _coast("cold", 20.0, 0.1, 300.0, angle=True)
     warm = _coast("warm", 18.5, 0.093, 310.0, angle=True)
-    assert len(coast_setups([cold, warm], policy().coast_down.setups)) == 1
+    assert len(setups_of([cold, warm])) == 1
     found = estimates(spin_down.ESTIMATOR, cold, warm)
     assert 18.0 < found["coast_coulomb_rad_s2"].number < 20.5
 
@@ -56,4 +55,4 @@ def test_coasts_without_a_speed_in_common_are_not_parted() -> None:
     slow = _coast("slow", 35.0, 0.15, 60.0, angle=True)
     from dataclasses import replace
 
-    assert len(coast_setups([replace(fast, tables=(cut,)), slow], policy().coast_down.setups)) == 1
+    assert len(setups_of([replace(fast, tables=(cut,)), slow])) == 1
