@@ -71,29 +71,29 @@ def model_verdict(
     base = base_fit(campaign, model, start)
     if isinstance(base, str):
         return _stated(model, ModelVerdict("insufficient", note=base)), None
-    if not search and _surely_missing(base):
+    if not search and _misses_beyond_drift(base):
         return _stated(model, replace(_residuals(base), verdict="missing")), None
-    found, kept = searched(campaign, model, base)
+    diagnosis, kept = searched(campaign, model, base)
     # instruments that drift count as noise where the verdict says that nothing else is left
-    tested = _residuals(base if found.verdict in ("missing", "unknown") else kept)
-    named = replace(_named(tested, found), scales=base.system.fit.machine.scales)
+    tested = _residuals(base if diagnosis.verdict in ("missing", "unknown") else kept)
+    named = replace(_named(tested, diagnosis), scales=base.system.fit.machine.scales)
     library = effects(model.effects_path)
     named = replace(named, touches=_touches(named.sizes, library))
-    return _stated(model, named), found
+    return _stated(model, named), diagnosis
 
 
-def _stated(model: ModelSpec, found: ModelVerdict) -> ModelVerdict:
-    return replace(found, model=model.name, effects=model.effects)
+def _stated(model: ModelSpec, verdict: ModelVerdict) -> ModelVerdict:
+    return replace(verdict, model=model.name, effects=model.effects)
 
 
-def _surely_missing(base: BaseFit) -> bool:
+def _misses_beyond_drift(base: BaseFit) -> bool:
     large = remainder(base.system, large=True)
     return bool(large) and drifting_segments(base.system.fit, large) is None
 
 
-def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
+def _named(tested: ModelVerdict, diagnosis: Diagnosis) -> ModelVerdict:
     """The residuals of a model with what a diagnosis of it says."""
-    ranked = {one.effect: one for one in found.ranking}
+    ranked = {unknown.effect: unknown for unknown in diagnosis.ranking}
     missing = {
         name: FoundEffect(
             ranked[name].parameters,
@@ -101,19 +101,19 @@ def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
             ranked[name].confused_with,
             ranked[name].experiment,
         )
-        for name in found.missing
+        for name in diagnosis.missing
     }
-    unseen = found.unexcited
-    one = found.unknown
+    unseen = diagnosis.unexcited
+    unknown = diagnosis.unknown
     return replace(
         tested,
-        verdict=found.verdict,
+        verdict=diagnosis.verdict,
         missing=missing,
-        note="; ".join(u.words for u in unseen) if found.verdict == "insufficient" else "",
-        held_out_with=found.ladder[-1].held_out if missing else None,
-        unknown="" if one is None else f"{one.signal}, {one.shape}",
+        note="; ".join(u.words for u in unseen) if diagnosis.verdict == "insufficient" else "",
+        held_out_with=diagnosis.ladder[-1].held_out if missing else None,
+        unknown="" if unknown is None else f"{unknown.signal}, {unknown.shape}",
         unexcited=unseen,
-        fitted=_fitted(found),
+        fitted=_fitted(diagnosis),
     )
 
 
@@ -126,26 +126,26 @@ def _touches(sizes: Mapping[str, Parameters], library: Mapping[str, Effect]) -> 
     }
 
 
-def _fitted(found: Diagnosis) -> dict[str, dict[str, ReportedParameter]]:
+def _fitted(diagnosis: Diagnosis) -> dict[str, dict[str, ReportedParameter]]:
     """Parameters of the effects that were asked for, beside those that were found."""
-    if not found.ladder:
+    if not diagnosis.ladder:
         return {}
-    last = found.ladder[-1].parameters
-    own = {full.partition("."): one for full, one in last.items()}
+    last = diagnosis.ladder[-1].parameters
+    values = {full.partition("."): one for full, one in last.items()}
     return {
-        name: {short: one for (effect, _, short), one in own.items() if effect == name}
-        for name in found.asked
-        if any(effect == name for effect, _, _ in own)
+        name: {short: one for (effect, _, short), one in values.items() if effect == name}
+        for name in diagnosis.asked
+        if any(effect == name for effect, _, _ in values)
     }
 
 
 def _residuals(base: BaseFit) -> ModelVerdict:
     """What a fit leaves; the verdict is the caller's."""
     system = base.system
-    left = remainder(system)
+    remainders = remainder(system)
     worst = None
-    if left:
-        first = max(left, key=lambda one: one.chi2_per_n)
+    if remainders:
+        first = max(remainders, key=lambda one: one.chi2_per_n)
         names = {(s.capture, c): reported_signal(s, c) for s in system.segments for c in s.channels}
         signal = names[first.capture, first.signal]
         floors = math.sqrt(first.chi2_per_n)
@@ -155,7 +155,7 @@ def _residuals(base: BaseFit) -> ModelVerdict:
         held_out=leave_out(system).total,
         residual=_largest(system),
         worst=worst,
-        over=len(left),
+        over=len(remainders),
     )
 
 

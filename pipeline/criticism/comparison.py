@@ -72,12 +72,12 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     machine = machine_of(campaign, start, policy_of(model.policy))
     if machine is None:
         return _nothing(campaign, model, model.effects, PAIRLESS)
-    found = segments(campaign, machine)
-    asked = model_of(model, machine)
-    names = tuple(effect.name for effect in asked.effects)
-    if not found:
+    cut_segments = segments(campaign, machine)
+    stated_model = model_of(model, machine)
+    names = tuple(effect.name for effect in stated_model.effects)
+    if not cut_segments:
         return _nothing(campaign, model, names, *(mixed(campaign, machine) or (_IDLE,)))
-    base = fit_of(found, asked)
+    base = fit_of(cut_segments, stated_model)
     system = linear_system(trimmed(base.system, names).fit)
     held = leave_out(system)
     simulated = simulate(system, held)
@@ -165,12 +165,12 @@ def _moves(
 def _errors(system: LinearSystem, held: HeldOut) -> Iterator[SignalError]:
     """Errors of every capture's equations in plain windows."""
     for place, (number, channel, order) in enumerate(system.labels):
-        mine = system.group == place
-        if order != 0 or not mine.any():
+        in_group = system.group == place
+        if order != 0 or not in_group.any():
             continue
-        out = bool(np.isfinite(held.residual[mine]).all())
-        residual = held.residual[mine] if out else system.residual[mine]
-        unit, expected = system.unit[mine], (system.noise_ratio * held.widening)[mine]
+        out = bool(np.isfinite(held.residual[in_group]).all())
+        residual = held.residual[in_group] if out else system.residual[in_group]
+        unit, expected = system.unit[in_group], (system.noise_ratio * held.widening)[in_group]
         segment = system.segments[number]
         signal = reported_signal(segment, channel)
         yield SignalError(
@@ -179,7 +179,7 @@ def _errors(system: LinearSystem, held: HeldOut) -> Iterator[SignalError]:
             "held_out" if out else "fit",
             math.sqrt(float(((residual * unit) ** 2).mean())),
             math.sqrt(float(((unit * expected) ** 2).mean())),
-            int(mine.sum()),
+            int(in_group.sum()),
             effective(residual),
             unit_of(signal),
         )

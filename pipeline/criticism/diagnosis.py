@@ -118,8 +118,8 @@ def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> BaseFit 
     machine = machine_of(campaign, start, policy_of(model.policy))
     if machine is None:
         return PAIRLESS
-    found = segments(campaign, machine)
-    return fit_of(found, model_of(model, machine)) if _enough(found) else TOO_LITTLE
+    cut_segments = segments(campaign, machine)
+    return fit_of(cut_segments, model_of(model, machine)) if _enough(cut_segments) else TOO_LITTLE
 
 
 def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagnosis, BaseFit]:
@@ -227,23 +227,24 @@ def _together(known: Sequence[KnownCombination], added: Sequence[str]) -> tuple[
     )
 
 
-def _as_reported(system: LinearSystem, left: Sequence[Remainder]) -> tuple[Remainder, ...]:
-    """All that is over its floor, first what is `left`, then what is too small to matter, with
-    signals as outputs name them.
+def _as_reported(system: LinearSystem, remainders: Sequence[Remainder]) -> tuple[Remainder, ...]:
+    """All that is over its floor: `remainders` first, then what is too small to matter.
+
+    Signals have the names of outputs.
     """
     names = {
         (s.capture, channel): reported_signal(s, channel)
         for s in system.segments
         for channel in s.channels
     }
-    small = [one for one in over_floor(system) if one not in left]
-    reported = (*left, *(replace(one, matters=False) for one in small))
+    small = [one for one in over_floor(system) if one not in remainders]
+    reported = (*remainders, *(replace(one, matters=False) for one in small))
     return tuple(replace(one, signal=names[one.capture, one.signal]) for one in reported)
 
 
-def _enough(found: Sequence[Segment]) -> bool:
+def _enough(cut_segments: Sequence[Segment]) -> bool:
     """Whether there is a test under current and one that turns, or one that is both."""
-    shown = frozenset[str]().union(*(equation_of(segment).use.shows for segment in found))
+    shown = frozenset[str]().union(*(equation_of(segment).use.shows for segment in cut_segments))
     return shown >= {"current", "turning"}
 
 
@@ -283,11 +284,11 @@ def _ranking(
 ) -> tuple[RankedEffect, ...]:
     """Found effects in the order found, then the others by their score on the last step."""
     last = ladder.steps[-1]
-    found = [_found(ladder, last.fit.effect(name), offered, library) for name in last.added]
+    ranked = [_found(ladder, last.fit.effect(name), offered, library) for name in last.added]
     others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]
     reasons = {name: _AGAINST if note else _GUESS for name, note in ladder.cut.items()}
     others = [replace(r, shortfall=reasons.get(r.effect, r.shortfall)) for r in others]
-    return tuple(found + sorted(others, key=lambda r: (-r.score, r.effect)))
+    return tuple(ranked + sorted(others, key=lambda r: (-r.score, r.effect)))
 
 
 def _found(

@@ -65,8 +65,8 @@ def parameters_of(step: LadderStep, held: HeldOut) -> dict[str, ReportedParamete
 
     """
     reported = reported_parameters(step.system, held)
-    own = step.fit.model.parameters()
-    found = ((name, reported[name]) for name in own)
+    parameters = step.fit.model.parameters()
+    found = ((name, reported[name]) for name in parameters)
     return {name: ReportedParameter(one.value, one.u, one.unit) for name, one in found}
 
 

@@ -72,16 +72,16 @@ class Ladder:
     left: tuple[Remainder, ...]
     cut: dict[str, str]
 
-    def explains(self, left: Sequence[Remainder]) -> bool:
+    def explains(self, remainders: Sequence[Remainder]) -> bool:
         """Whether its effects explain what the captures show.
 
         Parameters
         ----------
-        left
+        remainders
             What is over the floor and may have another cause.
 
         """
-        return explained(self.steps, self.held, left)
+        return explained(self.steps, self.held, remainders)
 
     def large(self) -> tuple[Remainder, ...]:
         """What is left and large for the machine as a whole.
@@ -161,22 +161,22 @@ def search_ladder(
         return ladder_from(fit_of(segments(campaign, wider), model_of(model, wider)), library)
 
     ladder, sketch, gain = _by_orders(search_again, name)
-    left, notes = ladder.left, []
+    remainders, notes = ladder.left, []
     if sketch is None:
         drifting = _with_drift(ladder, library)
         if drifting is not None:
-            ladder, left = drifting, drifting.large()
-            sketch, gain = _sketched(ladder, left, name)
+            ladder, remainders = drifting, drifting.large()
+            sketch, gain = _sketched(ladder, remainders, name)
             notes.append(_DRIFT.format(policy_of(model.policy).selection.drift_size))
     if sketch is None:
-        sketch, gain = _sketched(ladder, left, name, in_parts=True)
-        left = left if sketch else ladder.large()
+        sketch, gain = _sketched(ladder, remainders, name, in_parts=True)
+        remainders = remainders if sketch else ladder.large()
         notes += [_WITHIN] if sketch else []
-    change = None if ladder.explains(left) else _changed(ladder.steps[-1].system)
+    change = None if ladder.explains(remainders) else _changed(ladder.steps[-1].system)
     if change is not None and (sketch is None or change.gain > gain):
-        return SearchResult(ladder, left or ladder.left, None, change, (change.words,))
-    notes += _beside(sketch, left)
-    return SearchResult(ladder, left, sketch, None, tuple(notes))
+        return SearchResult(ladder, remainders or ladder.left, None, change, (change.words,))
+    notes += _beside(sketch, remainders)
+    return SearchResult(ladder, remainders, sketch, None, tuple(notes))
 
 
 def _changed(system: LinearSystem) -> Change | ChangeWithin | None:
@@ -187,9 +187,9 @@ def _changed(system: LinearSystem) -> Change | ChangeWithin | None:
     return within if within.gain > between.gain else between
 
 
-def _beside(sketch: UnknownStructure | None, left: Sequence[Remainder]) -> list[str]:
+def _beside(sketch: UnknownStructure | None, remainders: Sequence[Remainder]) -> list[str]:
     """A note where the signal that misses by most is not the sketched one's, winding or shaft."""
-    worst = max(left, key=lambda one: one.chi2_per_n, default=None)
+    worst = max(remainders, key=lambda one: one.chi2_per_n, default=None)
     if sketch is None or worst is None or (worst.signal in SHAFT) == (sketch.signal in SHAFT):
         return []
     floors = math.sqrt(worst.chi2_per_n)
@@ -246,10 +246,10 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
     searched = search(start.system.fit, library)
     alone = [leave_out(step.system) for step in searched]
     steps, unconfirmed = _confirmed(searched, alone)
-    kept, left = truncated(steps, in_common([r.system for r in steps], alone[: len(steps)]))
+    kept, remainders = truncated(steps, in_common([r.system for r in steps], alone[: len(steps)]))
     held = in_common([r.system for r in kept], alone[: len(kept)])
     cut = {step.added[-1]: contradiction(step) for step in steps[len(kept) :]}
-    return Ladder(start, kept, list(held), left, cut | unconfirmed)
+    return Ladder(start, kept, list(held), remainders, cut | unconfirmed)
 
 
 def _confirmed(
@@ -272,17 +272,17 @@ def _confirmed(
 
 
 def _sketched(
-    ladder: Ladder, left: Sequence[Remainder], name: str, in_parts: bool = False
+    ladder: Ladder, remainders: Sequence[Remainder], name: str, in_parts: bool = False
 ) -> tuple[UnknownStructure | None, float]:
     """What the structure depends on that no effect explains, and the deviance that it takes; None
     where there is none, or where nothing that the machine does predicts it.
 
     The signal that misses by most is sketched, winding or shaft; the other one if that fails.
     """
-    if ladder.explains(left):
+    if ladder.explains(remainders):
         return None, 0.0
     last = ladder.steps[-1].system
-    worst = sorted(left, key=lambda one: -one.chi2_per_n)
+    worst = sorted(remainders, key=lambda one: -one.chi2_per_n)
     signals = list(dict.fromkeys(one.signal for one in worst))
     other = [one for one in signals if (one in SHAFT) != (signals[0] in SHAFT)]
     sketch, gain = unknown_structure(last, signals, name, in_parts)

@@ -70,16 +70,16 @@ def drive_log(capture: Capture, machine: Machine) -> DriveLog | None:
     moving = [name for name in _MOTION if capture.has(name)]
     if not moving and capture.meta.test != "heat_run":
         return None
-    there = tuple(name for name in _ELECTRICAL if capture.has(name))
-    period, found, keep = even_clock(capture, (*there, *moving), machine.policy.cutting)
+    electrical = tuple(name for name in _ELECTRICAL if capture.has(name))
+    period, columns, keep = even_clock(capture, (*electrical, *moving), machine.policy.cutting)
     keep &= _on_time(capture, period, keep.size)
-    speed = found.get("omega_mech_rad_s")
-    shaft_angle(found, period, machine)
+    speed = columns.get("omega_mech_rad_s")
+    shaft_angle(columns, period, machine)
     if speed is not None:
-        found["omega_mech_rad_s"] = speed
-    sensors = prepared(found, period, machine.policy)
+        columns["omega_mech_rad_s"] = speed
+    sensors = prepared(columns, period, machine.policy)
     angle = any("theta" in name for name in moving)
-    return DriveLog(period, found, keep, sensors, speed is not None, angle)
+    return DriveLog(period, columns, keep, sensors, speed is not None, angle)
 
 
 def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:

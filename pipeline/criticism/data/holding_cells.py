@@ -67,14 +67,14 @@ def holding_cells(capture: Capture, policy: Policy) -> Cells | None:
     """
     if not capture.has("theta_mech_rad", "iq_a"):
         return None
-    found = capture.arrays("theta_mech_rad", "iq_a")
-    fine = np.isfinite(found["theta_mech_rad"]) & np.isfinite(found["iq_a"])
-    theta, current = found["theta_mech_rad"][fine], found["iq_a"][fine]
+    columns = capture.arrays("theta_mech_rad", "iq_a")
+    fine = np.isfinite(columns["theta_mech_rad"]) & np.isfinite(columns["iq_a"])
+    theta, current = columns["theta_mech_rad"][fine], columns["iq_a"][fine]
     rows, spread = [], []
     for part, sense in passes(theta):
-        cells, left = _cells(theta[part], current[part], policy.tables)
+        cells, residuals = _cells(theta[part], current[part], policy.tables)
         rows.append(np.column_stack([cells, np.full(cells.shape[0], float(sense))]))
-        spread += left
+        spread += residuals
     if not rows or sum(len(r) for r in rows) < policy.tables.sectors:
         return None
     table = np.concatenate(rows)
@@ -88,12 +88,12 @@ def _cells(theta: Array, current: Array, policy: Tables) -> tuple[Array, list[Ar
     number = np.floor(theta / TURN_RAD * policy.cells).astype(np.int64)
     order = np.argsort(number, kind="stable")
     edges = np.flatnonzero(np.diff(number[order])) + 1
-    means, left = [], []
+    means, residuals = [], []
     for rows in np.split(order, edges):
         means.append((theta[rows].mean(), current[rows].mean()))
         if rows.size >= policy.cell_rows:
-            left.append(_about_a_line(theta[rows], current[rows]))
-    return np.array(means), left
+            residuals.append(_about_a_line(theta[rows], current[rows]))
+    return np.array(means), residuals
 
 
 def _about_a_line(theta: Array, current: Array) -> Array:

@@ -75,8 +75,8 @@ def holding_orders(
 
 def _strongest(design: Array, current: Array, theta: Array, offered: Sequence[int]) -> int:
     """The order that takes most of the square of what the design leaves."""
-    left = current - design @ np.linalg.lstsq(design, current, rcond=None)[0]
-    power = [abs(left @ np.exp(1j * k * theta)) for k in offered]
+    residual = current - design @ np.linalg.lstsq(design, current, rcond=None)[0]
+    power = [abs(residual @ np.exp(1j * k * theta)) for k in offered]
     return offered[int(np.argmax(power))]
 
 
@@ -99,11 +99,11 @@ def _joined(
 def _held_out(design: Array, current: Array, sector: NDArray[np.int64]) -> Array:
     """Mean square [sectors] of the current in each sector as predicted from the others."""
     normal, slope = design.T @ design, design.T @ current
-    found = []
+    errors = []
     for number in np.unique(sector):
-        mine = sector == number
-        inside, seen = design[mine], current[mine]
+        in_sector = sector == number
+        inside, seen = design[in_sector], current[in_sector]
         less = np.linalg.pinv(normal - inside.T @ inside, rcond=1e-9, hermitian=True)
-        left = seen - inside @ (less @ (slope - inside.T @ seen))
-        found.append(float(left @ left) / seen.size)
-    return np.array(found)
+        residual = seen - inside @ (less @ (slope - inside.T @ seen))
+        errors.append(float(residual @ residual) / seen.size)
+    return np.array(errors)

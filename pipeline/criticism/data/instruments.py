@@ -60,14 +60,14 @@ def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
 
     """
     captures = tuple(captures)
-    gains, found = gains_of(captures), {}
+    gains, stated = gains_of(captures), {}
     for capture in captures:
         meta, used = capture.meta, _used(capture)
         for kind, name in gains[capture.path].items():
             u = used[kind]
             if u is not None or name != kind:
                 # a further instrument is known by its number here, so its gain is always stated
-                found[name] = meta.instrument_u("u_rel_current") if u is None else u
+                stated[name] = meta.instrument_u("u_rel_current") if u is None else u
         for name, one in (
             ("gain_torque", meta.u_rel_torque),
             ("offset_temp_k", meta.u_temp_degc),
@@ -75,23 +75,23 @@ def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
             ("gain_clock", meta.u_rel_clock),
         ):
             if one:
-                found[name] = max(found.get(name, 0.0), one)
-    return found
+                stated[name] = max(stated.get(name, 0.0), one)
+    return stated
 
 
 def _used(capture: Capture) -> Mapping[str, float | None]:
     """The kinds of gain that a capture's columns have, with the uncertainty that it states."""
-    meta, found = capture.meta, {}
+    meta, used = capture.meta, {}
     if meta.test == "lcr":
         return {}
     if any(capture.has(name) for name in _AXES_A):
-        found["gain_current"] = meta.u_rel_current or None
+        used["gain_current"] = meta.u_rel_current or None
     elif any(capture.has(name) for name in _LINES_A):
-        found["gain_current_bench"] = meta.u_rel_current or None
+        used["gain_current_bench"] = meta.u_rel_current or None
     if any(capture.has(name) for name in (*_VOLTS, *_FLUXES)):
         commanded = meta.voltage_kind == "commanded"
-        found["gain_commanded" if commanded else "gain_voltage"] = meta.u_rel_voltage or None
-    return found
+        used["gain_commanded" if commanded else "gain_voltage"] = meta.u_rel_voltage or None
+    return used
 
 
 def _u_lcr(meta: CaptureMeta) -> float | None:

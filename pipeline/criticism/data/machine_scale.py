@@ -163,9 +163,9 @@ def encoder_step(campaign: Campaign, policy: Policy) -> float:
     """
     logs = [c for c in campaign.of("drive") if c.has("theta_mech_rad")]
     angles = [c.arrays("theta_mech_rad")["theta_mech_rad"] for c in logs]
-    found = [rounding_step(angle, policy.sensor_noise) for angle in angles]
-    step = float(np.median(found)) if found else 0.0
-    agree = all(abs(one - step) <= policy.cutting.encoder_share * step for one in found)
+    steps = [rounding_step(angle, policy.sensor_noise) for angle in angles]
+    step = float(np.median(steps)) if steps else 0.0
+    agree = all(abs(one - step) <= policy.cutting.encoder_share * step for one in steps)
     return step if agree else 0.0
 
 
@@ -243,12 +243,12 @@ def counted_pole_pairs(campaign: Campaign) -> int | None:
         lines = [name for name in LINES_V if capture.has(name)]
         if len(lines) < 2:
             continue
-        found = capture.arrays(*lines, "theta_mech_rad")
-        theta = found.pop("theta_mech_rad")
+        columns = capture.arrays(*lines, "theta_mech_rad")
+        theta = columns.pop("theta_mech_rad")
         turned = float(np.ptp(theta)) if theta.size else 0.0
         if turned < TURN_RAD:
             continue
-        ratio = float(np.ptp(np.unwrap(np.angle(vector_of_lines(found))))) / turned
+        ratio = float(np.ptp(np.unwrap(np.angle(vector_of_lines(columns))))) / turned
         if ratio > 0.5 and abs(ratio - round(ratio)) < 0.02:
             return round(ratio)
     return None
@@ -269,12 +269,12 @@ def _speed(capture: Capture) -> float:
         speed = capture.arrays("omega_mech_rad_s")["omega_mech_rad_s"]
         return float(np.nanquantile(np.abs(speed), 0.999))
     if capture.has("t_s", "theta_mech_rad"):
-        found = capture.arrays("t_s", "theta_mech_rad")
-        if found["t_s"].size > 1 and (np.diff(found["t_s"]) > 0.0).all():
-            theta = found["theta_mech_rad"]
+        columns = capture.arrays("t_s", "theta_mech_rad")
+        if columns["t_s"].size > 1 and (np.diff(columns["t_s"]) > 0.0).all():
+            theta = columns["theta_mech_rad"]
             if np.ptp(theta) <= theta.size * np.spacing(np.max(np.abs(theta))):
                 return 0.0
-            speed = np.gradient(theta, found["t_s"])
+            speed = np.gradient(theta, columns["t_s"])
             return float(np.nanquantile(np.abs(speed), 0.999))
     return 0.0
 
@@ -307,18 +307,20 @@ def torque_orders(captures: Iterable[Capture], highest: int, usual: int) -> tupl
     every capture of at least one turn.
 
     """
-    found: set[int] | None = None
+    common_orders: set[int] | None = None
     for capture in captures:
         if not capture.has("theta_mech_rad", "torque_shaft_nm"):
             continue
         signals = capture.arrays("theta_mech_rad", "torque_shaft_nm")
         both = signals["theta_mech_rad"], signals["torque_shaft_nm"]
-        here = _standing_out(*both, highest)
-        if here is None and highest > usual:
-            here = _standing_out(*both, usual)
-        if here is not None:
-            found = here if found is None else found & here
-    return tuple(sorted(found or ()))
+        capture_orders = _standing_out(*both, highest)
+        if capture_orders is None and highest > usual:
+            capture_orders = _standing_out(*both, usual)
+        if capture_orders is not None:
+            common_orders = (
+                capture_orders if common_orders is None else common_orders & capture_orders
+            )
+    return tuple(sorted(common_orders or ()))
 
 
 def _standing_out(theta: Array, torque: Array, highest: int) -> set[int] | None:

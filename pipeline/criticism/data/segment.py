@@ -206,7 +206,7 @@ def segment_of(
     instrument: str,
     period: float,
     *,
-    found: Mapping[str, Array],
+    recorded: Mapping[str, Array],
     sensors: Sensors,
     channels: tuple[str, ...],
     weak: Projection | None,
@@ -226,8 +226,8 @@ def segment_of(
         `drive` or `bench`.
     period
         Of the even clock [s].
-    found
-        Columns [n].
+    recorded
+        Columns of the capture, by name [n].
     sensors
         Noise and steps of the columns.
     channels
@@ -241,9 +241,10 @@ def segment_of(
     **fixed
         Further numbers of the capture.
 
-    Attributes
-    ----------
-    segment with what the metadata of its capture say.
+    Returns
+    -------
+    Segment
+        With gains, temperatures and frequencies of the metadata.
 
     """
     stated = capture.meta.ambient_degc
@@ -257,12 +258,12 @@ def segment_of(
         test=capture.meta.test,
         kind=kind,
         ts_s=period,
-        recorded=found,
+        recorded=recorded,
         channels=channels,
         weak=weak,
         instrument=Instrument(instrument, capture.meta.voltage_timing, meter),
         sensors=replace(
-            sensors, steps={name: step for name, step in sensors.steps.items() if name in found}
+            sensors, steps={name: step for name, step in sensors.steps.items() if name in recorded}
         ),
         fixed={"ambient_k": ambient, **fixed},
         disturbances=Disturbances(offsets),

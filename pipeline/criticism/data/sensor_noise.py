@@ -155,8 +155,8 @@ def unrounded(signal: Array, step: float) -> Array:
     middle = 0.5 * (signal[slow] + signal[slow + 1])
     level = np.concatenate([middle, signal[far], signal[far + 1], signal[[0, -1]]])
     order = np.argsort(known, kind="stable")
-    found: Array = np.interp(np.arange(signal.size), known[order], level[order])
-    return found
+    estimate: Array = np.interp(np.arange(signal.size), known[order], level[order])
+    return estimate
 
 
 def rounding_error(signal: Array, step: float, shift: float, smooth: int) -> Array:
@@ -253,10 +253,10 @@ def _sharpened(signal: Array, step: float, together: float) -> tuple[float, Arra
     while True:
         wider = _parts(signal, length)
         lobe = step**2 / max(float(np.ptp(wider, axis=1).max()), step)
-        found = _best_step(wider, step, known, _SPACING * lobe)
-        if float(_coherence(wider, np.array([found]))[0]) < together:
+        best = _best_step(wider, step, known, _SPACING * lobe)
+        if float(_coherence(wider, np.array([best]))[0]) < together:
             break
-        step, parts, known = found, wider, min(known, _REACH * _SPACING * lobe)
+        step, parts, known = best, wider, min(known, _REACH * _SPACING * lobe)
         if length >= signal.size:
             break
         length = min(_WIDER * length, signal.size)
@@ -286,10 +286,10 @@ def _parts(signal: Array, length: int) -> Array:
 
 def _coherence(parts: Array, steps: Array) -> Array:
     """How well the phases e^{j2π x/q} of parts [parts, samples] stay together, for steps q [n]."""
-    found: Array = np.array(
+    coherence: Array = np.array(
         [np.abs(np.exp((2j * np.pi / step) * parts).mean(axis=1)).mean() for step in steps]
     )
-    return found
+    return coherence
 
 
 def is_rounded(signal: Array, step: float, policy: SensorNoise) -> bool:

@@ -109,23 +109,23 @@ def even_clock(
 
     """
     home = capture.table_of("t_s", *names)
-    found = capture.arrays("t_s", *names, masked=False)
+    columns = capture.arrays("t_s", *names, masked=False)
     keep = capture.kept(home).copy()
-    time = found.pop("t_s")
+    time = columns.pop("t_s")
     period = float(np.median(np.diff(time)))
-    for name, column in found.items():
+    for name, column in columns.items():
         good = np.isfinite(column)
         if not good.all() and good.any():
-            found[name] = np.interp(time, time[good], column[good])
+            columns[name] = np.interp(time, time[good], column[good])
             keep &= good
     uneven = np.abs(np.diff(time) - period).max() > policy.clock_even * period
     clock = counted(time, policy) if uneven else None
-    if clock is not None and not sampled_unevenly(time, clock[1], found.values(), policy):
+    if clock is not None and not sampled_unevenly(time, clock[1], columns.values(), policy):
         period, number = clock
         even = np.arange(number[-1] + 1)
         recorded = np.zeros(even.size, dtype=bool)
         recorded[number] = keep
-        found = {name: np.interp(even, number, column) for name, column in found.items()}
+        columns = {name: np.interp(even, number, column) for name, column in columns.items()}
         keep = recorded
     elif uneven:
         even = time[0] + period * np.arange(round((time[-1] - time[0]) / period) + 1)
@@ -135,10 +135,10 @@ def even_clock(
             & keep[after]
             & keep[after - 1]
         )
-        found = {name: np.interp(even, time, column) for name, column in found.items()}
+        columns = {name: np.interp(even, time, column) for name, column in columns.items()}
         keep = near
     keep[:1] = keep[-1:] = False
-    return period, found, keep
+    return period, columns, keep
 
 
 def smoothed(signal: Array, width: int) -> Array:
@@ -214,7 +214,7 @@ def reversals(theta: Array, slack: float) -> NDArray[np.int64]:
     moving = np.flatnonzero(step)
     sense = step[moving] > 0
     extremes = moving[1:][sense[1:] != sense[:-1]]
-    found: list[int] = []
+    places: list[int] = []
     going, best = 0, 0
     values = theta[extremes].tolist()
     at = [0, *extremes.tolist(), theta.size - 1]
@@ -228,10 +228,10 @@ def reversals(theta: Array, slack: float) -> NDArray[np.int64]:
         else:
             continue
         if going:
-            found.append(best)
+            places.append(best)
         going = 1 if value > theta[best] else -1
         lowest = highest = (value, place)
-    return np.array(found, dtype=np.int64)
+    return np.array(places, dtype=np.int64)
 
 
 def travel(theta: Array, slack: float) -> tuple[Array, Array, Array]:
@@ -265,7 +265,7 @@ def travel(theta: Array, slack: float) -> tuple[Array, Array, Array]:
 
 
 def thinned(
-    found: Mapping[str, Array],
+    columns: Mapping[str, Array],
     keep: NDArray[np.bool_],
     length: int,
     most: int,
@@ -275,7 +275,7 @@ def thinned(
 
     Parameters
     ----------
-    found
+    columns
         Signals [n each].
     keep
         Samples that count [n].
@@ -300,19 +300,19 @@ def thinned(
     """
     starts = window_starts(keep, length, length, most)
     if starts.size * (length + 2 * pad) >= keep.size:
-        return dict(found), window_starts(keep, length)
+        return dict(columns), window_starts(keep, length)
     starts = starts[(starts >= pad) & (starts + length + pad <= keep.size)]
     rows = (starts[:, None] - pad + np.arange(length + 2 * pad)[None, :]).ravel()
-    cut = {name: column[rows] for name, column in found.items()}
+    cut = {name: column[rows] for name, column in columns.items()}
     return cut, pad + (length + 2 * pad) * np.arange(starts.size)
 
 
-def whole_log(found: Mapping[str, Array], period: float, policy: Cutting) -> dict[str, Array]:
+def whole_log(columns: Mapping[str, Array], period: float, policy: Cutting) -> dict[str, Array]:
     """The signals of a log that an instrument may record late, of all samples.
 
     Parameters
     ----------
-    found
+    columns
         Columns [N].
     period
         Sample period [s].
@@ -326,8 +326,8 @@ def whole_log(found: Mapping[str, Array], period: float, policy: Cutting) -> dic
 
     """
     names = ("id_a", "iq_a", "torque_shaft_nm")
-    turned = smoothed(found["theta_mech_rad"], 2 * round(policy.speed_s / period / 2) + 1)
-    return {"theta_mech_rad": turned, **{name: found[name] for name in names if name in found}}
+    turned = smoothed(columns["theta_mech_rad"], 2 * round(policy.speed_s / period / 2) + 1)
+    return {"theta_mech_rad": turned, **{name: columns[name] for name in names if name in columns}}
 
 
 def window_of(period: float, size: int, policy: Cutting) -> int:
@@ -349,8 +349,8 @@ def window_of(period: float, size: int, policy: Cutting) -> int:
         leaves enough.
 
     """
-    wanted = max(round(policy.window_s / period), policy.window_samples)
-    return max(min(wanted, size // 4), policy.least_window)
+    samples = max(round(policy.window_s / period), policy.window_samples)
+    return max(min(samples, size // 4), policy.least_window)
 
 
 def with_angle(capture: Capture, names: list[str]) -> list[str]:
@@ -375,12 +375,12 @@ def with_angle(capture: Capture, names: list[str]) -> list[str]:
     return names
 
 
-def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> None:
+def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> None:
     """Adds the shaft angle to columns, from whatever gives it.
 
     Parameters
     ----------
-    found
+    columns
         Columns [n]; `theta_mech_rad` is put in, an electrical angle or a speed taken out. Without
         any of them the angle is 0.
     period
@@ -389,25 +389,25 @@ def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> Non
         Pole pairs.
 
     """
-    if "theta_mech_rad" in found:
+    if "theta_mech_rad" in columns:
         return
-    if "theta_elec_rad" in found:
-        found["theta_mech_rad"] = found.pop("theta_elec_rad") / machine.pole_pairs
-    elif "omega_mech_rad_s" in found:
-        speed = found.pop("omega_mech_rad_s")
-        found["theta_mech_rad"] = np.concatenate(
+    if "theta_elec_rad" in columns:
+        columns["theta_mech_rad"] = columns.pop("theta_elec_rad") / machine.pole_pairs
+    elif "omega_mech_rad_s" in columns:
+        speed = columns.pop("omega_mech_rad_s")
+        columns["theta_mech_rad"] = np.concatenate(
             [[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * period]
         )
     else:
-        found["theta_mech_rad"] = np.zeros(next(iter(found.values())).size)
+        columns["theta_mech_rad"] = np.zeros(next(iter(columns.values())).size)
 
 
-def prepared(found: dict[str, Array], period: float, policy: Policy) -> Sensors:
+def prepared(columns: dict[str, Array], period: float, policy: Policy) -> Sensors:
     """Noise, coarse steps and runs of columns.
 
     Parameters
     ----------
-    found
+    columns
         Columns [n]; temperatures are smoothed in place; `travel_rad`, `run` and `behind_nm` are
         added.
     period
@@ -421,17 +421,17 @@ def prepared(found: dict[str, Array], period: float, policy: Policy) -> Sensors:
         For `segment_of`.
 
     """
-    noise, steps = noise_and_steps(found, policy.sensor_noise)
+    noise, steps = noise_and_steps(columns, policy.sensor_noise)
     width = max(2 * round(policy.cutting.temperature_s / period) + 1, 51)
     for name in SMOOTHED:
-        if name in found:
-            found[name] = smoothed(found[name], width)
+        if name in columns:
+            columns[name] = smoothed(columns[name], width)
             noise[name] /= math.sqrt(width)
     runs = np.array([math.inf])
-    if "theta_mech_rad" in found:
-        runs = with_travel(found, noise, policy.cutting)
-    if "torque_shaft_nm" in found:
-        found["behind_nm"] = behind(found["torque_shaft_nm"], policy.cutting.play_share)
+    if "theta_mech_rad" in columns:
+        runs = with_travel(columns, noise, policy.cutting)
+    if "torque_shaft_nm" in columns:
+        columns["behind_nm"] = behind(columns["torque_shaft_nm"], policy.cutting.play_share)
     return Sensors(noise, steps, runs)
 
 
@@ -456,21 +456,21 @@ def behind(signal: Array, share: float) -> Array:
 
     """
     half = share * float(np.abs(signal).max(initial=0.0))
-    found, follows = np.empty(signal.size), float(signal[0]) if signal.size else 0.0
+    lagged, follows = np.empty(signal.size), float(signal[0]) if signal.size else 0.0
     for n, value in enumerate(signal.tolist()):
         follows = min(max(follows, value - half), value + half)
-        found[n] = value - follows
-    return found
+        lagged[n] = value - follows
+    return lagged
 
 
 def noise_and_steps(
-    found: Mapping[str, Array], policy: SensorNoise
+    columns: Mapping[str, Array], policy: SensorNoise
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Noise of columns, and steps of those that are rounded too coarsely for it.
 
     Parameters
     ----------
-    found
+    columns
         Columns [n].
     policy
         Constants of judgement.
@@ -481,20 +481,20 @@ def noise_and_steps(
         Standard deviations and steps by name; an angle has no step here.
 
     """
-    angles = {name: name.startswith("theta") for name in found}
-    noise = {n: sensor_noise(column, policy, angles[n]) for n, column in found.items()}
-    steps = {n: coarse_step(c, noise[n], policy) for n, c in found.items() if not angles[n]}
+    angles = {name: name.startswith("theta") for name in columns}
+    noise = {n: sensor_noise(column, policy, angles[n]) for n, column in columns.items()}
+    steps = {n: coarse_step(c, noise[n], policy) for n, c in columns.items() if not angles[n]}
     return noise, {name: step for name, step in steps.items() if step > 0.0}
 
 
 def even_angle(
-    found: dict[str, Array], noise: dict[str, float], window: int, policy: Cutting
+    columns: dict[str, Array], noise: dict[str, float], window: int, policy: Cutting
 ) -> None:
     """Takes an angle as its local parabola, as long a one as the motion of the shaft allows.
 
     Parameters
     ----------
-    found
+    columns
         Columns; `theta_mech_rad` [n] is replaced, and stays as `UNSMOOTHED`.
     noise
         Of each column; that of the angle is lowered to what the parabola leaves [rad].
@@ -517,14 +517,14 @@ def even_angle(
     Savitzky and Golay, Anal. Chem. 36(8), 1964, 1627, doi:10.1021/ac60214a047.
 
     """
-    theta, half = found["theta_mech_rad"], window // 2
+    theta, half = columns["theta_mech_rad"], window // 2
     if theta.size < 3 * (2 * half + 1) or noise["theta_mech_rad"] <= 0.0:
         return
     while (width := 2 * half + 1) >= policy.narrowest:
         run = _parabolas(theta, width)
         power = np.convolve((theta - run) ** 2, np.full(width, 1.0 / width), mode="valid")
         if float(power.max()) <= (policy.motion_u * noise["theta_mech_rad"]) ** 2:
-            found |= {"theta_mech_rad": run, UNSMOOTHED: theta}
+            columns |= {"theta_mech_rad": run, UNSMOOTHED: theta}
             # variance of a parabola's middle by least squares
             noise["theta_mech_rad"] *= math.sqrt(2.25 / width)
             return
@@ -532,7 +532,7 @@ def even_angle(
 
 
 def evened(
-    capture: Capture, found: dict[str, Array], sensors: Sensors, machine: Machine, window: int
+    capture: Capture, columns: dict[str, Array], sensors: Sensors, machine: Machine, window: int
 ) -> Sensors:
     """The sensors of a log once the angle of a torque map is smoothed by `even_angle`.
 
@@ -540,7 +540,7 @@ def evened(
     ----------
     capture
         Any capture; only a torque map is changed, since a dynamometer turns it evenly.
-    found
+    columns
         Columns [n]; the angle is replaced in place.
     sensors
         Noise of the columns.
@@ -559,7 +559,7 @@ def evened(
         return sensors
     noise = dict(sensors.noise)
     noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
-    even_angle(found, noise, window, machine.policy.cutting)
+    even_angle(columns, noise, window, machine.policy.cutting)
     return replace(sensors, noise=noise)
 
 
@@ -579,12 +579,12 @@ def _parabolas(signal: Array, width: int) -> Array:
     return fit
 
 
-def with_travel(found: dict[str, Array], noise: Mapping[str, float], policy: Cutting) -> Array:
+def with_travel(columns: dict[str, Array], noise: Mapping[str, float], policy: Cutting) -> Array:
     """Adds travel since the last reversal and number of the run to columns.
 
     Parameters
     ----------
-    found
+    columns
         Columns [n]; `travel_rad` and `run` are put in.
     noise
         Standard deviation of `theta_mech_rad`.
@@ -598,5 +598,5 @@ def with_travel(found: dict[str, Array], noise: Mapping[str, float], policy: Cut
 
     """
     slack = policy.reversal_u * noise["theta_mech_rad"]
-    found["travel_rad"], found["run"], runs = travel(found["theta_mech_rad"], slack)
+    columns["travel_rad"], columns["run"], runs = travel(columns["theta_mech_rad"], slack)
     return runs

@@ -81,15 +81,15 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
     columns = np.column_stack(chosen)[whole]
     target = weak.integral(theta, order=2)[whole]
     noise = log.sensors.noise["theta_mech_rad"] * weak.noise_gain(2)
-    found, left, rank = _regressed(columns, target, policy)
+    coefficients, residual, rank = _regressed(columns, target, policy)
     if len(chosen) + 2 <= most:
-        soft = np.column_stack([columns, np.column_stack(_spring(log, weak))[whole]])
-        sprung = _regressed(soft, target, policy)
+        with_spring = np.column_stack([columns, np.column_stack(_spring(log, weak))[whole]])
+        sprung = _regressed(with_spring, target, policy)
         of_current, of_bend, of_fourth = sprung[0][[0, -2, -1]].tolist()
         if _two_masses(of_current, of_bend, of_fourth, policy):
-            found, left, rank = sprung
-    made = columns[:, : len(driven)] @ found[: len(driven)]
-    power = float(left @ left) / (target.size - rank) - noise**2
+            coefficients, residual, rank = sprung
+    made = columns[:, : len(driven)] @ coefficients[: len(driven)]
+    power = float(residual @ residual) / (target.size - rank) - noise**2
     share: float = max(power, 0.0) / max(float(np.mean(made**2)), 1e-300)
     return share
 
@@ -99,8 +99,8 @@ def _regressed(columns: Array, target: Array, policy: Cutting) -> tuple[Array, A
     size = np.sqrt((columns**2).sum(axis=0))
     size = np.where(size > policy.load_rounding * size.max(), size, np.inf)
     scaled = columns / size
-    found, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=policy.load_rounding)
-    return found / size, target - scaled @ found, int(rank)
+    coefficients, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=policy.load_rounding)
+    return coefficients / size, target - scaled @ coefficients, int(rank)
 
 
 def _spring(log: DriveLog, weak: WeakRows) -> list[Array]:

@@ -122,9 +122,9 @@ def _nearest(
     best, least = None, np.inf
     for candidate, places in placed(wide, offered):
         if candidate.effect.name == other:
-            left = _noncentrality(_now(effect, places, wide)[0])
-            if left < least:
-                best, least = places, left
+            undetected = _noncentrality(_now(effect, places, wide)[0])
+            if undetected < least:
+                best, least = places, undetected
     return best
 
 
@@ -142,8 +142,10 @@ def _now(
     effect: Effect, alternative: NDArray[np.int64], wide: LinearSystem
 ) -> tuple[Array, NDArray[np.int64]]:
     """Normal matrix of [d, the model's other columns, the alternative's], and their places."""
-    mine = f"{effect.name}."
-    others = np.array([n for n in wide.own if not wide.columns[n].name.startswith(mine)])
+    prefix = f"{effect.name}."
+    others = np.array(
+        [n for n in wide.model_columns if not wide.columns[n].name.startswith(prefix)]
+    )
     places = np.concatenate([others, alternative]).astype(np.int64)
     weight = wide.weights(wide.reduced_chi2(wide.residual))
     matrix = _stacked(wide.matrix, _amplitudes(effect, wide), places)

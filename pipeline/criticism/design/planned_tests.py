@@ -70,24 +70,24 @@ def planned(test: str, fit: Fit) -> tuple[Segment, ...]:
 
 def _obeying(segment: Segment, fit: Fit) -> Segment:
     """The segment with its channels as the model predicts them."""
-    left = residual(segment, fit.model, fit.values)
+    residuals = residual(segment, fit.model, fit.values)
     recorded = dict(segment.recorded)
     for place, channel in enumerate(segment.channels):
         if channel in recorded:
-            recorded[channel] = recorded[channel] - left[place]
+            recorded[channel] = recorded[channel] - residuals[place]
     return replace(segment, recorded=recorded)
 
 
 def _noise(fit: Fit) -> Mapping[str, float]:
     scales = fit.model.machine.scales
     policy = fit.policy.design
-    found = {n: getattr(policy, field) * scales[scale] for n, (field, scale) in _NOISE.items()}
-    found["theta_mech_rad"] = policy.noise_angle_rad
+    noise = {n: getattr(policy, field) * scales[scale] for n, (field, scale) in _NOISE.items()}
+    noise["theta_mech_rad"] = policy.noise_angle_rad
     for segment in fit.segments:
         for name in (*_NOISE, "theta_mech_rad"):
             if segment.sensors.noise.get(name, 0.0) > 0.0:
-                found[name] = segment.sensors.noise[name]
-    return found
+                noise[name] = segment.sensors.noise[name]
+    return noise
 
 
 def _torque_map(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:

@@ -275,5 +275,5 @@ def _cardinal(knots: Array, at: Array) -> Array:
     from scipy.interpolate import CubicSpline  # dear to import, and seldom asked for
 
     spline = CubicSpline(knots, np.eye(knots.size), bc_type="natural")
-    found: Array = spline(np.clip(at, knots[0], knots[-1]))
-    return found
+    curves: Array = spline(np.clip(at, knots[0], knots[-1]))
+    return curves

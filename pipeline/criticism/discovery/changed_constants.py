@@ -101,22 +101,24 @@ def changed_constant(system: LinearSystem) -> Change | None:
 def _changes(system: LinearSystem) -> Iterator[Change]:
     """The best change of every constant that passes."""
     significant = significant_groups(system)
-    wanted = [n for n in system.own.tolist() if may_change(system, system.columns[n].name)]
+    candidates = [
+        n for n in system.model_columns.tolist() if may_change(system, system.columns[n].name)
+    ]
     before = End.of(system, np.empty((system.size, 0)))
-    for place in wanted:
+    for place in candidates:
         name = system.columns[place].name
-        cuts = list(_cuts(system, place))
-        ends = [End.of(system, mask[:, None] * system.matrix[:, [place]]) for _, mask in cuts]
+        splits = list(_cuts(system, place))
+        ends = [End.of(system, mask[:, None] * system.matrix[:, [place]]) for _, mask in splits]
         if not ends:
             continue
         best = min(range(len(ends)), key=lambda n: ends[n].deviance)
-        end, (captures, _) = ends[best], cuts[best]
-        penalty = math.log(system.size) + 2.0 * math.log(len(cuts) * len(wanted))
+        end, (captures, _) = ends[best], splits[best]
+        penalty = math.log(system.size) + 2.0 * math.log(len(splits) * len(candidates))
         gain = before.deviance - end.deviance - penalty
         most = clears(system, significant, before.reduced_chi2, end.reduced_chi2)
         if gain > system.policy.selection.tie and most:
-            own = float(end.step[place])
-            value = system.fit.values[name] + own
+            change = float(end.step[place])
+            value = system.fit.values[name] + change
             difference, u = float(end.step[-1]), end.u
             yield Change(name, unit_of(system, name), value, difference, u, captures, gain)
 
@@ -137,9 +139,9 @@ def _cuts(system: LinearSystem, place: int) -> Iterator[tuple[tuple[str, ...], A
     held = [name for name in dict.fromkeys(paths.tolist()) if np.any(column[paths == name])]
     if len(held) < system.policy.discovery.change_captures:
         return
-    own = np.stack([np.where(paths == name, column, 0.0) for name in held[1:]], axis=1)
-    apart = End.of(system, own).step[system.own_count :]
-    order = np.argsort(np.concatenate([[0.0], apart]), kind="stable")
+    columns = np.stack([np.where(paths == name, column, 0.0) for name in held[1:]], axis=1)
+    differences = End.of(system, columns).step[system.model_column_count :]
+    order = np.argsort(np.concatenate([[0.0], differences]), kind="stable")
     for cut in range(1, len(held)):
         both = [tuple(held[n] for n in part) for part in (order[:cut], order[cut:])]
         fewer = min(both, key=len)
@@ -158,11 +160,11 @@ class End:
     @classmethod
     def of(cls, system: LinearSystem, further: Array) -> End:
         """The best end with further columns [R, k], and the uncertainty of the last of them."""
-        matrix = np.column_stack([system.matrix[:, system.own], further])
+        matrix = np.column_stack([system.matrix[:, system.model_columns], further])
         free = np.zeros(further.shape[1])
         prior = Prior(
-            np.concatenate([system.prior_precision[system.own], free]),
-            np.concatenate([system.prior_gradient[system.own], free]),
+            np.concatenate([system.prior_precision[system.model_columns], free]),
+            np.concatenate([system.prior_gradient[system.model_columns], free]),
         )
         rows = np.column_stack([system.residual, matrix])
         groups = len(system.labels)

@@ -93,7 +93,9 @@ def changed_within(system: LinearSystem) -> ChangeWithin | None:
         for (place, _, _), some in zip(system.labels, significant, strict=True)
         if some
     }
-    places = [n for n in system.own.tolist() if may_change(system, system.columns[n].name)]
+    places = [
+        n for n in system.model_columns.tolist() if may_change(system, system.columns[n].name)
+    ]
     rows = _Rows.of(system)
     tried = [
         found
@@ -115,11 +117,11 @@ class _Rows:
     def of(cls, system: LinearSystem) -> _Rows:
         times, reach = np.full((2, system.residual.size), np.nan)
         for number, segment in enumerate(system.segments):
-            mine = system.segment == number
+            in_segment = system.segment == number
             if segment.weak is not None:
                 middle = segment.weak.starts + segment.weak.length // 2
-                times[mine] = clock(segment)[middle][system.window[mine]]
-                reach[mine] = 0.5 * segment.weak.length * segment.ts_s
+                times[in_segment] = clock(segment)[middle][system.window[in_segment]]
+                reach[in_segment] = 0.5 * segment.weak.length * segment.ts_s
         names = np.array([segment.capture for segment in system.segments])[system.segment]
         return cls(names, times, reach)
 
@@ -169,17 +171,17 @@ def _found(
     significant: NDArray[np.bool_],
 ) -> Iterator[ChangeWithin]:
     """The best change of every constant within one capture that passes."""
-    here, tie = rows.capture == capture, system.policy.selection.tie
+    in_capture, tie = rows.capture == capture, system.policy.selection.tie
     least = system.policy.discovery.change_windows
     before = End.of(system, np.empty((system.size, 0)))
     for place in places:
         column, name = system.matrix[:, place], system.columns[place].name
-        seen = here & (column != 0.0) & np.isfinite(rows.time_s)
+        seen = in_capture & (column != 0.0) & np.isfinite(rows.time_s)
         times = np.unique(rows.time_s[seen])
         if times.size < 2 * least:
             continue
         cut, after = _scanned(system, rows, seen, place, times, least)
-        steps = _Steps(system, rows.time_s, here, np.isin(rows.capture, after), column, times)
+        steps = _Steps(system, rows.time_s, in_capture, np.isin(rows.capture, after), column, times)
         end = steps.end(cut)
         penalty = 2.0 * math.log(system.size) + 2.0 * math.log(times.size * len(places))
         gain = before.deviance - end.deviance - penalty
@@ -209,16 +211,18 @@ def _scanned(
     column = system.matrix[:, place]
     capture = rows.capture[seen][0]
     held = [n for n in np.unique(rows.capture[column != 0.0]).tolist() if n != capture]
-    own = [np.where(rows.capture == name, column, 0.0) for name in held]
-    known = np.column_stack([system.matrix[:, system.own], *own])
+    columns = [np.where(rows.capture == name, column, 0.0) for name in held]
+    known = np.column_stack([system.matrix[:, system.model_columns], *columns])
     weight = system.weights(system.reduced_chi2(system.residual))
-    precision = np.concatenate([system.prior_precision[system.own], np.zeros(len(own))])
-    gradient = np.concatenate([system.prior_gradient[system.own], np.zeros(len(own))])
+    precision = np.concatenate(
+        [system.prior_precision[system.model_columns], np.zeros(len(columns))]
+    )
+    gradient = np.concatenate([system.prior_gradient[system.model_columns], np.zeros(len(columns))])
     weighted = known * weight[:, None]
     inverse = pseudo_inverse(weighted.T @ known + np.diag(precision))
     slope = weighted.T @ system.residual + gradient
     bins = np.searchsorted(times, rows.time_s[seen])
-    mine = column[seen]
+    changing = column[seen]
 
     def after(parts: Array) -> Array:
         """Sums [T - 1] over what is later than each time but the last."""
@@ -227,16 +231,18 @@ def _scanned(
         total: Array = np.cumsum(summed[::-1], axis=0)[::-1][1:]
         return total
 
-    cross = after(weighted[seen] * mine[:, None])
-    left = after(weight[seen] * mine * system.residual[seen]) - cross @ inverse @ slope
-    free = after(weight[seen] * mine**2) - np.einsum("ti,ij,tj->t", cross, inverse, cross)
-    gain = np.where(free > 0.0, left**2 / np.maximum(free, 1e-300), 0.0)
+    cross = after(weighted[seen] * changing[:, None])
+    slopes = after(weight[seen] * changing * system.residual[seen]) - cross @ inverse @ slope
+    free = after(weight[seen] * changing**2) - np.einsum("ti,ij,tj->t", cross, inverse, cross)
+    gain = np.where(free > 0.0, slopes**2 / np.maximum(free, 1e-300), 0.0)
     inside = np.arange(gain.size)
     gain[(inside < least - 1) | (inside >= times.size - least)] = -1.0
     cut = int(np.argmax(gain))
-    difference = -left[cut] / max(float(free[cut]), 1e-300)
+    difference = -slopes[cut] / max(float(free[cut]), 1e-300)
     step = -inverse @ (slope + cross[cut] * difference)
-    apart = step[step.size - len(held) :]
+    differences = step[step.size - len(held) :]
     return cut, [
-        n for n, one in zip(held, apart.tolist(), strict=True) if abs(one - difference) < abs(one)
+        n
+        for n, one in zip(held, differences.tolist(), strict=True)
+        if abs(one - difference) < abs(one)
     ]

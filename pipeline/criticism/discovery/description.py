@@ -38,7 +38,7 @@ _DIRECTION = {"omega_mech_rad_s": "rotation", "iq_a": "the torque"}
 
 def describe(
     pursuit: Pursuit,
-    found: Expression,
+    expression: Expression,
     smooth: Port,
     others: Sequence[tuple[tuple[str, ...], float]],
     signals: Sequence[str],
@@ -50,7 +50,7 @@ def describe(
     ----------
     pursuit
         The residual input in narrow hats.
-    found
+    expression
         The expression.
     smooth
         The same input with the few smooth curves that its evidence rests on.
@@ -63,31 +63,31 @@ def describe(
 
     """
     port = pursuit.port
-    carrier = _leading(pursuit, found)
-    curve = _curve(pursuit, found, smooth, carrier)
-    shape = _shape(pursuit, curve, found, carrier, others)
+    carrier = _leading(pursuit, expression)
+    curve = _curve(pursuit, expression, smooth, carrier)
+    shape = _shape(pursuit, curve, expression, carrier, others)
     size = pursuit.system.fit.model.machine.scales["current_a"]
     return UnknownStructure(
         signal=_signal(port, carrier, signals),
-        variables=_columns(port, found),
+        variables=_columns(port, expression),
         shape=shape,
         sketch=tuple(
-            SketchTerm(_term(port, found, n, size), float(found.amplitudes[n]), port.unit)
-            for n in range(len(found.terms))
+            SketchTerm(_term(port, expression, n, size), float(expression.amplitudes[n]), port.unit)
+            for n in range(len(expression.terms))
         ),
-        expression=_expression(port, found, size),
+        expression=_expression(port, expression, size),
         curve=curve,
         times="" if not port.carriers else port.carriers[carrier].words,
         alternatives=tuple(AlternativeVariables(*one) for one in others),
         effect=name,
-        source=effect_source(port, found, name, shape, size, pursuit.policy),
+        source=effect_source(port, expression, name, shape, size, pursuit.policy),
     )
 
 
-def _columns(port: Port, found: Expression) -> tuple[str, ...]:
+def _columns(port: Port, expression: Expression) -> tuple[str, ...]:
     if not port.monomials:
         return port.columns
-    used = [port.monomials[term.monomial] for term in found.terms]
+    used = [port.monomials[term.monomial] for term in expression.terms]
     names = ("id_a", "iq_a")
     kept = tuple(c for n, c in enumerate(names) if any(powers[n] for powers in used))
     return kept or names
@@ -95,19 +95,19 @@ def _columns(port: Port, found: Expression) -> tuple[str, ...]:
 
 def _signal(port: Port, carrier: int, signals: Sequence[str]) -> str:
     """The recorded signal that the structure is reported of: one that misses, if it acts on it."""
-    told_of = port.signals[min(carrier, len(port.signals) - 1)]
-    if port.hook == "flux" and signals and told_of not in signals:
+    signal = port.signals[min(carrier, len(port.signals) - 1)]
+    if port.hook == "flux" and signals and signal not in signals:
         return signals[0]
-    return told_of
+    return signal
 
 
-def _leading(pursuit: Pursuit, found: Expression) -> int:
+def _leading(pursuit: Pursuit, expression: Expression) -> int:
     """The carrier with the largest curve."""
     basis, count = pursuit.port.basis, len(pursuit.port.carriers)
     if basis is None or count < 2:
         return 0
     at = np.linspace(0.0, 2 * np.pi, _DENSE)
-    return int(np.argmax([np.ptp(found.value(at, n)) for n in range(count)]))
+    return int(np.argmax([np.ptp(expression.value(at, n)) for n in range(count)]))
 
 
 def _visited(pursuit: Pursuit) -> tuple[float, float]:
@@ -115,26 +115,26 @@ def _visited(pursuit: Pursuit) -> tuple[float, float]:
     basis = pursuit.port.basis
     if basis is None or not basis.nodes.size:
         return 0.0, 2 * np.pi
-    hats = pursuit.system.matrix[:, pursuit.own : pursuit.own + basis.nodes.size]
+    hats = pursuit.system.matrix[:, pursuit.model_size : pursuit.model_size + basis.nodes.size]
     seen = np.abs(hats).max(axis=0)
     live = np.flatnonzero(seen > pursuit.policy.visited_share * seen.max())
     return float(basis.nodes[live[0]]), float(basis.nodes[live[-1]])
 
 
 def _curve(
-    pursuit: Pursuit, found: Expression, smooth: Port, carrier: int
+    pursuit: Pursuit, expression: Expression, smooth: Port, carrier: int
 ) -> tuple[CurvePoint, ...]:
     """Bin centres with the curve's value and its 95 % band."""
     port = pursuit.port
     if port.variable is None or port.basis is None:
-        return _map_curve(pursuit, found)
+        return _map_curve(pursuit, expression)
     turning = port.variable.kind == "turn"
     if turning:
-        at = turn_angles([term.order for term in found.terms] or port.basis.orders)
+        at = turn_angles([term.order for term in expression.terms] or port.basis.orders)
     else:
         low, high = _visited(pursuit)
         at = np.linspace(low, high, _POINTS)
-    value, spread = curve_about(pursuit, found, _smooth_in_hats(pursuit, smooth), at, carrier)
+    value, spread = curve_about(pursuit, expression, _smooth_in_hats(pursuit, smooth), at, carrier)
     return tuple(
         CurvePoint(
             float(a),
@@ -169,7 +169,7 @@ def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:
     """The smooth curves of a port [K, k] as coefficients of its hats, one block a carrier."""
     fine, few = pursuit.port.basis, smooth.basis
     if fine is None or few is None or not fine.nodes.size:
-        return np.eye(pursuit.system.matrix.shape[1] - pursuit.own)
+        return np.eye(pursuit.system.matrix.shape[1] - pursuit.model_size)
     block = np.zeros((len(fine.names), len(few.names)))
     for n in range(len(few.names)):
         weights = np.zeros(len(few.names))
@@ -183,21 +183,21 @@ def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:
     return every
 
 
-def _map_curve(pursuit: Pursuit, found: Expression) -> tuple[CurvePoint, ...]:
+def _map_curve(pursuit: Pursuit, expression: Expression) -> tuple[CurvePoint, ...]:
     """Flux linkage along the axis whose own current bends it most, the other current zero."""
     size = pursuit.system.fit.model.machine.scales["current_a"]
     at = np.linspace(-1.0, 1.0, _POINTS)
     best: tuple[float, Array, Array] | None = None
     for axis in (0, 1):
         rows = []
-        for term in found.terms:
+        for term in expression.terms:
             powers = pursuit.port.monomials[term.monomial]
             own, other = powers[axis], powers[1 - axis]
             rows.append(own * at ** max(own - 1, 0) if other == 0 else np.zeros(at.size))
         slopes = np.stack(rows) if rows else np.zeros((0, at.size))
-        value = found.amplitudes @ slopes
+        value = expression.amplitudes @ slopes
         spread = np.sqrt(
-            np.maximum(np.einsum("iv,ij,jv->v", slopes, found.covariance, slopes), 0.0)
+            np.maximum(np.einsum("iv,ij,jv->v", slopes, expression.covariance, slopes), 0.0)
         )
         if best is None or np.ptp(value) > best[0]:
             best = float(np.ptp(value)), value, spread
@@ -217,7 +217,7 @@ def _map_curve(pursuit: Pursuit, found: Expression) -> tuple[CurvePoint, ...]:
 def _shape(
     pursuit: Pursuit,
     curve: Sequence[CurvePoint],
-    found: Expression,
+    expression: Expression,
     carrier: int,
     others: Sequence[tuple[tuple[str, ...], float]],
 ) -> str:
@@ -226,7 +226,7 @@ def _shape(
     words = port.effect.words
     variable = port.variable
     if variable is not None and curve:
-        words += f": {_run(port, curve, found, carrier, pursuit.policy)}"
+        words += f": {_run(port, curve, expression, carrier, pursuit.policy)}"
     if others:
         listed = "; ".join(" and ".join(columns) for columns, _ in others)
         words += f"; the captures would be explained nearly as well by {listed}"
@@ -234,15 +234,15 @@ def _shape(
 
 
 def _run(
-    port: Port, curve: Sequence[CurvePoint], found: Expression, carrier: int, policy: Discovery
+    port: Port, curve: Sequence[CurvePoint], expression: Expression, carrier: int, policy: Discovery
 ) -> str:
     variable = port.variable
     if variable is None:
         raise ValueError("a port without a variable has no curve")
     low, high = curve[0].at, curve[-1].at
     dense = np.linspace(low, high, _DENSE)
-    values = found.value(dense, carrier)
-    if not found.terms:
+    values = expression.value(dense, carrier)
+    if not expression.terms:
         dense = np.array([p.at for p in curve])
         values = np.array([p.value for p in curve])
     top = int(np.argmax(np.abs(values)))
@@ -296,9 +296,9 @@ def _parity(at: Array, values: Array, policy: Discovery) -> str:
     return "neither odd nor even, "
 
 
-def _term(port: Port, found: Expression, n: int, current_a: float) -> str:
+def _term(port: Port, expression: Expression, n: int, current_a: float) -> str:
     """One term in words, its carrier in front."""
-    term = found.terms[n]
+    term = expression.terms[n]
     if term.kind == POWER or port.variable is None:
         d, q = port.monomials[term.monomial]
         over = f"/({current_a:.4g} A)"
@@ -312,13 +312,13 @@ def _term(port: Port, found: Expression, n: int, current_a: float) -> str:
     return f"{axis}{carrier} · {words}" if carrier else f"{axis}{words}"
 
 
-def _expression(port: Port, found: Expression, current_a: float) -> str:
+def _expression(port: Port, expression: Expression, current_a: float) -> str:
     """The whole expression on one line, amplitudes with their standard uncertainty."""
-    if not found.terms:
+    if not expression.terms:
         return ""
     parts = []
-    for n in range(len(found.terms)):
-        u = found.u(n, "amplitude")
-        amplitude = f"({found.amplitudes[n]:.4g} ± {u:.1g}) {port.unit}"
-        parts.append(f"{amplitude} · [{_term(port, found, n, current_a)}]")
+    for n in range(len(expression.terms)):
+        u = expression.u(n, "amplitude")
+        amplitude = f"({expression.amplitudes[n]:.4g} ± {u:.1g}) {port.unit}"
+        parts.append(f"{amplitude} · [{_term(port, expression, n, current_a)}]")
     return f"{_SYMBOLS[port.hook]} = " + " + ".join(parts)

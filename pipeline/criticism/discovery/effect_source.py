@@ -37,7 +37,7 @@ from pipeline.criticism.effect import {imports}
 
 
 def effect_source(
-    port: Port, found: Expression, name: str, shape: str, current_a: float, policy: Discovery
+    port: Port, expression: Expression, name: str, shape: str, current_a: float, policy: Discovery
 ) -> str:
     """Source of an effect file that `compare` can use as it stands.
 
@@ -45,7 +45,7 @@ def effect_source(
     ----------
     port
         Where the structure acts.
-    found
+    expression
         Its expression.
     name
         Name of the effect.
@@ -62,7 +62,12 @@ def effect_source(
         One `EFFECT`; amplitudes start at zero and scales at what was found, as in every effect.
 
     """
-    lines = [*_body(port, found, current_a), "", "", *_effect(port, found, name, shape, policy)]
+    lines = [
+        *_body(port, expression, current_a),
+        "",
+        "",
+        *_effect(port, expression, name, shape, policy),
+    ]
     kinds = _KINDS[port.hook]
     listed = ["Effect", "Operating", "Parameter", "Values"]
     head = _HEAD
@@ -85,7 +90,7 @@ def _wrapped(text: str) -> str:
     return textwrap.fill(text[0].upper() + text[1:], 96, break_on_hyphens=False)
 
 
-def _body(port: Port, found: Expression, current_a: float) -> Iterator[str]:
+def _body(port: Port, expression: Expression, current_a: float) -> Iterator[str]:
     kind = _KINDS[port.hook]
     yield f"def _value(x: Operating, q: Values) -> {kind}:"
     if port.variable is None:
@@ -93,7 +98,7 @@ def _body(port: Port, found: Expression, current_a: float) -> Iterator[str]:
     else:
         yield f"    v = {port.variable.code}"
     yield f"    total: {kind} = np.zeros(np.shape(x.omega_rad_s))"
-    for n, term in enumerate(found.terms):
+    for n, term in enumerate(expression.terms):
         yield f"    total = total + {_summand(port, n, term, current_a)}"
     if port.hook in ("drop", "angle"):
         yield "    # a drive's own log only: what the motor has itself needs no factor"
@@ -129,7 +134,7 @@ def _centre(port: Port, n: int) -> str:
 
 
 def _effect(
-    port: Port, found: Expression, name: str, shape: str, policy: Discovery
+    port: Port, expression: Expression, name: str, shape: str, policy: Discovery
 ) -> Iterator[str]:
     yield "EFFECT = Effect("
     yield f"    name={_quoted(name)},"
@@ -139,8 +144,8 @@ def _effect(
     yield '    experiment="edit: the test in which it shows best",'
     yield '    reference="edit: where the formula comes from",'
     yield "    parameters=("
-    for n, term in enumerate(found.terms):
-        yield from _parameters(port, n, term, float(found.amplitudes[n]), policy)
+    for n, term in enumerate(expression.terms):
+        yield from _parameters(port, n, term, float(expression.amplitudes[n]), policy)
     yield "    ),"
     hook = {"flux": "coenergy"}.get(port.hook, port.hook)
     yield f"    {hook}=_value,"

@@ -111,8 +111,8 @@ class Expression:
             return np.zeros(np.shape(v))
         slope = np.stack(rows)
         variance = np.einsum("iv,ij,jv->v", slope, self.covariance, slope)
-        found: Array = np.sqrt(np.maximum(variance, 0.0))
-        return found
+        spread: Array = np.sqrt(np.maximum(variance, 0.0))
+        return spread
 
     def u(self, term: int, name: str) -> float:
         """Standard uncertainty of an amplitude or scale of a term.
@@ -143,8 +143,8 @@ class Pursuit:
     Parameters
     ----------
     system
-        Its first `own` columns are the model's, the others those of the input.
-    own
+        Its first `model_size` columns are the model's, the others those of the input.
+    model_size
         Number of the model's columns.
     port
         The residual input.
@@ -153,20 +153,25 @@ class Pursuit:
 
     """
 
-    def __init__(self, system: LinearSystem, own: int, port: Port, weight: Array) -> None:
-        self.system, self.own, self.port = system, own, port
+    def __init__(self, system: LinearSystem, model_size: int, port: Port, weight: Array) -> None:
+        self.system, self.model_size, self.port = system, model_size, port
         self.weight = weight
         self.policy = system.policy.discovery
         self.penalty = math.log(system.size)
-        hats = system.matrix[:, own:]
-        mine, prior_gradient = system.matrix[:, :own], system.prior_gradient[:own]
+        hats = system.matrix[:, model_size:]
+        model_matrix, prior_gradient = (
+            system.matrix[:, :model_size],
+            system.prior_gradient[:model_size],
+        )
         root = weight[:, None]
-        normal = mine.T @ (root * mine) + np.diag(system.prior_precision[:own])
+        normal = model_matrix.T @ (root * model_matrix) + np.diag(
+            system.prior_precision[:model_size]
+        )
         inverse = np.linalg.pinv(unit_diagonal(normal), hermitian=True)
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         inverse = inverse / np.outer(scale, scale)
-        cross = mine.T @ (root * hats)
-        slope = mine.T @ (weight * system.residual) + prior_gradient
+        cross = model_matrix.T @ (root * hats)
+        slope = model_matrix.T @ (weight * system.residual) + prior_gradient
         self.gram = hats.T @ (root * hats) - cross.T @ inverse @ cross
         self.moment = -(hats.T @ (weight * system.residual) - cross.T @ inverse @ slope)
 
@@ -189,18 +194,18 @@ class Pursuit:
 
         """
         basis = self.port.basis
-        found = np.zeros(self.system.matrix.shape[1] - self.own)
+        weights = np.zeros(self.system.matrix.shape[1] - self.model_size)
         if basis is None or term.kind == POWER:
-            found[term.monomial] = 1.0
-            return found
+            weights[term.monomial] = 1.0
+            return weights
         first = term.carrier * len(basis.names)
         nodes = basis.nodes.size
         if term.kind in WAVES and term.order in basis.orders:
             place = basis.orders.index(term.order)
-            found[first + nodes + 2 * place + (term.kind == "cos")] = 1.0
+            weights[first + nodes + 2 * place + (term.kind == "cos")] = 1.0
         else:
-            found[first : first + nodes] = term.value(basis.nodes)
-        return found
+            weights[first : first + nodes] = term.value(basis.nodes)
+        return weights
 
     def linear_gain(self, known: Array, new: Array) -> float:
         """Fall of the weighted sum of squares by further curves.
@@ -234,10 +239,10 @@ class Pursuit:
 
         """
         normal = curves.T @ self.gram @ curves
-        found: Array = np.linalg.lstsq(
+        amplitudes: Array = np.linalg.lstsq(
             normal + _RIDGE * np.diag(np.diag(normal)), curves.T @ self.moment, rcond=1e-10
         )[0]
-        return found
+        return amplitudes
 
     def curves(self, terms: Sequence[Term]) -> Array:
         """Terms as coefficients of the hats and waves of the input.
@@ -253,7 +258,7 @@ class Pursuit:
             One column a term.
 
         """
-        width = self.system.matrix.shape[1] - self.own
+        width = self.system.matrix.shape[1] - self.model_size
         return np.column_stack([np.empty((width, 0)), *(self.hats_of(t) for t in terms)])
 
     def fit(self, curves: Array) -> tuple[Array, Array, Array, float]:
@@ -270,29 +275,35 @@ class Pursuit:
             Own step, amplitudes [k], residual [R] and deviance.
 
         """
-        system, own = self.system, self.own
-        matrix = np.column_stack([system.matrix[:, :own], system.matrix[:, own:] @ curves])
-        prior_precision = np.concatenate([system.prior_precision[:own], np.zeros(curves.shape[1])])
-        prior_gradient = np.concatenate([system.prior_gradient[:own], np.zeros(curves.shape[1])])
+        system, model_size = self.system, self.model_size
+        matrix = np.column_stack(
+            [system.matrix[:, :model_size], system.matrix[:, model_size:] @ curves]
+        )
+        prior_precision = np.concatenate(
+            [system.prior_precision[:model_size], np.zeros(curves.shape[1])]
+        )
+        prior_gradient = np.concatenate(
+            [system.prior_gradient[:model_size], np.zeros(curves.shape[1])]
+        )
         weight, before = self.weight, np.inf
-        step, left, now = np.zeros(matrix.shape[1]), system.residual, np.inf
-        places = np.arange(own)
+        step, residual, now = np.zeros(matrix.shape[1]), system.residual, np.inf
+        places = np.arange(model_size)
         for _ in range(self.policy.most_rounds):
             weighted = matrix * weight[:, None]
             normal = weighted.T @ matrix + np.diag(prior_precision)
             scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
             inverse = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-11, hermitian=True)
             step = -(inverse @ ((weighted.T @ system.residual + prior_gradient) / scale)) / scale
-            left = system.residual + matrix @ step
-            reduced_chi2 = system.reduced_chi2(left)
+            residual = system.residual + matrix @ step
+            reduced_chi2 = system.reduced_chi2(residual)
             now = system.deviance_of(reduced_chi2) + float(
-                system.prior_costs(places, step[:own]).sum()
+                system.prior_costs(places, step[:model_size]).sum()
             )
             weight = system.weights(reduced_chi2)
             if abs(before - now) < system.policy.fit.settled:
                 break
             before = now
-        return step[:own], step[own:], left, now
+        return step[:model_size], step[model_size:], residual, now
 
 
 def expression(pursuit: Pursuit) -> Expression:
@@ -368,16 +379,16 @@ def _refined(pursuit: Pursuit, groups: Sequence[Group]) -> list[Group]:
         return list(groups)
 
     def moved(z: Array) -> list[Group]:
-        found = [list(group) for group in groups]
+        solution = [list(group) for group in groups]
         for (g, n, name), one in zip(places, z, strict=True):
             old = groups[g][n]
             if name == "scale":
-                found[g][n] = replace(found[g][n], scale=old.scale * math.exp(one))
+                solution[g][n] = replace(solution[g][n], scale=old.scale * math.exp(one))
             elif old.kind in CENTRED:
-                found[g][n] = replace(found[g][n], centre=old.centre * math.exp(one))
+                solution[g][n] = replace(solution[g][n], centre=old.centre * math.exp(one))
             else:
-                found[g][n] = replace(found[g][n], centre=old.centre + one)
-        return [tuple(group) for group in found]
+                solution[g][n] = replace(solution[g][n], centre=old.centre + one)
+        return [tuple(group) for group in solution]
 
     def loss(z: Array) -> float:
         curves = pursuit.curves([t for group in moved(z) for t in group])
@@ -387,14 +398,14 @@ def _refined(pursuit: Pursuit, groups: Sequence[Group]) -> list[Group]:
     from scipy.optimize import minimize  # dear to import, and seldom asked for
 
     size = max(abs(pursuit._fall(pursuit.curves([t for g in groups for t in g]))), 1e-300)
-    found = minimize(
+    solution = minimize(
         loss,
         np.zeros(len(places)),
         method="L-BFGS-B",
         bounds=[(-reach, reach)] * len(places),
         options={"ftol": 1e-14, "gtol": 1e-12},
     )
-    return moved(found.x) if found.fun <= loss(np.zeros(len(places))) else list(groups)
+    return moved(solution.x) if solution.fun <= loss(np.zeros(len(places))) else list(groups)
 
 
 def _dictionary(port: Port, policy: Discovery) -> Iterator[Group]:
@@ -436,15 +447,15 @@ def _shapes(variable: Variable, carrier: int, policy: Discovery) -> Iterator[Gro
 
 def _finished(pursuit: Pursuit, chosen: Sequence[Group], start: float) -> Expression:
     terms = tuple(t for group in chosen for t in group)
-    _, amplitudes, left, deviance = pursuit.fit(pursuit.curves(terms))
+    _, amplitudes, residual, deviance = pursuit.fit(pursuit.curves(terms))
     directions = tuple((n, name) for n, t in enumerate(terms) for name in ("amplitude", *t.free))
     columns = [
         _hat_direction(pursuit, terms[n], float(amplitudes[n]), name) for n, name in directions
     ]
-    width = pursuit.system.matrix.shape[1] - pursuit.own
+    width = pursuit.system.matrix.shape[1] - pursuit.model_size
     slopes = np.column_stack([np.empty((width, 0)), *columns])
     covariance = _inverse(slopes.T @ pursuit.gram @ slopes)
-    return Expression(terms, amplitudes, directions, covariance, start - deviance, left)
+    return Expression(terms, amplitudes, directions, covariance, start - deviance, residual)
 
 
 def _hat_direction(pursuit: Pursuit, term: Term, amplitude: float, name: str) -> Array:
@@ -464,7 +475,7 @@ def _inverse(normal: Array) -> Array:
 
 
 def curve_about(
-    pursuit: Pursuit, found: Expression, coarse: NDArray[np.float64], at: Array, carrier: int
+    pursuit: Pursuit, expression: Expression, coarse: NDArray[np.float64], at: Array, carrier: int
 ) -> tuple[Array, Array]:
     """The curve of a structure and its standard uncertainty: its expression and what that leaves.
 
@@ -472,7 +483,7 @@ def curve_about(
     ----------
     pursuit
         With the hats of the port.
-    found
+    expression
         Expression.
     coarse
         Smooth curves in hats [K, k].
@@ -498,12 +509,12 @@ def curve_about(
     curve and a constant of one shape cannot be separated.
 
     """
-    hats = pursuit.system.matrix[:, pursuit.own :] @ coarse
-    weight = pursuit.system.weights(pursuit.system.reduced_chi2(found.left))
+    hats = pursuit.system.matrix[:, pursuit.model_size :] @ coarse
+    weight = pursuit.system.weights(pursuit.system.reduced_chi2(expression.left))
     live = np.any(hats != 0.0, axis=0)
     normal = hats[:, live].T @ (weight[:, None] * hats[:, live])
     covariance = _inverse(normal)
-    step = -covariance @ (hats[:, live].T @ (weight * found.left))
+    step = -covariance @ (hats[:, live].T @ (weight * expression.left))
     basis = pursuit.port.basis
     if basis is None:
         raise ValueError("a port without a curve has no hats")
@@ -518,6 +529,6 @@ def curve_about(
     )
     spread = np.sqrt(
         np.maximum(np.einsum("vi,ij,vj->v", shapes, covariance, shapes), 0.0)
-        + found.spread(at, carrier) ** 2
+        + expression.spread(at, carrier) ** 2
     )
-    return found.value(at, carrier) + shapes @ step, spread
+    return expression.value(at, carrier) + shapes @ step, spread

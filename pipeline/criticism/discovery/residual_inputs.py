@@ -145,15 +145,15 @@ def refined(port: Port, machine: Machine, policy: Discovery) -> Port:
 
 
 def _torque_ports(machine: Machine, policy: Discovery) -> list[Port]:
-    one, omega, sense, iq, load = _torque_carriers(machine)
+    constant, omega, sense, iq, load = _torque_carriers(machine)
     warm, turn = ("temp_winding_degc", "temp_magnet_degc"), ("theta_mech_rad", "theta_elec_rad")
     pairs = (
-        *((one, name) for name in ("omega_mech_rad_s", "iq_a", "id_a", *warm, *turn)),
+        *((constant, name) for name in ("omega_mech_rad_s", "iq_a", "id_a", *warm, *turn)),
         *((omega, name) for name in (*warm, turn[0], "i_a")),
         *((sense, name) for name in (*warm, turn[0], "i_a")),
         *((iq, name) for name in (*warm, *turn, "omega_mech_rad_s")),
         (load, turn[0]),
-        (one, PAST),
+        (constant, PAST),
     )
     known = variables(machine)
     shaft = ("torque_shaft_nm",)
@@ -165,16 +165,16 @@ def _torque_ports(machine: Machine, policy: Discovery) -> list[Port]:
 
 def _angle_ports(machine: Machine, policy: Discovery) -> list[Port]:
     """Errors of the angle that an encoder records: by its direction, the torque, the turn."""
-    one, known = _torque_carriers(machine)[0], variables(machine)
+    constant, known = _torque_carriers(machine)[0], variables(machine)
     names = ("omega_mech_rad_s", "iq_a", "theta_mech_rad")
     curves = [(known[name], coarse(known[name], machine, policy)) for name in names]
-    return [_port("angle", variable, basis, (one,), ("vd_v",)) for variable, basis in curves]
+    return [_port("angle", variable, basis, (constant,), ("vd_v",)) for variable, basis in curves]
 
 
 def _torque_carriers(machine: Machine) -> tuple[Carrier, ...]:
     """One, the speed, its sense, the q current and its magnitude."""
     speed, current = machine.scales["speed_rad_s"], machine.scales["current_a"]
-    one = Carrier((), "", "1.0", lambda _: 1.0)
+    constant = Carrier((), "", "1.0", lambda _: 1.0)
     omega = Carrier(
         ("omega_mech_rad_s",),
         f"omega_mech_rad_s/({speed:.4g} rad/s)",
@@ -199,7 +199,7 @@ def _torque_carriers(machine: Machine) -> tuple[Carrier, ...]:
         f"np.abs(np.real(x.iq_a)) / {current:.6g}",
         lambda x: np.abs(np.real(x.iq_a)) / float(f"{current:.6g}"),
     )
-    return one, omega, sense, iq, load
+    return constant, omega, sense, iq, load
 
 
 def _constant(unit: complex) -> Callable[[Operating], Any]:
@@ -297,9 +297,9 @@ def _port(
         at = variable.read(x)
         total: Any = 0.0
         for n, carrier in enumerate(carriers):
-            mine = weights[n * count : (n + 1) * count]
-            if np.any(mine):
-                total = total + carrier.value(x) * basis.curve(at, mine)
+            carrier_weights = weights[n * count : (n + 1) * count]
+            if np.any(carrier_weights):
+                total = total + carrier.value(x) * basis.curve(at, carrier_weights)
         return total + np.zeros(np.shape(x.omega_rad_s))
 
     hooks: dict[str, Any] = {

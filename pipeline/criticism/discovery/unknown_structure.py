@@ -89,23 +89,23 @@ def unknown_structure(
 
     """
     fit = system.fit
-    found, wide = _ranked(system, _hooks(signals), in_parts)
-    if not found:
+    candidates, wide = _ranked(system, _hooks(signals), in_parts)
+    if not candidates:
         return None, 0.0
     policy = fit.policy.discovery
-    best = _simplest(found, fit.policy)
+    best = _simplest(candidates, fit.policy)
     others = tuple(
         (one.port.columns, one.held / best.held)
-        for one in found
+        for one in candidates
         if one is not best and one.held > (1.0 - policy.near_share) * best.held
     )
     port = refined(best.port, fit.model.machine, policy)
-    own = wide.own.size
+    model_size = wide.model_columns.size
     # a drag over an inertia is a product: the expression is sought around the inertia found
-    near = fit.moved(wide.columns[:own], best.step[:own])
+    near = fit.moved(wide.columns[:model_size], best.step[:model_size])
     fine = linear_system(near, effect_columns(port.effect, near.model), wide)
     weight = fine.weights(fine.reduced_chi2(best.left))
-    pursuit = Pursuit(fine, own, port, weight)
+    pursuit = Pursuit(fine, model_size, port, weight)
     sketch = describe(pursuit, expression(pursuit), best.port, others, signals, name)
     return sketch, best.gain
 
@@ -130,36 +130,36 @@ def _ranked(
     offered = ports(fit.model.machine, fit.policy.discovery, hooks)
     columns = [effect_columns(port.effect, fit.model) for port in offered]
     wide = linear_system(fit, [c for some in columns for c in some], before)
-    own = wide.own
-    none = wide.normal_equations(own).best()
-    left, base = wide.after(own, none.step), none.deviance
+    model_columns = wide.model_columns
+    none = wide.normal_equations(model_columns).best()
+    residual, base = wide.after(model_columns, none.step), none.deviance
     missed = _missed(wide) if in_parts else None
-    units = _units(wide, own, left, missed)
-    reference = _held_out(wide, own, left, np.zeros(own.size), units)
-    excess = float(wide.counts @ np.log(np.maximum(wide.reduced_chi2(left), 1.0)))
+    units = _units(wide, model_columns, residual, missed)
+    reference = _held_out(wide, model_columns, residual, np.zeros(model_columns.size), units)
+    excess = float(wide.counts @ np.log(np.maximum(wide.reduced_chi2(residual), 1.0)))
     penalty = math.log(wide.size)
     least = max(fit.policy.selection.tie, fit.policy.selection.least_share * excess)
-    found = []
-    first = own.size
+    ranked = []
+    first = model_columns.size
     for place, (port, mine) in enumerate(zip(offered, columns, strict=True)):
         places = np.arange(first, first + len(mine))
         first += len(mine)
         live = places[np.any(wide.matrix[:, places] != 0.0, axis=0)]
         if live.size == 0:
             continue
-        chosen = np.concatenate([own, live])
+        chosen = np.concatenate([model_columns, live])
         end = wide.normal_equations(chosen).best(*fit.policy.selection.thorough)
         after = wide.after(chosen, end.step)
         gain = base - end.deviance - live.size * penalty
         if gain <= 0.0:
             continue
-        ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fit)])
+        ridge = np.concatenate([np.zeros(model_columns.size), _ridge(wide.columns, live, fit)])
         held = reference - _held_out(wide, chosen, after, ridge, units)
         if held > least:
-            found.append(
+            ranked.append(
                 Found(port, gain, held, after, _ridge_step(wide, chosen, after, ridge), place)
             )
-    return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
+    return sorted(ranked, key=lambda f: (-f.held, f.port.effect.name)), wide
 
 
 def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fit: Fit) -> Array:
@@ -173,14 +173,14 @@ def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fit: Fit) -> Arra
     return (fit.policy.discovery.prior_size * np.array(scales)) ** -2.0
 
 
-def _simplest(found: Sequence[Found], policy: Policy) -> Found:
+def _simplest(candidates: Sequence[Found], policy: Policy) -> Found:
     """Of the ports that do about as well as the best, the one of fewest variables.
 
     Of several that no evidence parts it is the one listed first, the commonest in machines.
     """
     tie = policy.selection.tie
-    enough = found[0].held - max(tie, policy.discovery.near_share * found[0].held)
-    close = [one for one in found if one.held >= enough]
+    enough = candidates[0].held - max(tie, policy.discovery.near_share * candidates[0].held)
+    close = [one for one in candidates if one.held >= enough]
     fewest = min(len(one.port.columns) for one in close)
     simple = [one for one in close if len(one.port.columns) == fewest]
     level = max(one.held for one in simple) - tie
@@ -194,7 +194,10 @@ def _missed(system: LinearSystem) -> NDArray[np.int64]:
 
 
 def _units(
-    system: LinearSystem, own: NDArray[np.int64], left: Array, missed: NDArray[np.int64] | None
+    system: LinearSystem,
+    model_columns: NDArray[np.int64],
+    residual: Array,
+    missed: NDArray[np.int64] | None,
 ) -> NDArray[np.int64]:
     """For every row [R] the number of what is held out together: a capture, or a part of one of the
     segments in `missed`; -1 for rows that are always in the fit.
@@ -210,26 +213,29 @@ def _units(
         part = system.policy.discovery.parts * system.window // (last[segment] + 1)
         inner = np.isin(segment, missed) & (part > 0) & (part < system.policy.discovery.parts - 1)
         units = np.where(inner, system.policy.discovery.parts * segment + part, -1)
-    carried = np.isin(units, _carrying(system, own, left, units))
-    return np.where(carried, -1, units)
+    sole_support = np.isin(units, _carrying(system, model_columns, residual, units))
+    return np.where(sole_support, -1, units)
 
 
 def _carrying(
-    system: LinearSystem, own: NDArray[np.int64], left: Array, units: NDArray[np.int64]
+    system: LinearSystem,
+    model_columns: NDArray[np.int64],
+    residual: Array,
+    units: NDArray[np.int64],
 ) -> list[int]:
     """Units without which some constant of the model is lost."""
     policy = system.policy.goodness
-    weight = system.weights(system.reduced_chi2(left))
-    live = own[np.any(system.matrix[:, own] != 0.0, axis=0)]
+    weight = system.weights(system.reduced_chi2(residual))
+    live = model_columns[np.any(system.matrix[:, model_columns] != 0.0, axis=0)]
     matrix = system.matrix[:, live]
     normal = (matrix * weight[:, None]).T @ matrix + np.diag(system.prior_precision[live])
     scale = np.sqrt(np.diag(normal))
     spread = np.diag(np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True))
     carrying = []
     for number in np.unique(units[units >= 0]).tolist():
-        mine = units == number
-        rows = matrix[mine]
-        less = normal - (rows * weight[mine, None]).T @ rows
+        in_unit = units == number
+        rows = matrix[in_unit]
+        less = normal - (rows * weight[in_unit, None]).T @ rows
         inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         grown = np.diag(inverse) / np.maximum(spread, 1e-300)
         lost = np.diag(less) < policy.lost_share * np.diag(normal)
@@ -239,10 +245,10 @@ def _carrying(
 
 
 def _ridge_step(
-    system: LinearSystem, places: NDArray[np.int64], left: Array, ridge: Array
+    system: LinearSystem, places: NDArray[np.int64], residual: Array, ridge: Array
 ) -> Array:
     """Step [k] of least deviance; by `ridge`, curve and constant of one shape do not run away."""
-    weight = system.weights(system.reduced_chi2(left))
+    weight = system.weights(system.reduced_chi2(residual))
     matrix = system.matrix[:, places]
     weighted = matrix * weight[:, None]
     normal = weighted.T @ matrix + np.diag(system.prior_precision[places] + ridge)
@@ -255,29 +261,29 @@ def _ridge_step(
 def _held_out(
     system: LinearSystem,
     places: NDArray[np.int64],
-    left: Array,
+    residual: Array,
     ridge: Array,
     units: NDArray[np.int64],
 ) -> float:
     """Deviance of every unit as predicted without it, by the columns at `places`.
 
-    `left` [R] is the residual at their best fit, and gives the weights; rows of unit -1 keep it. A
+    `residual` [R] is that at their best fit, and gives the weights; rows of unit -1 keep it. A
     coefficient that no other unit shows stays at zero, by `ridge`.
     """
-    weight = system.weights(system.reduced_chi2(left))
+    weight = system.weights(system.reduced_chi2(residual))
     matrix = system.matrix[:, places]
     weighted = matrix * weight[:, None]
     prior_precision = np.diag(system.prior_precision[places] + ridge)
     normal = weighted.T @ matrix + prior_precision
     slope = weighted.T @ system.residual + system.prior_gradient[places]
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    predicted = left.copy()
+    predicted = residual.copy()
     for number in np.unique(units[units >= 0]).tolist():
-        mine = units == number
-        if not np.any(matrix[mine]):
+        in_unit = units == number
+        if not np.any(matrix[in_unit]):
             continue
-        less = (normal - weighted[mine].T @ matrix[mine]) / np.outer(scale, scale)
-        right = (slope - weighted[mine].T @ system.residual[mine]) / scale
+        less = (normal - weighted[in_unit].T @ matrix[in_unit]) / np.outer(scale, scale)
+        right = (slope - weighted[in_unit].T @ system.residual[in_unit]) / scale
         step = -np.linalg.lstsq(less, right, rcond=1e-12)[0] / scale
-        predicted[mine] = system.residual[mine] + matrix[mine] @ step
+        predicted[in_unit] = system.residual[in_unit] + matrix[in_unit] @ step
     return system.deviance_of(system.reduced_chi2(predicted))

@@ -17,8 +17,8 @@ def _torque(x: Operating, q: Values) -> Array:
 
     def twist() -> Array:
         through = passed_on(x, share)
-        found: Array = 0.5 * gap * side_of(through, q["torque_nm"]) + spring_twist(x, q, through)
-        return found
+        torque: Array = 0.5 * gap * side_of(through, q["torque_nm"]) + spring_twist(x, q, through)
+        return torque
 
     return far_drag(x, share, q["between"], twist)
 

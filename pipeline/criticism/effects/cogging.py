@@ -28,19 +28,19 @@ def orders(machine: Machine) -> tuple[int, ...]:
     seen = {k for k in machine.torque_orders if any(k % base == 0 for base in bases)}
     if machine.cogging_order is not None:
         seen.add(machine.cogging_order)
-    every = tuple(sorted(seen | _untold(machine))) or (6 * machine.pole_pairs,)
+    every = tuple(sorted(seen | _unverified_orders(machine))) or (6 * machine.pole_pairs,)
     # of a wave that is not gone through once, a piece looks like any other curve
     return tuple(k for k in every if k * machine.travel_turns >= 1.0) or every[-1:]
 
 
-def _untold(machine: Machine) -> set[int]:
+def _unverified_orders(machine: Machine) -> set[int]:
     """The second harmonic of cogging where no torque spectrum says whether it is there."""
     order = machine.cogging_order
     return set() if order is None or machine.torque_orders else {2 * order}
 
 
 def _expand(machine: Machine) -> tuple[Parameter, ...]:
-    untold = _untold(machine)
+    unverified = _unverified_orders(machine)
     return tuple(
         Parameter(
             f"{wave}_{order}_nm",
@@ -50,7 +50,7 @@ def _expand(machine: Machine) -> tuple[Parameter, ...]:
             "torque_nm",
             -1.0,
             1.0,
-            optional=int(order in untold),
+            optional=int(order in unverified),
             order=order,
         )
         for order in orders(machine)

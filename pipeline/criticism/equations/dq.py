@@ -77,25 +77,32 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     torque = capture.has("torque_shaft_nm") and turning and angle
     names += ["torque_shaft_nm"] if torque else []
     policy = machine.policy.cutting
-    period, found, keep = even_clock(capture, tuple(names), policy)
-    shaft_angle(found, period, machine)
-    turned = float(np.ptp(found["theta_mech_rad"]))
+    period, columns, keep = even_clock(capture, tuple(names), policy)
+    shaft_angle(columns, period, machine)
+    turned = float(np.ptp(columns["theta_mech_rad"]))
     channels: tuple[str, ...] = ("vd_v", "vq_v")
     if torque and turned > policy.turning_rad:
         channels += ("torque_shaft_nm",)
-    size = found["vd_v"].size
+    size = columns["vd_v"].size
     window = window_of(period, size, policy)
     orders = electrical_orders(machine) if angle and turned > policy.turning_rad else ()
-    sensors = evened(capture, found, prepared(found, period, machine.policy), machine, window)
+    sensors = evened(capture, columns, prepared(columns, period, machine.policy), machine, window)
     most = policy.windows if capture.meta.test == "torque_map" else policy.windows_drive
-    found["t_s"] = period * np.arange(size, dtype=np.float64)
+    columns["t_s"] = period * np.arange(size, dtype=np.float64)
     logged = capture.meta.test == "drive" and len(channels) > 2
-    whole = {**found, "good": keep.astype(float)} if logged else None
-    log = whole_log(found, period, policy)
-    found, starts = thinned(found, keep, window, most)
-    weak = projection(found["theta_mech_rad"], starts, window, orders)
+    whole = {**columns, "good": keep.astype(float)} if logged else None
+    log = whole_log(columns, period, policy)
+    columns, starts = thinned(columns, keep, window, most)
+    weak = projection(columns["theta_mech_rad"], starts, window, orders)
     made = segment_of(
-        capture, "dq", "drive", period, found=found, sensors=sensors, channels=channels, weak=weak
+        capture,
+        "dq",
+        "drive",
+        period,
+        recorded=columns,
+        sensors=sensors,
+        channels=channels,
+        weak=weak,
     )
     return replace(made, unthinned=Unthinned(whole, log))
 

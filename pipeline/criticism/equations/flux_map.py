@@ -37,12 +37,12 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
     """
     names = ("id_a", "iq_a", *LINKAGES)
-    found = capture.arrays(*names)
+    columns = capture.arrays(*names)
     policy = machine.policy.tables
-    noise = _axes_noise(found, names[:2], policy) | _axes_noise(found, names[2:], policy)
+    noise = _axes_noise(columns, names[:2], policy) | _axes_noise(columns, names[2:], policy)
     if not all(noise.values()):
         return None
-    levels = levels_of(found["id_a"])
+    levels = levels_of(columns["id_a"])
     # rows of one d current are held out together: a map is often its own mirror image in i_q
     blocks = levels if levels.max(initial=0) + 1 >= policy.levels else None
     return segment_of(
@@ -50,7 +50,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "flux_map",
         "drive",
         1.0,
-        found=found,
+        recorded=columns,
         sensors=Sensors(noise),
         channels=LINKAGES,
         weak=None,
@@ -59,10 +59,10 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
 
 def _axes_noise(
-    found: Mapping[str, Array], names: tuple[str, ...], policy: Tables
+    columns: Mapping[str, Array], names: tuple[str, ...], policy: Tables
 ) -> dict[str, float]:
     """A share of an axis's range, or a tenth of the other's at least: one instrument reads both."""
-    ranges = {name: float(np.ptp(found[name])) for name in names}
+    ranges = {name: float(np.ptp(columns[name])) for name in names}
     least = policy.other_axis * max(ranges.values())
     return {name: policy.flux_share * max(own, least) for name, own in ranges.items()}
 

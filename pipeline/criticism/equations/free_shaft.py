@@ -63,23 +63,23 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
             return None
         names = [*names, "torque_shaft_nm"]
     policy = machine.policy.cutting
-    period, found, keep = even_clock(capture, tuple(names), policy)
-    shaft_angle(found, period, machine)
-    channel = TORQUE if TORQUE in found else SPEED
+    period, columns, keep = even_clock(capture, tuple(names), policy)
+    shaft_angle(columns, period, machine)
+    channel = TORQUE if TORQUE in columns else SPEED
     if capture.meta.test == "cogging":
-        return _slow_turn(capture, machine, period, found, keep, channel)
+        return _slow_turn(capture, machine, period, columns, keep, channel)
     window = window_of(period, keep.size, policy)
-    keep = keep & _coasts(found["theta_mech_rad"], window, policy.driven_share)
-    sensors = prepared(found, period, machine.policy)
-    found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
-    found, starts = thinned(found, keep, window, policy.windows)
-    weak = projection(found["theta_mech_rad"], starts, window, ())
+    keep = keep & _coasts(columns["theta_mech_rad"], window, policy.driven_share)
+    sensors = prepared(columns, period, machine.policy)
+    columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
+    columns, starts = thinned(columns, keep, window, policy.windows)
+    weak = projection(columns["theta_mech_rad"], starts, window, ())
     return segment_of(
         capture,
         "shaft",
         "bench",
         period,
-        found=found,
+        recorded=columns,
         sensors=sensors,
         channels=(channel,),
         weak=weak,
@@ -109,22 +109,22 @@ def _slow_turn(
     capture: Capture,
     machine: Machine,
     period: float,
-    found: dict[str, Array],
+    columns: dict[str, Array],
     keep: NDArray[np.bool_],
     channel: str,
 ) -> Segment | None:
     orders, policy = slow_orders(machine), machine.policy.cutting
-    theta = found["theta_mech_rad"]
+    theta = columns["theta_mech_rad"]
     turns = float(np.ptp(theta)) / (2 * math.pi)
     if turns <= 0.0:
         return None
     factor = max(int(theta.size / turns / (policy.slow_samples * max(orders))), 1)
     if theta.size // factor < policy.least_window + 2:
         return None
-    noise, steps = noise_and_steps(found, machine.policy.sensor_noise)
+    noise, steps = noise_and_steps(columns, machine.policy.sensor_noise)
     noise = {n: sigma / math.sqrt(factor) for n, sigma in noise.items()}
-    found = {name: decimated(column, factor) for name, column in found.items()}
-    sensors = Sensors(noise, steps, with_travel(found, noise, policy))
+    columns = {name: decimated(column, factor) for name, column in columns.items()}
+    sensors = Sensors(noise, steps, with_travel(columns, noise, policy))
     keep = decimated(keep.astype(float), factor) > 0.999
     keep[:1] = keep[-1:] = False
     size = keep.size
@@ -132,13 +132,13 @@ def _slow_turn(
     window = min(window, size - 2)
     # the first and the last sample have no neighbours
     starts = 1 + window_starts(keep[1:-1], window)
-    weak = projection(found["theta_mech_rad"], starts, window, orders, cycles=0.9, margin=12.0)
+    weak = projection(columns["theta_mech_rad"], starts, window, orders, cycles=0.9, margin=12.0)
     return segment_of(
         capture,
         "shaft",
         "bench",
         period * factor,
-        found=found,
+        recorded=columns,
         sensors=sensors,
         channels=(channel,),
         weak=weak,

@@ -49,7 +49,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "standing",
         "drive",
         1.0,
-        found={"theta_mech_rad": cells.theta_mech_rad, "iq_a": cells.iq_a, "sense": cells.sense},
+        recorded={"theta_mech_rad": cells.theta_mech_rad, "iq_a": cells.iq_a, "sense": cells.sense},
         sensors=Sensors({"iq_a": cells.noise_a}),
         channels=("iq_a",),
         weak=None,

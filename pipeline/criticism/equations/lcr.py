@@ -42,26 +42,26 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
     """
     names = ["theta_elec_deg", "lab_h"] + [n for n in ("rab_ohm", "freq_hz") if capture.has(n)]
-    found = capture.arrays(*names)
-    angle = 2 * np.radians(found["theta_elec_deg"])
+    columns = capture.arrays(*names)
+    angle = 2 * np.radians(columns["theta_elec_deg"])
     basis = np.stack([np.ones(angle.size), np.cos(angle), np.sin(angle)], axis=1)
     if angle.size < 6:
         return None
     noise, policy = {}, machine.policy
     for name in names[1:]:
-        fit = basis @ np.linalg.lstsq(basis, found[name], rcond=None)[0]
-        scatter = math.sqrt(float(((found[name] - fit) ** 2).sum()) / (angle.size - 3))
-        least = policy.tables.reading * float(np.abs(found[name]).max())
+        fit = basis @ np.linalg.lstsq(basis, columns[name], rcond=None)[0]
+        scatter = math.sqrt(float(((columns[name] - fit) ** 2).sum()) / (angle.size - 3))
+        least = policy.tables.reading * float(np.abs(columns[name]).max())
         noise[name] = max(
-            scatter, resolution(found[name], machine.policy.sensor_noise) / math.sqrt(12), least
+            scatter, resolution(columns[name], machine.policy.sensor_noise) / math.sqrt(12), least
         )
-    channels = tuple(n for n in ("lab_h", "rab_ohm") if n in found)
+    channels = tuple(n for n in ("lab_h", "rab_ohm") if n in columns)
     return segment_of(
         capture,
         "lcr",
         "lcr",
         1.0,
-        found=found,
+        recorded=columns,
         sensors=Sensors(noise),
         channels=channels,
         weak=None,

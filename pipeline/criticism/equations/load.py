@@ -59,13 +59,13 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         return None
     others = [name for name in ("id_a", *SMOOTHED) if capture.has(name)]
     policy = machine.policy.cutting
-    period, found, keep = even_clock(capture, ("iq_a", TORQUE, *others, *angle), policy)
-    shaft_angle(found, period, machine)
+    period, columns, keep = even_clock(capture, ("iq_a", TORQUE, *others, *angle), policy)
+    shaft_angle(columns, period, machine)
     size = keep.size
     window = window_of(period, size, policy)
-    sensors = evened(capture, found, prepared(found, period, machine.policy), machine, window)
-    found["t_s"] = period * np.arange(size, dtype=np.float64)
-    cut_out, starts = thinned(found, keep, window, policy.windows)
+    sensors = evened(capture, columns, prepared(columns, period, machine.policy), machine, window)
+    columns["t_s"] = period * np.arange(size, dtype=np.float64)
+    cut_out, starts = thinned(columns, keep, window, policy.windows)
     by_angle = "omega_mech_rad_s" not in angle
     orders = electrical_orders(machine) if by_angle else ()
     weak = projection(cut_out["theta_mech_rad"], starts, window, orders)
@@ -76,7 +76,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "load",
         "drive",
         period,
-        found=cut_out,
+        recorded=cut_out,
         sensors=sensors,
         channels=(TORQUE,),
         weak=weak,

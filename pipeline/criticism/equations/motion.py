@@ -68,7 +68,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "motion",
         "drive",
         log.period_s,
-        found=shaft,
+        recorded=shaft,
         sensors=log.sensors,
         channels=(TORQUE,),
         weak=weak,

@@ -32,7 +32,7 @@ from pipeline.numerics.projection import Projection, projection
 from pipeline.physics.frames import vector_of_lines
 from pipeline.records.capture import Capture
 
-_OWN_FRAME = "own_frame"
+_VOLTAGE_FRAME = "own_frame"
 """Number of a segment whose angle is that of its voltage, for want of an encoder."""
 _LINE_RAD = {f"v{pair}_v": angle for pair, angle in PAIR_RAD.items()}
 """Where each line voltage stands [rad, electrical]."""
@@ -62,47 +62,49 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     names = with_angle(capture, [*lines, *extra])
     encoder = not ANGLES.isdisjoint(names)
     policy = machine.policy.cutting
-    wanted = tuple(names if encoder else [*lines, *extra])
-    period, found, keep = even_clock(capture, wanted, policy)
+    signals = tuple(names if encoder else [*lines, *extra])
+    period, columns, keep = even_clock(capture, signals, policy)
     window = window_of(period, keep.size, policy)
     if encoder:
-        shaft_angle(found, period, machine)
+        shaft_angle(columns, period, machine)
     else:
-        keep &= _by_voltage(found, machine, window)
-    sensors = prepared(found, period, machine.policy)
-    found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
-    found, starts = thinned(found, keep, window, policy.windows)
-    weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))
-    weak = weak.only(_steady(weak, found["theta_mech_rad"], policy))
+        keep &= _by_voltage(columns, machine, window)
+    sensors = prepared(columns, period, machine.policy)
+    columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
+    columns, starts = thinned(columns, keep, window, policy.windows)
+    weak = projection(columns["theta_mech_rad"], starts, window, electrical_orders(machine))
+    weak = weak.only(_steady(weak, columns["theta_mech_rad"], policy))
     made = segment_of(
         capture,
         "open",
         "bench",
         period,
-        found=found,
+        recorded=columns,
         sensors=sensors,
         channels=("vd_v", "vq_v"),
         weak=weak,
     )
-    return made if encoder else replace(made, fixed={**made.fixed, _OWN_FRAME: 1.0})
+    return made if encoder else replace(made, fixed={**made.fixed, _VOLTAGE_FRAME: 1.0})
 
 
-def _by_voltage(found: dict[str, Array], machine: Machine, window: int) -> NDArray[np.bool_]:
+def _by_voltage(columns: dict[str, Array], machine: Machine, window: int) -> NDArray[np.bool_]:
     """Adds the angle [n, rad] at which the voltage stands; the samples where it is known.
 
     The magnet's angle at the start differs between spins, and a speed does not show it. The voltage
     does, but for the sense of rotation, which its own turning shows; its harmonics are averaged
     out over a window.
     """
-    voltage = vector_of_lines({name: found[name] for name in LINES_V if name in found})
+    voltage = vector_of_lines({name: columns[name] for name in LINES_V if name in columns})
     noise = max(
-        sensor_noise(found[name], machine.policy.sensor_noise) for name in LINES_V if name in found
+        sensor_noise(columns[name], machine.policy.sensor_noise)
+        for name in LINES_V
+        if name in columns
     )
     phase = np.unwrap(np.angle(voltage))
     width = 2 * (window // 2) + 1
     sense = np.sign(smoothed(np.gradient(phase), width))
     angle = smoothed(phase - 0.5 * math.pi * sense, width)
-    found["theta_mech_rad"] = angle / machine.pole_pairs
+    columns["theta_mech_rad"] = angle / machine.pole_pairs
     known = (np.abs(voltage) > machine.policy.cutting.audible_u * noise) & (
         np.diff(sense, prepend=sense[0]) == 0.0
     )
@@ -117,8 +119,8 @@ def _steady(weak: Projection, theta: Array, policy: Cutting) -> NDArray[np.bool_
     half = weak.length // 2
     first = theta[weak.starts + half] - theta[weak.starts]
     second = theta[weak.starts + 2 * half - 1] - theta[weak.starts + half - 1]
-    calm = np.abs(second - first) < policy.steady_share * np.abs(first + second)
-    return calm if calm.sum() >= policy.steady_windows else np.ones(calm.size, dtype=bool)
+    steady = np.abs(second - first) < policy.steady_share * np.abs(first + second)
+    return steady if steady.sum() >= policy.steady_windows else np.ones(steady.size, dtype=bool)
 
 
 def state(
@@ -128,7 +130,7 @@ def state(
     motion = motion_of(segment, signals, model.machine)
     none = np.zeros(motion.theta_rad.size, dtype=complex)
     x = operating(segment, signals, model, values, none, motion)
-    if _OWN_FRAME in segment.fixed:
+    if _VOLTAGE_FRAME in segment.fixed:
         return x
     x = replace(x, eps_rad=x.eps_rad - values["bench_angle_rad"])
     return at_true_angle(segment, x, model, values)
@@ -184,7 +186,7 @@ def _recorded_eps(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Array:
     eps: Array = model.machine.pole_pairs * signals["theta_mech_rad"]
-    return eps if _OWN_FRAME in segment.fixed else eps - values["bench_angle_rad"]
+    return eps if _VOLTAGE_FRAME in segment.fixed else eps - values["bench_angle_rad"]
 
 
 def _reading(segment: Segment, _: str, __: Model, ___: Values) -> Array:

@@ -65,7 +65,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "q",
         "drive",
         log.period_s,
-        found=log.columns,
+        recorded=log.columns,
         sensors=log.sensors,
         channels=("vq_v", SPEED) if log.speed and log.angle else ("vq_v",),
         weak=weak,

@@ -40,15 +40,15 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     """
     if capture.has("id_a", "iq_a", "psi_d_wb", "psi_q_wb"):
         return None
-    found = capture.arrays("id_a", "omega_mech_rad_s", "vq_v")
-    levels = set_levels(found["id_a"], machine.policy.tables)
+    columns = capture.arrays("id_a", "omega_mech_rad_s", "vq_v")
+    levels = set_levels(columns["id_a"], machine.policy.tables)
     count = int(levels.max(initial=0)) + 1
-    freedom = found["vq_v"].size - 2 * count
+    freedom = columns["vq_v"].size - 2 * count
     if freedom < count:
         return None
-    volts = found["vq_v"]
+    volts = columns["vq_v"]
     power = sum(
-        _scatter(found["omega_mech_rad_s"][levels == k], volts[levels == k]) for k in range(count)
+        _scatter(columns["omega_mech_rad_s"][levels == k], volts[levels == k]) for k in range(count)
     )
     least = machine.policy.tables.steady_reading * float(np.abs(volts).max())
     noise = {"vq_v": max(math.sqrt(power / freedom), least)}
@@ -58,7 +58,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "steady",
         "drive",
         1.0,
-        found=found,
+        recorded=columns,
         sensors=Sensors(noise),
         channels=("vq_v",),
         weak=None,
@@ -70,8 +70,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 def _scatter(speed: Array, volts: Array) -> float:
     """Sum of squares of one level's voltages about a straight line over speed."""
     design = np.column_stack([np.ones(speed.size), speed])
-    left = volts - design @ np.linalg.lstsq(design, volts, rcond=None)[0]
-    return float(left @ left)
+    residual = volts - design @ np.linalg.lstsq(design, volts, rcond=None)[0]
+    return float(residual @ residual)
 
 
 def state(

@@ -47,10 +47,10 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     sign = 1.0 if current[1] == pair[0] else -1.0
     extra = ["temp_winding_degc"] if capture.has("temp_winding_degc") else []
     policy = machine.policy.cutting
-    period, found, keep = even_clock(capture, (f"v{pair}_v", current, *extra), policy)
-    volts, amps = found.pop(f"v{pair}_v"), sign * found.pop(current)
-    found = {"v_pair_v": volts, "i_pair_a": amps, **found}
-    sensors = prepared(found, period, machine.policy)
+    period, columns, keep = even_clock(capture, (f"v{pair}_v", current, *extra), policy)
+    volts, amps = columns.pop(f"v{pair}_v"), sign * columns.pop(current)
+    columns = {"v_pair_v": volts, "i_pair_a": amps, **columns}
+    sensors = prepared(columns, period, machine.policy)
     fixed = {"pair_rad": PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
     if stepped and place is not None:
         fixed["theta_elec_rad"] = math.radians(place)
@@ -68,7 +68,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "terminal",
         "bench",
         period,
-        found=found,
+        recorded=columns,
         sensors=sensors,
         channels=("v_pair_v",),
         weak=weak,
@@ -81,8 +81,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 def _settled(weak: Projection, amps: Array, change_a: float) -> Projection:
     """The windows in which the current does not move: there the inductance does not matter."""
     spread = np.array([np.ptp(amps[s : s + weak.length]) for s in weak.starts])
-    calm = spread < max(change_a, 1e-11)
-    return weak.only(calm)
+    steady = spread < max(change_a, 1e-11)
+    return weak.only(steady)
 
 
 def state(

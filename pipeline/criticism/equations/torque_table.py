@@ -50,12 +50,12 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
     """
     names = ("iq_a", TORQUE, *(name for name in _BESIDE if capture.has(name)))
-    found = capture.arrays(*names)
-    fine = np.all([np.isfinite(column) for column in found.values()], axis=0)
-    found = {name: column[fine] for name, column in found.items()}
+    columns = capture.arrays(*names)
+    fine = np.all([np.isfinite(column) for column in columns.values()], axis=0)
+    columns = {name: column[fine] for name, column in columns.items()}
     policy = machine.policy.tables
-    torque, parts = found[TORQUE], _parts(found["iq_a"], policy)
-    noise = None if parts is None else _noise(found, policy.reading)
+    torque, parts = columns[TORQUE], _parts(columns["iq_a"], policy)
+    noise = None if parts is None else _noise(columns, policy.reading)
     if noise is None:
         return None
     made = segment_of(
@@ -63,7 +63,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "torque_table",
         "drive",
         1.0,
-        found=found,
+        recorded=columns,
         sensors=Sensors({TORQUE: noise}),
         channels=(TORQUE,),
         weak=None,
@@ -119,10 +119,10 @@ def _parts(current: Array, policy: Tables) -> NDArray[np.int64] | None:
     return parts
 
 
-def _noise(found: Mapping[str, Array], reading: float) -> float | None:
+def _noise(columns: Mapping[str, Array], reading: float) -> float | None:
     """Standard deviation [N·m] of the torques about their curves; None with too few rows."""
-    torque, current = found[TORQUE], found["iq_a"] / float(np.abs(found["iq_a"]).max())
-    angles = found.get("theta_mech_rad")
+    torque, current = columns[TORQUE], columns["iq_a"] / float(np.abs(columns["iq_a"]).max())
+    angles = columns.get("theta_mech_rad")
     place = np.zeros(torque.size, dtype=np.int64) if angles is None else levels_of(angles)
     if torque.size < 2 * _TERMS * (int(place.max()) + 1):
         place = np.zeros(torque.size, dtype=np.int64)
@@ -137,8 +137,8 @@ def _noise(found: Mapping[str, Array], reading: float) -> float | None:
 def _about_its_curve(current: Array, torque: Array) -> float:
     """Sum of squares [N²·m²] of torques about offset, slope and sag over current."""
     design = np.column_stack([np.ones(current.size), current, current**3])
-    left = torque - design @ np.linalg.lstsq(design, torque, rcond=None)[0]
-    return float(left @ left)
+    residual = torque - design @ np.linalg.lstsq(design, torque, rcond=None)[0]
+    return float(residual @ residual)
 
 
 EQUATION = Equation(

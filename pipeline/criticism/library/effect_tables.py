@@ -143,12 +143,12 @@ def _tables(effect: Effect, anywhere: Operating, q: Values) -> list[EffectTable]
 
 def _depends(on: Callable[[Operating], Array], x: Operating) -> set[str]:
     """The variables that a hook's answer changes with."""
-    here = on(x)
+    value = on(x)
 
     def moved(name: str) -> Array:
         return on(_fresh(x, **{name: np.roll(getattr(x, name), 1)}))
 
-    return {name for name in _VARIABLES if not np.array_equal(moved(name), here)}
+    return {name for name in _VARIABLES if not np.array_equal(moved(name), value)}
 
 
 def _fresh(x: Operating, **changed: Any) -> Operating:

@@ -13,8 +13,8 @@ from pipeline.plugins import discover
 @cache
 def equations() -> Mapping[str, Equation]:
     """Every equation by name, in the order in which a capture's segments are made."""
-    found = discover("pipeline.criticism.equations", "EQUATION", Equation)
-    ordered = sorted((one.value for one in found), key=lambda one: (one.rank, one.name))
+    discovered = discover("pipeline.criticism.equations", "EQUATION", Equation)
+    ordered = sorted((one.value for one in discovered), key=lambda one: (one.rank, one.name))
     return {equation.name: equation for equation in ordered}
 
 

@@ -39,10 +39,10 @@ def headline(effect: Effect, parameters: Mapping[str, ReportedParameter]) -> str
     return _SIZE.sub(lambda found: _size(found[1], parameters), effect.headline)
 
 
-def _size(wanted: str, parameters: Mapping[str, ReportedParameter]) -> str:
-    if wanted == "largest":
+def _size(parameter: str, parameters: Mapping[str, ReportedParameter]) -> str:
+    if parameter == "largest":
         return _largest(parameters)
-    names, percent = wanted.removesuffix("%"), wanted.endswith("%")
+    names, percent = parameter.removesuffix("%"), parameter.endswith("%")
     nothing = ReportedParameter(None, None, "1")
     of_phases = names.startswith("phases ")
     parts = [
@@ -106,8 +106,8 @@ def _largest(parameters: Mapping[str, ReportedParameter]) -> str:
     """The largest of the waves `sin_ORDER_nm` and `cos_ORDER_nm`, with its order."""
     waves: dict[str, list[ReportedParameter]] = {}
     for name, one in parameters.items():
-        if found := _WAVE.fullmatch(name):
-            waves.setdefault(found[1], []).append(one)
+        if match := _WAVE.fullmatch(name):
+            waves.setdefault(match[1], []).append(one)
     sizes = {order: amplitude(parts) for order, parts in waves.items()}
     known = {order: one for order, one in sizes.items() if one.value is not None}
     if not known:

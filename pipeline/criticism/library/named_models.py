@@ -43,5 +43,5 @@ def model_of(spec: ModelSpec, machine: Machine) -> Model:
     less = {name[1:] for name in spec.effects if name.startswith("-")}
     more = [name for name in spec.effects if not name.startswith("-")]
     names = [name for name in dict.fromkeys([*MODELS[spec.name], *more]) if name not in less]
-    found = tuple(chosen(tuple(names), spec.effects_path).values())
-    return Model(replace(machine, policy=policy_of(spec.policy)), found)
+    added = tuple(chosen(tuple(names), spec.effects_path).values())
+    return Model(replace(machine, policy=policy_of(spec.policy)), added)

@@ -45,15 +45,15 @@ def effects(effects_path: str | None = None) -> dict[str, Effect]:
 @cache
 def _library(files: tuple[tuple[Path, str], ...]) -> Mapping[str, Effect]:
     """Our effects and those of a user's files, which are known by path and digest."""
-    found = {
+    library = {
         one.name: one.value for one in discover("pipeline.criticism.effects", "EFFECT", Effect)
     }
     for path, digest in files:
         effect = _load(path, digest)
-        if effect.name in found:
+        if effect.name in library:
             raise UsageError(f"{path.name}: effect {effect.name} exists already", "rename it")
-        found[effect.name] = effect
-    return dict(sorted(found.items()))
+        library[effect.name] = effect
+    return dict(sorted(library.items()))
 
 
 def _user_files(effects_path: str | None) -> tuple[tuple[Path, str], ...]:
@@ -95,12 +95,12 @@ def _load(path: Path, digest: str) -> Effect:
         return guarded(effect, path, path.read_text(encoding="utf-8", errors="replace"))
 
 
-def known_effects(wanted: Sequence[str], effects_path: str | None = None) -> None:
+def known_effects(requested: Sequence[str], effects_path: str | None = None) -> None:
     """Refuses the name of an effect that there is not, also of one to take away, or is twice.
 
     Parameters
     ----------
-    wanted
+    requested
         Names; one to take away begins with `-`.
     effects_path
         Folder of a user's own effects.
@@ -111,7 +111,7 @@ def known_effects(wanted: Sequence[str], effects_path: str | None = None) -> Non
         A name is unknown or there twice.
 
     """
-    names = tuple(name.removeprefix("-") for name in wanted)
+    names = tuple(name.removeprefix("-") for name in requested)
     chosen(names, effects_path)
     twice = [name for name in names if names.count(name) > 1]
     if twice:

@@ -71,22 +71,22 @@ class Hook:
         return value
 
     def _look(self, value: Any, inputs: list[NDArray[Any]]) -> None:
-        shape, found = inputs[0].shape, np.asarray(value)
+        shape, result = inputs[0].shape, np.asarray(value)
         where = f"{Path(self.file).name}{_at(getattr(self.call, '__code__', None))}: {self.what}"
-        if found.dtype.kind not in "bifc":
+        if result.dtype.kind not in "bifc":
             words = f"{where} gives {type(value).__name__} and no numbers"
             raise UsageError(words, "return an array of one number a sample")
         try:
-            fits = np.broadcast_shapes(found.shape, shape) == shape
+            fits = np.broadcast_shapes(result.shape, shape) == shape
         except ValueError:
             fits = False
         if not fits:
-            words = f"{where} gives an array of shape {found.shape} for samples of shape {shape}"
+            words = f"{where} gives an array of shape {result.shape} for samples of shape {shape}"
             raise UsageError(words, "return one number a sample")
-        if np.isfinite(found).all():
+        if np.isfinite(result).all():
             return
         known = np.logical_and.reduce([np.isfinite(one) for one in inputs if one.shape == shape])
-        lost = np.broadcast_to(~np.isfinite(found), shape) & known
+        lost = np.broadcast_to(~np.isfinite(result), shape) & known
         if lost.any():
             words = f"{where} gives no finite number at {np.count_nonzero(lost)} of {lost.size}"
             raise UsageError(f"{words} samples", "give one for every current, speed and angle")
@@ -172,8 +172,10 @@ def _known_scale(parameter: Parameter, path: Path, what: str, text: str = "") ->
     if parameter.scale == "1" or parameter.scale in SCALES:
         return
     quoted = (f'"{parameter.scale}"', f"'{parameter.scale}'")
-    found = [n for n, line in enumerate(text.splitlines(), 1) if any(one in line for one in quoted)]
-    at = f", line {found[0]}" if found else ""
+    places = [
+        n for n, line in enumerate(text.splitlines(), 1) if any(one in line for one in quoted)
+    ]
+    at = f", line {places[0]}" if places else ""
     words = f"{path.name}{at}: {what}: {parameter.name} has the scale {parameter.scale!r}"
     near = get_close_matches(parameter.scale, SCALES, 1)
     hint = f"did you mean {near[0]!r}? " if near else ""
@@ -278,12 +280,12 @@ def _line(error: BaseException, path: Path) -> int | None:
     """The line of the file that is nearest to the error."""
     if isinstance(error, SyntaxError) and error.filename == str(path):
         return error.lineno
-    found, trace = None, error.__traceback__
+    line, trace = None, error.__traceback__
     while trace is not None:
         if _of(trace) == str(path):
-            found = trace.tb_lineno
+            line = trace.tb_lineno
         trace = trace.tb_next
-    return found
+    return line
 
 
 def _of(trace: TracebackType) -> str:

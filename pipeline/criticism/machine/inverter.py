@@ -162,9 +162,9 @@ def _beside(volts: Array, loss_v: float, late: Array, side: float) -> tuple[Arra
     held = 2.0 * loss_v * late
     for k, others in enumerate(_OTHERS):
         for j in others:
-            apart = volts[k] - volts[j]
-            low[k] += 0.5 * np.clip(apart / (2.0 * loss_v) + behind[j], 0.0, 1.0)
-            moved[k] += np.maximum(side * apart - held[j], 0.0) / 3.0
+            difference = volts[k] - volts[j]
+            low[k] += 0.5 * np.clip(difference / (2.0 * loss_v) + behind[j], 0.0, 1.0)
+            moved[k] += np.maximum(side * difference - held[j], 0.0) / 3.0
     return low, moved
 
 

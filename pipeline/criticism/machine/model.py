@@ -121,8 +121,8 @@ PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 
 def _prior(name: str, priors: Priors) -> float | None:
     """Standard uncertainty of a nuisance by the policy; None of a constant that has no prior."""
-    own: float | None = getattr(priors, _SHARED_PRIORS.get(name, name), None)
-    return priors.gain if own is None and name.startswith("gain_") else own
+    usual: float | None = getattr(priors, _SHARED_PRIORS.get(name, name), None)
+    return priors.gain if usual is None and name.startswith("gain_") else usual
 
 
 def base_of(machine: Machine) -> tuple[Constant, ...]:
@@ -193,8 +193,8 @@ class Model:
 
     def stated(self) -> dict[str, tuple[float, float]]:
         """What somebody states of the model's own parameters: value and standard uncertainty."""
-        own = {*PHYSICAL, *self.parameters()}
-        return {name: both for name, both in self.machine.stated.items() if name in own}
+        known = {*PHYSICAL, *self.parameters()}
+        return {name: both for name, both in self.machine.stated.items() if name in known}
 
     def with_effects(self, *effects: Effect) -> Model:
         """This model and further effects.
@@ -237,10 +237,10 @@ def values_of(effect: Effect, machine: Machine, values: Values) -> dict[str, flo
         In their units; 0 for those of optional terms that are left out.
 
     """
-    found = {p.name: values[f"{effect.name}.{p.name}"] for p in effect.parameters_of(machine)}
+    parameters = {p.name: values[f"{effect.name}.{p.name}"] for p in effect.parameters_of(machine)}
     if not effect.left_out:
-        return found
-    return {p.name: 0.0 for p in effect.every(machine)} | found
+        return parameters
+    return {p.name: 0.0 for p in effect.every(machine)} | parameters
 
 
 def clock_gain(recorder: str | None, model: Model, values: Values) -> float:
@@ -575,9 +575,9 @@ def zero(effect: Effect, model: Model, at: Iterable[tuple[str, float]] = ()) -> 
 
     """
     shapes = dict(at)
-    found = {}
+    values = {}
     for p in effect.parameters_of(model.machine):
         name = f"{effect.name}.{p.name}"
         scale = model.machine.scale(p)
-        found[name] = 0.0 if p.amplitude else shapes.get(p.name, p.scan[0] * scale)
-    return found
+        values[name] = 0.0 if p.amplitude else shapes.get(p.name, p.scan[0] * scale)
+    return values

@@ -134,11 +134,11 @@ def law_of_twist(shafts: Iterable[Shaft], policy: Torsion) -> Law | None:
     turning = [one.power for one in windows if one.turns]
     if not turning:
         return None
-    found, spread = _fitted(windows, inertia, policy)
+    coefficients, spread = _fitted(windows, inertia, policy)
     return Law(
-        float(found[1]),
+        float(coefficients[1]),
         math.sqrt(spread[1, 1]),
-        2.0 * float(found[2]),
+        2.0 * float(coefficients[2]),
         2.0 * math.sqrt(spread[2, 2]),
         math.sqrt(float(np.mean(turning))),
         len(turning),
@@ -155,21 +155,21 @@ def _windows(shaft: Shaft, policy: Torsion) -> Iterable[_Window]:
     noise = _Noise.of(shaft, block, size)
     moves = max(policy.torque_range * least, policy.torque_moves * float(np.std(through)))
     for first in range(0, theta.size - size + 1, size // 2):
-        here = np.flatnonzero(closed[first : first + size])
-        pressed = through[first : first + size][here]
+        rows = np.flatnonzero(closed[first : first + size])
+        pressed = through[first : first + size][rows]
         if pressed.size < policy.closed_blocks or np.ptp(pressed) < moves:
             continue
         side = np.sign(pressed)
-        own = [x[first : first + size][here] - x[first] for x in (turned, theta)]
-        parabola = np.vander(here / size - 0.5, 3)
+        own = [x[first : first + size][rows] - x[first] for x in (turned, theta)]
+        parabola = np.vander(rows / size - 0.5, 3)
         rest = np.linalg.qr(parabola, mode="complete")[0][:, 3:]
-        lower = np.linalg.cholesky(rest.T @ noise.error[np.ix_(here, here)] @ rest)
+        lower = np.linalg.cholesky(rest.T @ noise.error[np.ix_(rows, rows)] @ rest)
         whiten = np.linalg.solve(lower, rest.T)
         white = whiten @ np.column_stack([own[0], pressed, side, own[1]])
         yield _Window(
             white[:, :3],
             white[:, 3],
-            noise.products(whiten.T @ whiten, here),
+            noise.products(whiten.T @ whiten, rows),
             float(np.mean(pressed**2)),
             bool(np.ptp(side) > 0),
         )
@@ -256,9 +256,9 @@ class _Noise:
             u_theta * torque @ angle.T,
         )
 
-    def products(self, inverse: Array, here: NDArray[np.int64]) -> Array:
+    def products(self, inverse: Array, rows: NDArray[np.int64]) -> Array:
         """What noise adds to the whitened columns' products with columns and angle [3, 4]."""
-        among = np.ix_(here, here)
+        among = np.ix_(rows, rows)
         added = np.zeros((3, 4))
         added[0, 0] = np.sum(inverse * self.momentum[among])
         added[0, 1] = added[1, 0] = np.sum(inverse * self.momentum_torque[among])
@@ -284,29 +284,31 @@ def _fitted(windows: Sequence[_Window], inertia: float, policy: Torsion) -> tupl
     count = np.array([one.angle.size for one in windows])
     noise = np.array([one.noise for one in windows])
     clean = normal - noise[:, :, :3] / np.outer(size, size)
-    pull = slope - noise[:, :, 3] / size
+    slope_free_of_noise = slope - noise[:, :, 3] / size
     ends = []
     for gap in policy.starts_rad:
-        found = size * np.array([1.0 / inertia, 0.0, 0.5 * gap])
+        coefficients = size * np.array([1.0 / inertia, 0.0, 0.5 * gap])
         for _ in range(policy.rounds):
-            spreads = _spreads(normal, slope, power, count, found)
+            spreads = _spreads(normal, slope, power, count, coefficients)
             usual = float(np.clip(np.quantile(spreads[turns], policy.usual), 1.0, policy.odd))
             weight = np.maximum(spreads / usual, 1.0) ** -2.0
             inverse = np.linalg.pinv(np.einsum("i,ijk->jk", weight, clean), hermitian=True)
-            before, found = found, inverse @ (weight @ pull)
-            if np.abs(found - before).max() < policy.settled * np.abs(found).max():
+            before, coefficients = coefficients, inverse @ (weight @ slope_free_of_noise)
+            if np.abs(coefficients - before).max() < policy.settled * np.abs(coefficients).max():
                 break
-        spreads = np.maximum(_spreads(normal, slope, power, count, found), 1.0)
-        score = weight[:, None] * (pull - clean @ found)
+        spreads = np.maximum(_spreads(normal, slope, power, count, coefficients), 1.0)
+        score = weight[:, None] * (slope_free_of_noise - clean @ coefficients)
         # windows overlap by half: two of them count as one
         spread = 2.0 * inverse @ (score.T @ score) @ inverse / np.outer(size, size)
-        ends.append((float((count * np.log(spreads)).sum()), found / size, spread))
+        ends.append((float((count * np.log(spreads)).sum()), coefficients / size, spread))
     _, best, covariance = min(ends, key=lambda end: end[0])
     return best, covariance
 
 
-def _spreads(normal: Array, slope: Array, power: Array, count: Array, found: Array) -> Array:
+def _spreads(normal: Array, slope: Array, power: Array, count: Array, coefficients: Array) -> Array:
     """χ²/n [W] of every window."""
-    explained = 2.0 * slope @ found - np.einsum("ijk,j,k->i", normal, found, found)
+    explained = 2.0 * slope @ coefficients - np.einsum(
+        "ijk,j,k->i", normal, coefficients, coefficients
+    )
     spreads: Array = np.maximum(power - explained, 0.0) / count
     return spreads

@@ -85,12 +85,12 @@ def _smoothed(x: Operating, inner: Array) -> Array:
     box = np.full(block, 1.0 / block)
     smooth = np.convolve(np.convolve(box, box), box)
     kernel = 2.0 * np.pad(smooth, smooth.size // 2) - np.convolve(smooth, smooth)
-    found = np.zeros(inner.size + 2)
-    if found.size < kernel.size + 2:
-        return found
+    smoothed = np.zeros(inner.size + 2)
+    if smoothed.size < kernel.size + 2:
+        return smoothed
     first = kernel.size // 2 + 1
-    found[first : found.size - first] = np.convolve(inner, kernel, mode="valid")
-    return found
+    smoothed[first : smoothed.size - first] = np.convolve(inner, kernel, mode="valid")
+    return smoothed
 
 
 def _block(period_s: float, policy: Torsion) -> int:
@@ -268,8 +268,8 @@ def far_drag(x: Operating, share: float, between: float, twist_rad: Callable[[],
         return np.zeros(np.shape(x.omega_rad_s))
     far = share * x.base["j_kgm2"]
     rigid = not x.shaft.alone and (between > 0.0 or (between == 0.0 and x.shaft.held))
-    moved = x.theta_rad[:: x.shaft.finer] if rigid else twist_rad()
-    return _at_points(x, -far / x.ts_s**2 * np.pad(np.diff(moved, 2), 1))
+    angle_rad = x.theta_rad[:: x.shaft.finer] if rigid else twist_rad()
+    return _at_points(x, -far / x.ts_s**2 * np.pad(np.diff(angle_rad, 2), 1))
 
 
 def side_of(through_nm: Array, least_nm: float) -> Array:
@@ -343,21 +343,21 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
     return Discrimination("compliance", {}) if gap + policy.sure_u * u_gap < matters else None
 
 
-def _shaft(one: FullLog, between: bool, share: float) -> Shaft:
+def _shaft(log: FullLog, between: bool, share: float) -> Shaft:
     """A log as `law_of_twist` takes it: the coupling's torque, or the momentum of both parts."""
-    x, inertia = one.x, one.x.base["j_kgm2"]
-    driving = x.torque_nm - one.drag_nm
-    u_both = math.hypot(one.u_shaft_nm, one.u_air_gap_nm)
-    u_shaft = one.u_shaft_nm
+    x, inertia = log.x, log.x.base["j_kgm2"]
+    driving = x.torque_nm - log.drag_nm
+    u_both = math.hypot(log.u_shaft_nm, log.u_air_gap_nm)
+    u_shaft = log.u_shaft_nm
     return Shaft(
         x.ts_s,
         x.theta_rad,
-        one.shaft_nm if between else driving,
-        one.shaft_nm if between else driving - one.shaft_nm,
+        log.shaft_nm if between else driving,
+        log.shaft_nm if between else driving - log.shaft_nm,
         0.0 if between else (1.0 - share) * inertia,
         share * inertia if between else inertia,
-        one.u_theta_rad,
-        u_shaft if between else one.u_air_gap_nm,
+        log.u_theta_rad,
+        u_shaft if between else log.u_air_gap_nm,
         u_shaft if between else u_both,
-        one.good,
+        log.good,
     )

@@ -88,14 +88,14 @@ def bounded_step(best: Best, columns: Sequence[Column], model: Model, values: Va
     live = np.arange(len(columns))
     step = np.zeros(len(columns))
     while live.size:
-        moved = best(live).step
+        free_step = best(live).step
         out = [
             n
-            for n, change in zip(live.tolist(), moved.tolist(), strict=True)
+            for n, change in zip(live.tolist(), free_step.tolist(), strict=True)
             if _leaves(values[columns[n].name], change, limits.get(columns[n].name))
         ]
         if not out:
-            step[live] = moved
+            step[live] = free_step
             break
         live = np.setdiff1d(live, out)
     return step

@@ -83,7 +83,7 @@ def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
     for _ in range(policy.iterations):
         fit = system.fit
         step = bounded_step(_damped(system), system.columns, fit.model, fit.values)
-        if system.deviance - system.foreseen(step) >= policy.converged:
+        if system.deviance - system.predicted_deviance(step) >= policy.converged:
             halvings = policy.halvings if fresh else 1
             tried, promised = _tried(system, step, halvings)
             gain = system.deviance - tried.deviance
@@ -106,7 +106,7 @@ def _tried(system: LinearSystem, step: Array, halvings: int) -> tuple[LinearSyst
     for _ in range(halvings):
         moved = system.fit.moved(system.columns, step)
         tried = linear_system(moved, before=system, chord=True)
-        promised = system.deviance - system.foreseen(step)
+        promised = system.deviance - system.predicted_deviance(step)
         if tried.deviance < system.deviance + policy.converged:
             break
         step = policy.shortening * step

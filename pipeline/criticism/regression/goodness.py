@@ -130,8 +130,8 @@ def leave_out(system: LinearSystem) -> HeldOut:
     nothing.
 
     """
-    policy, own = system.policy.goodness, system.own.size
-    places = np.flatnonzero(np.any(system.matrix[:, :own] != 0.0, axis=0))
+    policy, own_size = system.policy.goodness, system.model_columns.size
+    places = np.flatnonzero(np.any(system.matrix[:, :own_size] != 0.0, axis=0))
     weight = system.weights(system.reduced_chi2(system.residual))
     matrix = system.matrix[:, places]
     unit = _units(system)
@@ -140,11 +140,11 @@ def leave_out(system: LinearSystem) -> HeldOut:
     plain = matrix.T @ matrix + np.diag(system.prior_precision[places])
     slope = weighted.T @ system.residual + system.prior_gradient[places]
     spread = np.diag(np.linalg.pinv(unit_diagonal(normal), hermitian=True))
-    left, widening = np.full(system.size, np.nan), np.ones(system.size)
+    residual, widening = np.full(system.size, np.nan), np.ones(system.size)
     steps: dict[int, Array] = {}
     for number in sorted(set(unit.tolist())):
-        mine = unit == number
-        less = normal - weighted[mine].T @ matrix[mine]
+        in_unit = unit == number
+        less = normal - weighted[in_unit].T @ matrix[in_unit]
         scale = np.sqrt(np.diag(normal))
         inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         grown = np.diag(inverse) / np.maximum(spread, 1e-300)
@@ -154,14 +154,16 @@ def leave_out(system: LinearSystem) -> HeldOut:
             or _lost(less, normal, policy)
         ):
             continue
-        step = -(inverse @ ((slope - weighted[mine].T @ system.residual[mine]) / scale)) / scale
-        left[mine] = system.residual[mine] + matrix[mine] @ step
-        rows = matrix[mine] / system.noise_ratio[mine, None]
-        covariance = pseudo_inverse(plain - matrix[mine].T @ matrix[mine])
-        widening[mine] = np.sqrt(1.0 + np.einsum("rk,kl,rl->r", rows, covariance, rows))
-        steps[number] = np.zeros(own)
+        step = (
+            -(inverse @ ((slope - weighted[in_unit].T @ system.residual[in_unit]) / scale)) / scale
+        )
+        residual[in_unit] = system.residual[in_unit] + matrix[in_unit] @ step
+        rows = matrix[in_unit] / system.noise_ratio[in_unit, None]
+        covariance = pseudo_inverse(plain - matrix[in_unit].T @ matrix[in_unit])
+        widening[in_unit] = np.sqrt(1.0 + np.einsum("rk,kl,rl->r", rows, covariance, rows))
+        steps[number] = np.zeros(own_size)
         steps[number][places] = step
-    return HeldOut.of(system, left, steps, widening)
+    return HeldOut.of(system, residual, steps, widening)
 
 
 def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
@@ -224,9 +226,9 @@ def _units(system: LinearSystem) -> NDArray[np.int64]:
     first = len(names)
     for number, one in enumerate(system.segments):
         if one.blocks is not None:
-            mine = segment == number
-            units[mine] = first + names.index(one.capture) * _MOST_BLOCKS
-            units[mine] += one.blocks[system.window[mine]]
+            in_segment = segment == number
+            units[in_segment] = first + names.index(one.capture) * _MOST_BLOCKS
+            units[in_segment] += one.blocks[system.window[in_segment]]
     return units
 
 
@@ -251,7 +253,7 @@ def signal_errors(system: LinearSystem, residual: Array) -> dict[str, float]:
         By reported name, in the unit of the signal.
 
     """
-    found: dict[str, float] = {}
+    errors: dict[str, float] = {}
     plain = (
         reported_signal(system.segments[number], channel) if order == 0 else ""
         for number, channel, order in system.labels
@@ -259,10 +261,12 @@ def signal_errors(system: LinearSystem, residual: Array) -> dict[str, float]:
     names = np.array(list(plain))
     of_row = names[system.group]
     for name in sorted({n for n in names.tolist() if n}):
-        mine = (of_row == name) & np.isfinite(residual)
-        if mine.any():
-            found[name] = math.sqrt(float(((residual[mine] * system.unit[mine]) ** 2).mean()))
-    return found
+        in_signal = (of_row == name) & np.isfinite(residual)
+        if in_signal.any():
+            errors[name] = math.sqrt(
+                float(((residual[in_signal] * system.unit[in_signal]) ** 2).mean())
+            )
+    return errors
 
 
 def remainder(system: LinearSystem, large: bool = False) -> tuple[Remainder, ...]:
@@ -306,13 +310,15 @@ def over_floor(system: LinearSystem, large: bool = False) -> tuple[Remainder, ..
         from when `remainder` is empty.
 
     """
-    found = []
+    exceeding = []
     for place, chi2_per_n, size, matters in _over(system, system.noise_ratio, large):
         number, channel, order = system.labels[place]
         capture = system.segments[number].capture
-        found.append(Remainder(capture, channel, order, chi2_per_n, size, matters))
+        exceeding.append(Remainder(capture, channel, order, chi2_per_n, size, matters))
     return tuple(
-        sorted(found, key=lambda r: (not r.matters, -r.chi2_per_n, r.capture, r.signal, r.order))
+        sorted(
+            exceeding, key=lambda r: (not r.matters, -r.chi2_per_n, r.capture, r.signal, r.order)
+        )
     )
 
 
@@ -337,7 +343,7 @@ def significant_groups(system: LinearSystem) -> NDArray[np.bool_]:
     return significant
 
 
-def misfit(system: LinearSystem) -> Array:
+def form_error_factor(system: LinearSystem) -> Array:
     """How wrong a model's form may have made the parameters.
 
     Parameters
@@ -363,15 +369,17 @@ def misfit(system: LinearSystem) -> Array:
     JCGM 100:2008 (GUM), 4.3.7. doi:10.59161/JCGM100-2008E
 
     """
-    own = system.own.size
+    own = system.model_columns.size
     weight = system.weights(system.reduced_chi2(system.residual))
     factor = np.zeros((own, own))
     for place, _, _, matters in _over(system, system.noise_ratio):
         if matters:
-            mine = system.group == place
-            rows = system.matrix[mine, :own] * weight[mine, None]
-            left = float((system.residual[mine] ** 2 - system.noise_ratio[mine] ** 2).sum())
-            bound = math.sqrt(max(left, 0.0) / 3.0) * rows
+            in_group = system.group == place
+            rows = system.matrix[in_group, :own] * weight[in_group, None]
+            excess = float(
+                (system.residual[in_group] ** 2 - system.noise_ratio[in_group] ** 2).sum()
+            )
+            bound = math.sqrt(max(excess, 0.0) / 3.0) * rows
             _, factor = np.linalg.qr(np.vstack([factor, bound]))
     return factor
 
@@ -388,9 +396,9 @@ def _over(
         n, q = counts[place], reduced_chi2[place]
         if n == 0 or q <= max(1.0 + policy.over, _highest_by_chance(n, policy.chance)):
             continue
-        mine = system.group == place
-        unit = float(((system.unit * noise_ratio)[mine] ** 2).mean())
-        more = float(((residual[mine] * system.unit[mine]) ** 2).mean()) - unit
+        in_group = system.group == place
+        unit = float(((system.unit * noise_ratio)[in_group] ** 2).mean())
+        more = float(((residual[in_group] * system.unit[in_group]) ** 2).mean()) - unit
         size = math.sqrt(max(more, 0.0))
         matters = size > material_size(system.segments[number], channel, system.fit, large)
         yield place, float(q), size, matters
@@ -429,9 +437,9 @@ def material_size(segment: Segment, channel: str, fit: Fit, large: bool = False)
     Of a log at standstill the machine's own voltage is no measure: all of it is R times current.
 
     """
-    one, policy = channel_of(segment, channel), fit.policy.goodness
+    observed, policy = channel_of(segment, channel), fit.policy.goodness
     scale = channel_scale(segment, channel, fit.model.machine, fit.values)
-    size = (policy.material if one.scale else policy.material_bench) * scale
-    if one.scale and one.beside and not large:
-        size = min(size, policy.material_reading * largest_reading(segment, one.beside))
+    size = (policy.material if observed.scale else policy.material_bench) * scale
+    if observed.scale and observed.beside and not large:
+        size = min(size, policy.material_reading * largest_reading(segment, observed.beside))
     return size

@@ -14,7 +14,7 @@ from pipeline.criticism.machine.model import BASE, PHYSICAL, Model, base_of
 from pipeline.criticism.policy.regression import GaussNewton
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.goodness import HeldOut, misfit
+from pipeline.criticism.regression.goodness import HeldOut, form_error_factor
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column
 from pipeline.numerics.identifiability import (
@@ -51,7 +51,7 @@ class Known:
     rest
         Step [own] that the equations would still take where a bound or the last iteration prevents
         it.
-    misfit
+    form_error_factor
         Factor [own, own] of what errors of the model's form may do; zeros where the form is taken
         as right.
 
@@ -60,7 +60,7 @@ class Known:
     found: Identified
     steps: Array
     rest: Array
-    misfit: Array
+    form_error_factor: Array
 
     def u_of(self, gradient: Array, bent: bool = False) -> float:
         """Standard uncertainty of a function of the parameters.
@@ -96,7 +96,7 @@ class Known:
         if count > 1:
             between = math.sqrt((count - 1) * float(np.var(moves)))
         pull = self.found.root @ (self.found.root.T @ gradient)
-        form = float(np.linalg.norm(self.misfit @ pull))
+        form = float(np.linalg.norm(self.form_error_factor @ pull))
         return math.hypot(max(noise, between), float(self.rest @ gradient), form)
 
     @property
@@ -121,7 +121,7 @@ def known(system: LinearSystem, held: HeldOut) -> Known:
         Without anything that only keeps steps short, or where the fit began.
 
     """
-    return known_by(system, held, _sizes(system.fit, system.columns[: system.own.size]))
+    return known_by(system, held, _sizes(system.fit, system.columns[: system.model_columns.size]))
 
 
 def known_by(system: LinearSystem, held: HeldOut, sizes: Array) -> Known:
@@ -142,22 +142,24 @@ def known_by(system: LinearSystem, held: HeldOut, sizes: Array) -> Known:
         Without errors of the model's form.
 
     """
-    own = system.own.size
+    own = system.model_columns.size
     weight = system.weights(system.reduced_chi2(system.residual))
     matrix, prior_precision = system.matrix[:, :own], system.prior_precision[:own]
     rows = np.vstack([matrix * np.sqrt(weight)[:, None], np.diag(np.sqrt(prior_precision))])
-    found = identify(rows, sizes)
+    identified = identify(rows, sizes)
     slope = matrix.T @ (weight * system.residual) + system.prior_gradient[:own]
     steps = np.array(list(held.steps.values())).reshape(-1, own)
-    return Known(found, steps, -found.root @ (found.root.T @ slope), np.zeros((own, own)))
+    return Known(
+        identified, steps, -identified.root @ (identified.root.T @ slope), np.zeros((own, own))
+    )
 
 
 def _reported(system: LinearSystem, held: HeldOut) -> Known:
     """The same with what a form that misses the recordings may do to the numbers."""
-    return replace(known(system, held), misfit=misfit(system))
+    return replace(known(system, held), form_error_factor=form_error_factor(system))
 
 
-def surely_there(system: LinearSystem, held: HeldOut, least: float) -> set[str]:
+def significantly_nonzero(system: LinearSystem, held: HeldOut, least: float) -> set[str]:
     """Parameters that are surely not zero, as they are or over a constant that no motor is without.
 
     Parameters
@@ -176,7 +178,7 @@ def surely_there(system: LinearSystem, held: HeldOut, least: float) -> set[str]:
         inertia.
 
     """
-    own = system.own.size
+    own = system.model_columns.size
     fit = known(system, held)
     values = np.array([system.fit.values[c.name] for c in system.columns])
     below = [n for n, c in enumerate(system.columns) if c.name in POSITIVE and values[n] > 0.0]
@@ -221,7 +223,7 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
     chosen of a few, or given by a discriminator, is determined where an amplitude of its effect is.
 
     """
-    fit, model, own = system.fit, system.fit.model, system.columns[: system.own.size]
+    fit, model, own = system.fit, system.fit.model, system.columns[: system.model_columns.size]
     sure_of = _reported(system, held)
     u = dict(zip((c.name for c in own), sure_of.u.tolist(), strict=True))
     beyond = _beyond(sure_of.u, system.prior_precision[: len(own)], fit.policy.fit)
@@ -249,11 +251,11 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
     return made
 
 
-def _or_stated(one: ModelParameter, stated: tuple[float, float] | None) -> ModelParameter:
+def _or_stated(parameter: ModelParameter, stated: tuple[float, float] | None) -> ModelParameter:
     """The parameter, or what is stated of it where nothing else determines it."""
-    if one.known or stated is None:
-        return one
-    return replace(one, value=stated[0], u=stated[1], stated=True)
+    if parameter.known or stated is None:
+        return parameter
+    return replace(parameter, value=stated[0], u=stated[1], stated=True)
 
 
 def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
@@ -279,7 +281,7 @@ def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
     """
     stated, sure_of, notes = system.fit.model.stated(), _reported(system, held), []
     policy = system.policy.fit
-    for place, column in enumerate(system.columns[: system.own.size]):
+    for place, column in enumerate(system.columns[: system.model_columns.size]):
         if column.name not in stated:
             continue
         (stated_value, u_stated), u = stated[column.name], float(sure_of.u[place])
@@ -339,18 +341,20 @@ def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCom
 
     """
     fit, policy = system.fit, system.policy.fit
-    names = [c.name for c in system.columns[: system.own.size]]
+    names = [c.name for c in system.columns[: system.model_columns.size]]
     sure_of = _reported(system, held)
-    found = sure_of.found
+    identified = sure_of.found
     values = np.array([fit.values[name] for name in names])
     physical = {**dict.fromkeys(PHYSICAL), **fit.model.parameters()}
     observed = np.any(system.matrix[:, : len(names)] != 0.0, axis=0)
-    open_ = np.isinf(found.u) | ~found.determined
+    open_ = np.isinf(identified.u) | ~identified.determined
     places = [n for n, name in enumerate(names) if name in physical and observed[n] and open_[n]]
     positive = [names.index(name) for name in POSITIVE if fit.values[name] > 0.0]
-    made = known_combinations(found, values, places, positive)
+    made = known_combinations(identified, values, places, positive)
     moving = np.zeros(len(names), dtype=bool)
-    for moved, there in walked(found, values, made, math.log(policy.walk_factor)) if made else ():
+    for moved, there in (
+        walked(identified, values, made, math.log(policy.walk_factor)) if made else ()
+    ):
         at = replace(fit, values=fit.values | dict(zip(names, there.tolist(), strict=True)))
         deviance = linear_system(at, before=system, chord=True).deviance
         if not abs(deviance - system.deviance) < policy.walk_rise:
@@ -371,31 +375,33 @@ def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCom
     return tuple(c for one in combined if (c := _of_pairs(one)))
 
 
-def _of_pairs(one: KnownCombination) -> KnownCombination | None:
+def _of_pairs(combination: KnownCombination) -> KnownCombination | None:
     """A combination of a machine whose pole pairs, unknown, were taken as one."""
-    if {"ld_h", "lq_h"}.intersection(one.of):
+    if {"ld_h", "lq_h"}.intersection(combination.of):
         return None
-    alone = one.expression == "psi_wb"
+    alone = combination.expression == "psi_wb"
     named = "pole_pairs*psi_wb" if alone else "(pole_pairs*psi_wb)"
-    return replace(one, expression=one.expression.replace("psi_wb", named))
+    return replace(combination, expression=combination.expression.replace("psi_wb", named))
 
 
-def _combined(one: Combination, u: float, names: Sequence[str], model: Model) -> KnownCombination:
+def _combined(
+    combination: Combination, u: float, names: Sequence[str], model: Model
+) -> KnownCombination:
     """A combination as it is reported."""
     base = base_of(model.machine)
     units = {c.name: c.unit for c in base} | {n: p.unit for n, (_, p) in model.parameters().items()}
-    weights = {names[place]: weight for place, weight in one.weights}
-    if one.product:
+    weights = {names[place]: weight for place, weight in combination.weights}
+    if combination.product:
         return KnownCombination(
             _fraction(list(weights), weights, "*"),
-            one.value,
+            combination.value,
             u,
             _fraction([units[name] for name in weights], weights, "·"),
             tuple(weights),
         )
     (first, _), (second, factor) = weights.items()
     words = f"{first} {'+' if factor > 0.0 else '-'} {abs(factor):.9g}*{second}"
-    return KnownCombination(words, one.value, u, units[first], tuple(weights))
+    return KnownCombination(words, combination.value, u, units[first], tuple(weights))
 
 
 def _fraction(factors: Sequence[str], weights: Mapping[str, float], times: str) -> str:

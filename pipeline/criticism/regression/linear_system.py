@@ -72,7 +72,7 @@ class LinearSystem:
         Half the slope of the priors' cost [P].
     fit
         Where it was linearised.
-    own_count
+    model_column_count
         Number of columns of the model.
     made_at
         Values at which each column was computed.
@@ -91,7 +91,7 @@ class LinearSystem:
     prior_precision: Array
     prior_gradient: Array
     fit: Fit
-    own_count: int
+    model_column_count: int
     made_at: Mapping[ColumnKey, Values]
 
     @property
@@ -105,9 +105,9 @@ class LinearSystem:
         return int(self.residual.size)
 
     @property
-    def own(self) -> NDArray[np.int64]:
+    def model_columns(self) -> NDArray[np.int64]:
         """Places of the columns of the model's own parameters."""
-        return np.arange(self.own_count)
+        return np.arange(self.model_column_count)
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -176,7 +176,7 @@ class LinearSystem:
         each: Array = 1.0 / np.maximum(reduced_chi2, 1.0)
         return each[self.group]
 
-    def foreseen(self, step: Array) -> float:
+    def predicted_deviance(self, step: Array) -> float:
         """Deviance after a step along the first columns, to first order.
 
         Parameters
@@ -237,8 +237,8 @@ class LinearSystem:
             In the order of the columns; names without a column are left out.
 
         """
-        wanted = set(names)
-        return np.array([n for n, c in enumerate(self.columns) if c.name in wanted], dtype=int)
+        requested = set(names)
+        return np.array([n for n, c in enumerate(self.columns) if c.name in requested], dtype=int)
 
     def normal_equations(self, places: NDArray[np.int64] | None = None) -> NormalEquations:
         """Normal matrices by group.
@@ -284,9 +284,9 @@ class LinearSystem:
         order = np.argsort(self.group, kind="stable")
         edges = np.concatenate([[0], np.cumsum(self.counts).astype(np.int64)])
         for number, (first, end) in enumerate(pairwise(edges.tolist())):
-            mine = residuals[:, order[first:end]]
-            slope[number] = mine @ self.matrix[order[first:end]]
-            power[number] = (mine**2).sum(axis=1)
+            group_residuals = residuals[:, order[first:end]]
+            slope[number] = group_residuals @ self.matrix[order[first:end]]
+            power[number] = (group_residuals**2).sum(axis=1)
         return [replace(known, power=power[:, n], slope=slope[:, n]) for n in range(len(residuals))]
 
     def along(self, places: NDArray[np.int64]) -> LinearSystem:
@@ -324,8 +324,8 @@ class LinearSystem:
         array [R]
 
         """
-        left: Array = self.residual + self.matrix[:, places] @ step
-        return left
+        residual: Array = self.residual + self.matrix[:, places] @ step
+        return residual
 
     def covariance(self, places: NDArray[np.int64]) -> Array:
         """Covariance of parameters when they are fitted together.
@@ -373,7 +373,7 @@ def linear_system(
 
     """
     model, values = fit.model, fit.values
-    own = own_columns(model)
+    own = model_columns(model)
     columns = [*own, *candidates]
     known = _kept(before, fit, columns, chord)
     new = [column for column in columns if column.key not in known]
@@ -394,7 +394,7 @@ def linear_system(
         prior_precision=prior_precision,
         prior_gradient=prior_gradient,
         fit=fit,
-        own_count=len(own),
+        model_column_count=len(own),
         made_at={column.key: values for column in new},
     )
     return made if before is None or not known else _with_known(made, before, known)
@@ -487,8 +487,8 @@ def _kept(
         return not (turned and of_angle) and _holds(column, before.made_at[column.key], fit)
 
     places = {column.key: place for place, column in enumerate(before.columns)}
-    there = [column for column in columns if column.key in places]
-    kept = [column.key for column in there if chord or stays(column)]
+    carried_over = [column for column in columns if column.key in places]
+    kept = [column.key for column in carried_over if chord or stays(column)]
     return {key: before.matrix[:, places[key]] for key in kept}
 
 
@@ -536,7 +536,7 @@ def _priors(model: Model, columns: Sequence[Column], values: Values) -> tuple[Ar
     return prior_precision, prior_gradient
 
 
-def own_columns(model: Model) -> list[Column]:
+def model_columns(model: Model) -> list[Column]:
     """The columns of a model's own parameters, those of the base first.
 
     Parameters

@@ -312,7 +312,7 @@ class _Sampler:
         self.x = operate(segment, segment.recorded, model, values)
         self.hooks = hooks_in(segment)
         pieces = self.pieces = evaluate(model, self.x, values, self.hooks)
-        self.own: dict[str, Pieces] = {}
+        self.effect_pieces: dict[str, Pieces] = {}
         self.gains = {c.name for c in base_of(model.machine) if c.hook == "gain"}
         self.paced: dict[float, Array] = {}
         self.mean = mean_current(self.x, values)
@@ -369,11 +369,11 @@ class _Sampler:
             pieces = replace(pieces, drop_v=pieces.drop_v + lead)
         elif column.name not in _BETWEEN:
             pieces = evaluate(self.model, x, moved, self.hooks)
-        there = predicted(self.segment, x, pieces, self.model, moved)
+        after = predicted(self.segment, x, pieces, self.model, moved)
         if column.name == "j_kgm2" and of_acceleration(self.segment, self.segment.channels[-1]):
             # the slope of 1/J, not of its chord: friction over inertia is known better than 1e-3
             step *= self.values[column.name] / moved[column.name]
-        return -(there - self.start) / step
+        return -(after - self.start) / step
 
     def _gain(self, column: Column) -> Array | None:
         """Along a gain of the station: of the prediction, or what it does to current and heat."""
@@ -398,8 +398,8 @@ class _Sampler:
             *UNLOGGED_K,
         ):
             return (self._residual(self.model, moved) - self.here) / column.step
-        there = predicted(self.segment, self.x, self.pieces, self.model, moved)
-        return -(there - self.start) / column.step
+        after = predicted(self.segment, self.x, self.pieces, self.model, moved)
+        return -(after - self.start) / column.step
 
     def _anew(self, column: Column, effect: Effect) -> Array | None:
         inside = effect in self.model.effects
@@ -425,10 +425,10 @@ class _Sampler:
         """
         if effect.hook != "sensor" or effect.angle is not None or effect.current is not None:
             return self._residual(model, moved)
-        there = self.start
+        after = self.start
         if any(hook is not None for hook in (effect.voltage, effect.shaft, effect.speed)):
-            there = predicted(self.segment, self.x, self.pieces, model, moved)
-        return measured(self.segment, self.segment.recorded, model, moved) - there
+            after = predicted(self.segment, self.x, self.pieces, model, moved)
+        return measured(self.segment, self.segment.recorded, model, moved) - after
 
     def _start(self, column: Column, effect: Effect) -> dict[str, float]:
         """The values that a column departs from; an effect not in the model is not there."""
@@ -441,9 +441,9 @@ class _Sampler:
         moved = {**start, column.name: start[column.name] + column.step}
         change = self._pieces(effect, moved)
         if effect in self.model.effects:
-            if effect.name not in self.own:
-                self.own[effect.name] = self._pieces(effect, start)
-            before = self.own[effect.name]
+            if effect.name not in self.effect_pieces:
+                self.effect_pieces[effect.name] = self._pieces(effect, start)
+            before = self.effect_pieces[effect.name]
             change = Pieces(
                 change.psi_wb - before.psi_wb,
                 change.slope_wb - before.slope_wb,
@@ -460,12 +460,12 @@ class _Sampler:
         plain = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
         if self.observes.form == "affine":
             still = self._pieces_of_nothing()
-            there = predicted(self.segment, self.x, change, plain, self.values) - predicted(
+            after = predicted(self.segment, self.x, change, plain, self.values) - predicted(
                 self.segment, self.x, still, plain, self.values
             )
         else:
-            there = predicted(self.segment, self.x, change, plain, self.quiet)
-        return -there / column.step if np.any(np.abs(there) > _NOTHING) else None
+            after = predicted(self.segment, self.x, change, plain, self.quiet)
+        return -after / column.step if np.any(np.abs(after) > _NOTHING) else None
 
     def _pieces_of_nothing(self) -> Pieces:
         nothing = np.zeros(self.x.omega_rad_s.shape)

@@ -112,11 +112,11 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
     ratios = {
         key: np.array([line / beside for line, beside in seen]) for key, seen in powers.items()
     }
-    there = {freq for freq, captures in clear.items() if len(captures) >= policy.captures}
+    common = {freq for freq, captures in clear.items() if len(captures) >= policy.captures}
     return tuple(
         Hum(*key, math.sqrt(float(np.median([line for line, _ in powers[key]]))))
         for key, ratio in ratios.items()
-        if key[-1] in there and float(np.median(ratio)) > policy.seen
+        if key[-1] in common and float(np.median(ratio)) > policy.seen
     )
 
 
@@ -161,20 +161,20 @@ def hum_notes(hums: Sequence[Hum]) -> tuple[str, ...]:
     """
     notes = []
     for signal in dict.fromkeys(hum.signal for hum in hums):
-        mine = [hum for hum in hums if hum.signal == signal]
-        lines = ", ".join(f"{freq:g}" for freq in sorted({hum.freq_hz for hum in mine}))
-        rms = max(hum.rms for hum in mine)
+        of_signal = [hum for hum in hums if hum.signal == signal]
+        lines = ", ".join(f"{freq:g}" for freq in sorted({hum.freq_hz for hum in of_signal}))
+        rms = max(hum.rms for hum in of_signal)
         notes.append(f"mains hum in {signal} at {lines} Hz, {rms:.2g} rms: taken as noise")
     return tuple(notes)
 
 
 def _humming(segment: Segment, hums: Sequence[Hum], model: Model, values: Values) -> Segment:
     weak = segment.weak
-    mine = [h for h in hums if h.kind == segment.kind and h.signal in _sensors(segment)]
-    if weak is None or not mine:
+    present = [h for h in hums if h.kind == segment.kind and h.signal in _sensors(segment)]
+    if weak is None or not present:
         return segment
     lines = []
-    for hum in mine:
+    for hum in present:
         waves = hum.rms * _waves(segment, hum.freq_hz)
         if hum.signal not in segment.channels:
             lines.append(disturbed(segment, weak, model, values, hum.signal, waves))
@@ -182,7 +182,7 @@ def _humming(segment: Segment, hums: Sequence[Hum], model: Model, values: Values
         both = np.zeros((2, len(segment.channels), weak.starts.size, weak.orders.size))
         both[:, segment.channels.index(hum.signal)] = weak.project(waves)
         lines.append(both)
-    for name, rms, freq in _in_currents(segment, mine):
+    for name, rms, freq in _in_currents(segment, present):
         waves = rms * _waves(segment, freq)
         lines.append(disturbed(segment, weak, model, values, name, waves))
     return with_lines(segment, np.concatenate(lines))
@@ -196,17 +196,17 @@ def _sensors(segment: Segment) -> tuple[str, ...]:
 
 def _as_sensed(segment: Segment, model: Model, values: Values) -> Mapping[str, Array]:
     """Residual [n] of every sensor; what the rotor's frame turns at its speed, turned back."""
-    left = residual(segment, model, values)
+    residuals = residual(segment, model, values)
     sensed = equation_of(segment).sensing.sensed
     if sensed is not None:
-        return sensed(segment, left, model, values)
-    return dict(zip(segment.channels, left, strict=True))
+        return sensed(segment, residuals, model, values)
+    return dict(zip(segment.channels, residuals, strict=True))
 
 
-def _in_currents(segment: Segment, mine: Sequence[Hum]) -> Iterator[tuple[str, float, float]]:
+def _in_currents(segment: Segment, hums: Sequence[Hum]) -> Iterator[tuple[str, float, float]]:
     """Name, rms [A] and frequency of what the current sensors may have of a voltage's lines."""
     sensed = [
-        h for h in mine if segment.sensors.noise.get(h.signal, 0.0) > 0.0 and "_v" in h.signal
+        h for h in hums if segment.sensors.noise.get(h.signal, 0.0) > 0.0 and "_v" in h.signal
     ]
     for freq in sorted({h.freq_hz for h in sensed}):
         times = max(h.rms / segment.sensors.noise[h.signal] for h in sensed if h.freq_hz == freq)
@@ -318,8 +318,8 @@ class _Spectrum:
         seen = np.bincount(part, wave.real, self.policy.parts) + 1j * np.bincount(
             part, wave.imag, self.policy.parts
         )
-        there = size > 0.0
-        power = float((np.abs(seen[there]) ** 2 / size[there]).sum())
+        nonzero = size > 0.0
+        power = float((np.abs(seen[nonzero]) ** 2 / size[nonzero]).sum())
         return float(np.abs(seen.sum()) ** 2 / size.sum()) / max(power, 1e-300)
 
 

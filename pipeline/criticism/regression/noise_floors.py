@@ -98,8 +98,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     group, _, valid, groups = row_index(segment)
     plain = projected(segment, residual(segment, model, values))
     total, count = np.zeros(len(groups)), np.zeros(len(groups))
-    wanted = policy.pooled // max(int(valid.sum()) // max(len(groups), 1), 1)
-    replicates = min(max(wanted, policy.replicates), policy.pooled)
+    replicate_count = policy.pooled // max(int(valid.sum()) // max(len(groups), 1), 1)
+    replicates = min(max(replicate_count, policy.replicates), policy.pooled)
     sensors = segment.sensors
     if sensors.steps:
         replicates = max(replicates, policy.shifts)
@@ -208,10 +208,10 @@ def form_tolerance(
     """
     group, _, valid, groups = row_index(segment)
     total = np.zeros(len(groups))
-    here = residual(segment, model, values) if added else np.zeros(0)
+    before = residual(segment, model, values) if added else np.zeros(0)
     for effect in added:
         without = residual(segment, model, {**values, **zero(effect, model)})
-        power = projected(segment, without - here)[valid] ** 2
+        power = projected(segment, without - before)[valid] ** 2
         count = np.bincount(group[valid], minlength=len(groups))
         total += np.bincount(group[valid], power, minlength=len(groups)) / np.maximum(count, 1)
     wrong = model.policy.noise_floors.form if share is None else share
@@ -361,9 +361,9 @@ def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
     for effect in model.effects:
         if effect.drop is not None:
             q = values_of(effect, model.machine, known)
-            here = effect.drop(x, q)
-            step = effect.drop(moved, q) - here
-            steeper = np.abs(step) - (more - 1.0) * np.abs(here)
+            before = effect.drop(x, q)
+            step = effect.drop(moved, q) - before
+            steeper = np.abs(step) - (more - 1.0) * np.abs(before)
             change = change + np.maximum(steeper, 0.0) * np.exp(1j * np.angle(step))
     return change
 
@@ -407,10 +407,10 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
     known = dict(values)
     for effect in model.effects:
         known = {**zero(effect, model), **known}
-    there = x.at(finer * creeping)
+    resting = x.at(finer * creeping)
     drag = frozenset({"torque"})
     onward, back = (
-        evaluate(model, replace(there, omega_rad_s=pace), known, drag).drag_nm
+        evaluate(model, replace(resting, omega_rad_s=pace), known, drag).drag_nm
         for pace in (np.full(creeping.size, speed) for speed in (slow, -slow))
     )
     grip = np.zeros(segment.size)

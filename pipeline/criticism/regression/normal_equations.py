@@ -143,8 +143,8 @@ class NormalEquations:
         edges = np.concatenate([[0], np.cumsum(counts)])
         normal = np.empty((count, both.shape[1], both.shape[1]))
         for number in range(count):
-            mine = both[edges[number] : edges[number + 1]]
-            np.matmul(mine.T, mine, out=normal[number])
+            in_group = both[edges[number] : edges[number + 1]]
+            np.matmul(in_group.T, in_group, out=normal[number])
         return cls(
             counts.astype(float),
             normal[:, 0, 0].copy(),

@@ -95,12 +95,12 @@ def channel_scale(segment: Segment, channel: str, machine: Machine, values: Valu
         axis.
 
     """
-    one = channel_of(segment, channel)
-    if not one.scale:
+    observed = channel_of(segment, channel)
+    if not observed.scale:
         # an axis that stands still has the scale of the other one
-        return largest_reading(segment, one.beside or (channel,))
-    scale = machine.scales[one.scale]
-    return scale / values["j_kgm2"] if one.acceleration and not one.as_torque else scale
+        return largest_reading(segment, observed.beside or (channel,))
+    scale = machine.scales[observed.scale]
+    return scale / values["j_kgm2"] if observed.acceleration and not observed.as_torque else scale
 
 
 def largest_reading(segment: Segment, names: Sequence[str]) -> float:

@@ -160,7 +160,7 @@ def disturbed(
         Change of the weak residual.
 
     """
-    here, column = residual(segment, model, values), segment.recorded[name]
+    before, column = residual(segment, model, values), segment.recorded[name]
     moved = ({**segment.recorded, name: column + wave} for wave in waves)
-    there = [residual(segment, model, values, recorded) for recorded in moved]
-    return np.stack([weak.project(one - here) for one in there])
+    after = [residual(segment, model, values, recorded) for recorded in moved]
+    return np.stack([weak.project(one - before) for one in after])

@@ -43,9 +43,9 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
         used = recorded.meta.test in known_tests() and recorded.path not in mixed
         capture = with_values(recorded) if used else None
         if capture is not None:
-            own = gains[recorded.path]
+            gain = gains[recorded.path]
             cut = (_by_encoder(s, machine) for s in _cut(capture, machine))
-            made += [_by_instruments(segment, own) for segment in cut]
+            made += [_by_instruments(segment, gain) for segment in cut]
     kinds = {segment.kind for segment in made}
     # a table that other captures can predict is held out as a whole
     whole = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
@@ -70,8 +70,8 @@ def mixed_setups(campaign: Campaign, machine: Machine) -> tuple[Setup, ...]:
     """
     policy = machine.policy.cutting
     limits = Limits(policy.setup_share, policy.setup_top, policy.setup_least)
-    found = coast_setups(campaign.of("spin_down"), limits)
-    return found if len(found) > 1 else ()
+    setups = coast_setups(campaign.of("spin_down"), limits)
+    return setups if len(setups) > 1 else ()
 
 
 def known_tests() -> frozenset[str]:
@@ -102,9 +102,9 @@ def _unlogged(segment: Segment, equation: Equation) -> dict[str, float]:
 
 def _late_speed(segment: Segment, capture: Capture) -> dict[str, float]:
     """The nuisance of a motion that is known by a drive's own speed alone."""
-    told = capture.has("theta_mech_rad") or capture.has("theta_elec_rad")
-    own = segment.instrument.name == "drive" and capture.has("omega_mech_rad_s")
-    return {LATE_SPEED: 1.0} if own and not told else {}
+    has_angle = capture.has("theta_mech_rad") or capture.has("theta_elec_rad")
+    drive_speed = segment.instrument.name == "drive" and capture.has("omega_mech_rad_s")
+    return {LATE_SPEED: 1.0} if drive_speed and not has_angle else {}
 
 
 def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:

@@ -155,7 +155,7 @@ def detectable(effect: Effect, wide: LinearSystem, offered: Sequence[Candidate])
         amplitude count. 0 where nothing observes it.
 
     """
-    own, machine = wide.own, wide.fit.machine
+    model_columns, machine = wide.model_columns, wide.fit.machine
     sizes = {
         f"{effect.name}.{p.name}": p.typical * machine.scale(p)
         for p in effect.parameters_of(machine)
@@ -164,14 +164,14 @@ def detectable(effect: Effect, wide: LinearSystem, offered: Sequence[Candidate])
     for candidate, places in placed(wide, offered):
         if candidate.effect.name != effect.name:
             continue
-        covariance = wide.covariance(np.concatenate([own, places]))
-        spread = np.sqrt(np.maximum(np.diag(covariance)[own.size :], 0.0))
+        covariance = wide.covariance(np.concatenate([model_columns, places]))
+        spread = np.sqrt(np.maximum(np.diag(covariance)[model_columns.size :], 0.0))
         for place, one in zip(places, spread, strict=True):
             if one > 0 and np.any(wide.matrix[:, place]):
                 best = max(best, sizes[wide.columns[place].name] / float(one))
     return best
 
 
-def _meet(one: Effect, other: Effect) -> bool:
+def _meet(effect: Effect, other: Effect) -> bool:
     """Whether two effects can reach one signal: drops and drags cannot stand for each other."""
-    return {one.hook, other.hook} != {"drop", "torque"}
+    return {effect.hook, other.hook} != {"drop", "torque"}

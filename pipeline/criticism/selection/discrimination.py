@@ -88,24 +88,24 @@ def sharing_discriminator(effect: Effect, library: Mapping[str, Effect]) -> tupl
     )
 
 
-def settled(effect: Effect, found: Discrimination) -> Effect:
+def settled(effect: Effect, discrimination: Discrimination) -> Effect:
     """An effect with the shapes that full logs give; no fit moves them any more.
 
     Parameters
     ----------
     effect
         The effect.
-    found
+    discrimination
         What its discriminator gave.
 
     """
-    return replace(effect, parameters=tuple(_known(p, found) for p in effect.parameters))
+    return replace(effect, parameters=tuple(_known(p, discrimination) for p in effect.parameters))
 
 
-def _known(p: Parameter, found: Discrimination) -> Parameter:
-    if p.name not in found.values or p.amplitude:
+def _known(p: Parameter, discrimination: Discrimination) -> Parameter:
+    if p.name not in discrimination.values or p.amplitude:
         return p
-    return replace(p, choice=True, scan=(1.0,), u=found.values[p.name][1])
+    return replace(p, choice=True, scan=(1.0,), u=discrimination.values[p.name][1])
 
 
 def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> LinearSystem:
@@ -129,17 +129,20 @@ def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> L
     """
     fit = system.fit
     effect = fit.effect(name)
-    found = discriminate(fit, effect)
-    if found is None or found.name not in (name, *sharing_discriminator(effect, library)):
+    discrimination = discriminate(fit, effect)
+    if discrimination is None or discrimination.name not in (
+        name,
+        *sharing_discriminator(effect, library),
+    ):
         return system
-    truth = settled(library[found.name], found)
+    truth = settled(library[discrimination.name], discrimination)
     effects = tuple(truth if e.name == name else e for e in fit.model.effects)
     model = replace(fit.model, effects=effects)
-    own = f"{name}."
+    prefix = f"{name}."
     values = fit.without(name).values | zero(truth, model)
     for p in truth.parameters_of(model.machine):
-        if own + p.name in fit.values:
-            values[f"{truth.name}.{p.name}"] = fit.values[own + p.name]
-    values |= {f"{truth.name}.{key}": value for key, (value, _) in found.values.items()}
+        if prefix + p.name in fit.values:
+            values[f"{truth.name}.{p.name}"] = fit.values[prefix + p.name]
+    values |= {f"{truth.name}.{key}": value for key, (value, _) in discrimination.values.items()}
     start = replace(fit, model=model, values=values).at({})
     return gauss_newton(start, before=system)

@@ -30,25 +30,25 @@ _WANDERS = ("v", "i", "torque")
 """Beginnings of the names of signals that drift: voltages, currents and torque."""
 
 
-def drifting_segments(fit: Fit, left: Sequence[Remainder]) -> tuple[Segment, ...] | None:
+def drifting_segments(fit: Fit, remainders: Sequence[Remainder]) -> tuple[Segment, ...] | None:
     """The segments, knowing the drift that their instruments may have.
 
     Parameters
     ----------
     fit
         Without drift.
-    left
+    remainders
         What it leaves over the floor.
 
     Returns
     -------
     tuple of Segment or None
-        None if a fit with that drift leaves anything large over the floor, or if what is `left` is
+        None if a fit with that drift leaves anything large over the floor, or if `remainders` are
         in captures of one test alone: instruments drift in every test, while a machine that warms
         up changes slowly in one.
 
     """
-    captures = {one.capture for one in left}
+    captures = {one.capture for one in remainders}
     tests = {segment.test for segment in fit.segments if segment.capture in captures}
     if len(tests) < fit.policy.selection.drift_tests:
         return None

@@ -27,8 +27,8 @@ from pipeline.criticism.selection.score_test import (
     Score,
     Standing,
     clears,
+    fall_below_floor,
     paid_for,
-    quiet_fall,
     searched,
     share_of,
 )
@@ -91,33 +91,35 @@ def with_starts(
         return tuple(scores)
     best = {score.candidate.effect.name: score for score in scores}
     thorough = wide.policy.selection.thorough
-    own = wide.along(wide.own)
-    before = Standing.of(own, np.arange(len(own.columns)), own.normal_equations().best(*thorough))
+    base = wide.along(wide.model_columns)
+    before = Standing.of(
+        base, np.arange(len(base.columns)), base.normal_equations().best(*thorough)
+    )
     penalty = searched(offered)
-    for end in _best_ends(own, offered):
-        name, score = end.trial.candidate.effect.name, _score(own, end, before, significant)
+    for end in _best_ends(base, offered):
+        name, score = end.trial.candidate.effect.name, _score(base, end, before, significant)
         known = best.get(name)
         if known is None or score.fall > known.fall:
             best[name] = replace(score, penalty=score.penalty + penalty)
     return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
 
 
-def _best_ends(own: LinearSystem, offered: Sequence[Candidate]) -> list[_End]:
+def _best_ends(base: LinearSystem, offered: Sequence[Candidate]) -> list[_End]:
     """The best trial of every parameter with starts: of these, then of finer ones beside it."""
-    machine, finer = own.fit.machine, own.policy.selection.finer_starts
+    machine, finer = base.fit.machine, base.policy.selection.finer_starts
     tried = [
         (c, p)
         for c in offered
-        if any(observes(segment, c.effect) for segment in own.segments)
+        if any(observes(segment, c.effect) for segment in base.segments)
         for p in c.effect.parameters_of(machine)
         if p.starts
     ]
     nearest = [
         _least(ends)
-        for ends in _ends(own, [[_Trial(*one, start) for start in one[1].starts] for one in tried])
+        for ends in _ends(base, [[_Trial(*one, start) for start in one[1].starts] for one in tried])
     ]
     beside = _ends(
-        own,
+        base,
         [[replace(e.trial, start=factor * e.trial.start) for factor in finer] for e in nearest],
     )
     return [_least([first, *more]) for first, more in zip(nearest, beside, strict=True)]
@@ -127,54 +129,56 @@ def _least(ends: Sequence[_End]) -> _End:
     return min(ends, key=lambda end: (end.descent.deviance, end.trial.start))
 
 
-def _ends(own: LinearSystem, trials: Sequence[Sequence[_Trial]]) -> list[list[_End]]:
+def _ends(base: LinearSystem, trials: Sequence[Sequence[_Trial]]) -> list[list[_End]]:
     """Where all else, refitted to first order, leaves every trial.
 
     The columns stay those of where no candidate is, and so does what rows are divided by.
     """
-    fit = own.fit
+    fit = base.fit
     each = [trial for some in trials for trial in some]
     asked = tuple((t.candidate.effect, t.values(fit.machine)) for t in each)
-    weights = [own.row_weight[own.segment == n] for n in range(len(own.segments))]
+    weights = [base.row_weight[base.segment == n] for n in range(len(base.segments))]
     arguments = [(fit.model, fit.values, asked, weight) for weight in weights]
-    parts = on_each(_trial_residuals, own.segments, arguments)
-    whole = np.tile(own.residual, (len(each), 1))
+    parts = on_each(_trial_residuals, base.segments, arguments)
+    whole = np.tile(base.residual, (len(each), 1))
     for number, part in enumerate(parts):
-        rows = np.flatnonzero(own.segment == number)
+        rows = np.flatnonzero(base.segment == number)
         for place, residual in part.items():
             whole[place, rows] = residual
-    thorough = own.policy.selection.thorough
+    thorough = base.policy.selection.thorough
     ends = iter(
         [
-            _End(trial, replace(own, residual=residual), known.best(*thorough))
+            _End(trial, replace(base, residual=residual), known.best(*thorough))
             for trial, residual, known in zip(
-                each, whole, own.normal_equations_of(whole), strict=True
+                each, whole, base.normal_equations_of(whole), strict=True
             )
         ]
     )
     return [[next(ends) for _ in some] for some in trials]
 
 
-def _score(own: LinearSystem, end: _End, before: Standing, significant: NDArray[np.bool_]) -> Score:
+def _score(
+    base: LinearSystem, end: _End, before: Standing, significant: NDArray[np.bool_]
+) -> Score:
     """The score of a trial, without what the search over candidates costs."""
-    trial, machine, policy = end.trial, own.fit.machine, own.policy.selection
+    trial, machine, policy = end.trial, base.fit.machine, base.policy.selection
     effect, parameter = trial.candidate.effect, trial.parameter
-    after = Standing.of(end.system, np.arange(len(own.columns)), end.descent)
-    found = Score(
+    after = Standing.of(end.system, np.arange(len(base.columns)), end.descent)
+    score = Score(
         trial.candidate,
         before.deviance - after.deviance,
         0.0,
         {trial.name: trial.start * machine.scale(parameter)},
-        dict(zip((c.name for c in own.columns), end.descent.step.tolist(), strict=True)),
-        share_of(own, effect, before, after),
+        dict(zip((c.name for c in base.columns), end.descent.step.tolist(), strict=True)),
+        share_of(base, effect, before, after),
         abs(trial.start) / parameter.negligible,
-        quiet_fall(own, before.reduced_chi2, after.reduced_chi2),
-        clears(own, significant, before.reduced_chi2, after.reduced_chi2),
+        fall_below_floor(base, before.reduced_chi2, after.reduced_chi2),
+        clears(base, significant, before.reduced_chi2, after.reduced_chi2),
         policy=policy,
     )
-    dof = paid_for(effect, machine, found)
+    dof = paid_for(effect, machine, score)
     search = 2.0 * math.log(len(parameter.starts) + len(policy.finer_starts))
-    return replace(found, penalty=dof * math.log(own.size) + search)
+    return replace(score, penalty=dof * math.log(base.size) + search)
 
 
 def _trial_residuals(

@@ -33,8 +33,8 @@ from pipeline.criticism.selection.score_test import (
     Score,
     Standing,
     clears,
+    fall_below_floor,
     paid_for,
-    quiet_fall,
     searched,
     share_of,
 )
@@ -66,7 +66,7 @@ def with_linear_start(
         The largest fall first.
 
     """
-    found = list(scores)
+    ranked = list(scores)
     for name, candidate in {c.effect.name: c for c in reversed(offered)}.items():
         form = candidate.effect.linear
         if form is None or not _misses(wide, significant, form.channel):
@@ -75,11 +75,11 @@ def with_linear_start(
         if started is None:
             continue
         started = replace(started, penalty=started.penalty + searched(offered))
-        others = [score for score in found if score.candidate.effect.name != name]
-        known = [score for score in found if score.candidate.effect.name == name]
+        others = [score for score in ranked if score.candidate.effect.name != name]
+        known = [score for score in ranked if score.candidate.effect.name == name]
         best = max([started, *known], key=lambda score: score.fall)
-        found = sorted([*others, best], key=lambda s: (-s.fall, s.candidate.effect.name))
-    return tuple(found)
+        ranked = sorted([*others, best], key=lambda s: (-s.fall, s.candidate.effect.name))
+    return tuple(ranked)
 
 
 def _misses(wide: LinearSystem, significant: NDArray[np.bool_], channel: str) -> bool:
@@ -105,21 +105,21 @@ def _scored(wide: LinearSystem, candidate: Candidate, form: LinearForm) -> Score
     end = _reweighted(near.fit, near.fit)
     base = _reweighted(wide.fit, end.fit)
     before, after = _standing(base), _standing(end)
-    own, first = f"{candidate.effect.name}.", candidate.effect.parameters_of(wide.fit.machine)[0]
-    values = {name: value for name, value in end.fit.values.items() if name.startswith(own)}
-    found = Score(
+    prefix, first = f"{candidate.effect.name}.", candidate.effect.parameters_of(wide.fit.machine)[0]
+    values = {name: value for name, value in end.fit.values.items() if name.startswith(prefix)}
+    score = Score(
         replace(candidate, values=values),
         before.deviance - after.deviance,
         0.0,
-        {f"{own}{first.name}": values[f"{own}{first.name}"]},
+        {f"{prefix}{first.name}": values[f"{prefix}{first.name}"]},
         {n: end.fit.values[n] - v for n, v in wide.fit.values.items()},
         share_of(base, candidate.effect, before, after),
-        values[f"{own}{first.name}"] / first.negligible,
-        quiet_fall(base, before.reduced_chi2, after.reduced_chi2),
+        values[f"{prefix}{first.name}"] / first.negligible,
+        fall_below_floor(base, before.reduced_chi2, after.reduced_chi2),
         policy=wide.policy.selection,
     )
-    dof = paid_for(candidate.effect, wide.fit.machine, found)
-    return replace(found, penalty=dof * math.log(wide.size))
+    dof = paid_for(candidate.effect, wide.fit.machine, score)
+    return replace(score, penalty=dof * math.log(wide.size))
 
 
 def _reweighted(fit: Fit, other: Fit) -> LinearSystem:
@@ -151,7 +151,7 @@ def _begun(fit: Fit, effect: Effect, form: LinearForm) -> Fit | None:
     system = linear_system(replace(fit, sigma=plain), columns)
     known, effort = system.normal_equations(), fit.policy.selection.thorough
     end = known.along(np.arange(len(system.columns))).best(*effort)
-    rigid = known.along(system.own).best(*effort)
+    rigid = known.along(system.model_columns).best(*effort)
     acting = np.array([channel == form.channel for _, channel, _ in system.labels])
     if not clears(system, acting, rigid.reduced_chi2, end.reduced_chi2):
         return None
@@ -161,5 +161,5 @@ def _begun(fit: Fit, effect: Effect, form: LinearForm) -> Fit | None:
     values = form.values(linear, moved, machine)
     if values is None:
         return None
-    own = {f"{effect.name}.{name}": value for name, value in values.items()}
-    return replace(fit, model=fit.model.with_effects(effect)).at({**moved, **own})
+    start = {f"{effect.name}.{name}": value for name, value in values.items()}
+    return replace(fit, model=fit.model.with_effects(effect)).at({**moved, **start})

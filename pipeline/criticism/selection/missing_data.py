@@ -35,14 +35,14 @@ def mixed(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     return (f"coasts left out: {setup_words(setups)}; {REMEDY}",) if setups else ()
 
 
-def unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
+def unused(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str, ...]:
     """A note of the captures that no equation could use, none where all are used.
 
     Parameters
     ----------
     campaign
         Captures of the motor.
-    found
+    cut_segments
         Segments made of them.
 
     Attributes
@@ -55,7 +55,7 @@ def unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
         Empty where all captures are used.
 
     """
-    used = {segment.capture for segment in found}
+    used = {segment.capture for segment in cut_segments}
     idle = [
         c.path for c in campaign.captures if c.path not in used and c.meta.test in known_tests()
     ]
@@ -92,12 +92,12 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     )
 
 
-def at_ambient(found: Sequence[Segment], model: Model) -> tuple[str, ...]:
+def at_ambient(cut_segments: Sequence[Segment], model: Model) -> tuple[str, ...]:
     """Notes of the captures in which a temperature that the model uses was not recorded.
 
     Parameters
     ----------
-    found
+    cut_segments
         The segments.
     model
         The model.
@@ -111,7 +111,7 @@ def at_ambient(found: Sequence[Segment], model: Model) -> tuple[str, ...]:
     notes = []
     for effect in model.effects:
         for name in (signal for signal in effect.signals if signal.startswith("temp_")):
-            warmed = (s for s in found if effect.hook in equation_of(s).use.warms)
+            warmed = (s for s in cut_segments if effect.hook in equation_of(s).use.warms)
             cold = {s.capture for s in warmed if name not in s.recorded}
             if cold:
                 where = ", ".join(sorted(cold))
@@ -147,15 +147,15 @@ def unexcited(
 
     """
     inside = {effect.name for effect in last.system.fit.model.effects}
-    least, found = last.system.policy.selection.visible_u, []
+    least, hidden = last.system.policy.selection.visible_u, []
     for name, effect in library.items():
         lacking = tuple(test for test in effect.tests if not _holds(campaign, effect, test))
         if name in inside or not lacking or lacking[0] != effect.tests[0]:
             continue
         if detectable(effect, last.system, offered) < least:
             signals = _missing(campaign, effect, lacking)
-            found.append(Unexcited(name, lacking, effect.experiment, signals))
-    return tuple(found)
+            hidden.append(Unexcited(name, lacking, effect.experiment, signals))
+    return tuple(hidden)
 
 
 def _holds(campaign: Campaign, effect: Evidence, test: str) -> bool:

@@ -64,12 +64,12 @@ def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None
     fit = tried.fit
     name = f"{fit.model.effects[-1].name}."
     known = fit.model.parameters()
-    own = [n for n, c in enumerate(tried.columns) if c.name.startswith(name)]
-    own = [n for n in own if known[tried.columns[n].name][1].amplitude]
-    others = np.setdiff1d(tried.own, own)
-    size = np.array([fit.values[tried.columns[n].name] for n in own])
+    columns = [n for n, c in enumerate(tried.columns) if c.name.startswith(name)]
+    columns = [n for n in columns if known[tried.columns[n].name][1].amplitude]
+    others = np.setdiff1d(tried.model_columns, columns)
+    size = np.array([fit.values[tried.columns[n].name] for n in columns])
     weight = np.sqrt(tried.weights(np.maximum(before, after)))
-    moved = weight * (tried.matrix[:, own] @ size)
+    moved = weight * (tried.matrix[:, columns] @ size)
     beside = tried.matrix[:, others] * weight[:, None]
     scale = np.maximum(np.sqrt((beside**2).sum(axis=0)), 1e-300)
     moved = moved - beside / scale @ np.linalg.lstsq(beside / scale, moved, rcond=1e-9)[0]
@@ -79,7 +79,7 @@ def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None
     was, now = (
         tried.counts * (np.log(np.maximum(q, 1.0)) + np.minimum(q, 1.0)) for q in (before, after)
     )
-    acts = np.bincount(tried.group, np.any(tried.matrix[:, own], axis=1), len(tried.labels)) > 0
+    acts = np.bincount(tried.group, np.any(tried.matrix[:, columns], axis=1), len(tried.labels)) > 0
     moved[~acts[tried.group]] = 0.0
     power = np.bincount(of_group[tried.group], moved**2, len(names))
     gain = np.bincount(of_group[acts], (was - now)[acts], len(names))

@@ -70,13 +70,13 @@ def orders_left(system: LinearSystem) -> tuple[float, ...]:
         if order not in log.looked_at
     ]
     lines.sort(key=lambda line: line[0])
-    found = []
+    orders = []
     for near in _clustered(lines, policy):
         logs = [log for _, log in near]
         if len({log.capture for log in logs}) >= policy.captures:
             order = _common(float(np.median([order for order, _ in near])), logs, policy)
-            found.append(int(order) if order.is_integer() else order)
-    return tuple(dict.fromkeys(found))
+            orders.append(int(order) if order.is_integer() else order)
+    return tuple(dict.fromkeys(orders))
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,9 +236,9 @@ def _logs(segment: Segment, system: LinearSystem) -> Iterator[Log]:
     if not rows:
         return
     fit, current = system.fit, segment.recorded["iq_a"]
-    left = residual(segment, fit.model, fit.values)
+    residuals = residual(segment, fit.model, fit.values)
     looked_at = frozenset(weak.orders.tolist())
-    for channel, one in zip(segment.channels, left, strict=True):
+    for channel, one in zip(segment.channels, residuals, strict=True):
         parts = tuple(Part(one[r], theta[r], weight[r], current[r]) for r in rows)
         whole = Part(one, theta, weight, current)
         least = material_size(segment, channel, fit)
@@ -283,8 +283,8 @@ def _lines(log: Log, policy: OrderScan) -> list[float]:
         return []
     grid = policy.step * np.arange(1, count + 1)
     power, beside = _spectrum(parts, count, policy)
-    found: list[float] = []
-    while len(found) < policy.most:
+    lines: list[float] = []
+    while len(lines) < policy.most:
         matters = (power > log.least**2) & (grid >= policy.lowest)
         best = int(np.argmax(np.where(matters, power / beside, 0.0).max(axis=0)))
         if not matters[:, best].any():
@@ -295,9 +295,9 @@ def _lines(log: Log, policy: OrderScan) -> list[float]:
         clear = np.where(matters[:, best], power[:, best] / beside[:, best], 0.0)
         if float(clear.max()) <= policy.stands_out:
             break
-        found.append(order)
+        lines.append(order)
         power = left
-    return found
+    return lines
 
 
 def _spectrum(parts: Sequence[Part], count: int, policy: OrderScan) -> tuple[Array, Array]:

@@ -88,8 +88,8 @@ def _unless_worth(
     amplitude would stay.
     """
     fit, effect = system.fit, system.fit.effect(name)
-    mine = effect.parameters_of(fit.machine)
-    if not any(p.amplitude and p.optional not in terms for p in mine):
+    parameters = effect.parameters_of(fit.machine)
+    if not any(p.amplitude and p.optional not in terms for p in parameters):
         return None
     tried = _without(system, effect, terms)
     worth = penalty * len(_parameters(fit, effect, terms))
@@ -98,19 +98,19 @@ def _unless_worth(
 
 def _parameters(fit: Fit, effect: Effect, terms: Sequence[int]) -> tuple[str, ...]:
     """Full names of the parameters of some terms."""
-    mine = effect.parameters_of(fit.model.machine)
-    return tuple(f"{effect.name}.{p.name}" for p in mine if p.optional in terms)
+    parameters = effect.parameters_of(fit.model.machine)
+    return tuple(f"{effect.name}.{p.name}" for p in parameters if p.optional in terms)
 
 
 def _spare(system: LinearSystem, effect: Effect, penalty: float) -> tuple[int, ...]:
     """The optional terms that do not pay to first order, the cheapest first."""
     parameters = effect.parameters_of(system.fit.machine)
-    left = sorted({p.optional for p in parameters} - {0})
+    removable = sorted({p.optional for p in parameters} - {0})
     known = system.normal_equations()
     gone: list[int] = []
     while True:
         costs = []
-        for term in left:
+        for term in removable:
             if any(p.amplitude and p.optional not in (*gone, term) for p in parameters):
                 names = _parameters(system.fit, effect, (*gone, term))
                 more = len(names) * penalty
@@ -119,15 +119,18 @@ def _spare(system: LinearSystem, effect: Effect, penalty: float) -> tuple[int, .
         if cheapest[0] >= 0.0:
             return tuple(gone)
         gone.append(cheapest[1])
-        left.remove(cheapest[1])
+        removable.remove(cheapest[1])
 
 
 def _loss(system: LinearSystem, known: NormalEquations, names: Sequence[str]) -> float:
     """Rise of deviance, to first order, when these parameters go to zero and the rest refits."""
-    own = system.own
-    out = np.array([n for n in own if system.columns[n].name in names], dtype=int)
+    model_columns = system.model_columns
+    out = np.array([n for n in model_columns if system.columns[n].name in names], dtype=int)
     move = np.array([-system.fit.values[system.columns[n].name] for n in out])
-    return known.moved(out, move).along(np.setdiff1d(own, out)).best().deviance - known.deviance()
+    return (
+        known.moved(out, move).along(np.setdiff1d(model_columns, out)).best().deviance
+        - known.deviance()
+    )
 
 
 def _doubtful(
@@ -152,6 +155,8 @@ def _without(system: LinearSystem, effect: Effect, terms: Sequence[int]) -> Line
     effects = tuple(less if e.name == effect.name else e for e in fit.model.effects)
     values = {name: v for name, v in fit.values.items() if name not in gone}
     start = replace(fit, model=replace(fit.model, effects=effects), values=values)
-    own = f"{effect.name}."
-    named = [replace(c, name=f"-{c.name}") if c.name.startswith(own) else c for c in system.columns]
+    prefix = f"{effect.name}."
+    named = [
+        replace(c, name=f"-{c.name}") if c.name.startswith(prefix) else c for c in system.columns
+    ]
     return gauss_newton(start, before=replace(system, columns=tuple(named)))

@@ -19,7 +19,7 @@ from pipeline.criticism.effect import Array, Effect, Machine, Parameter
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.selection import Selection
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.linear_system import LinearSystem, linear_system, own_columns
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system, model_columns
 from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.criticism.regression.normal_equations import Descent, NormalEquations, deviance_of
 
@@ -64,7 +64,7 @@ class Score:
         Part that it removes of the removable excess, of the channel that it helps most [1].
     size
         Largest of its amplitudes over its negligible size [1].
-    quiet
+    below_floor
         Part of the fall in signals that have nothing over their floor.
     clears
         Whether it removes most of what would be reported as a remainder, and so matters at any
@@ -83,7 +83,7 @@ class Score:
     moves: Mapping[str, float]
     share: float
     size: float
-    quiet: float = 0.0
+    below_floor: float = 0.0
     clears: bool = False
     confounder: str | None = None
     policy: Selection = field(kw_only=True)
@@ -109,7 +109,7 @@ class Score:
 
     @property
     def _below_floor(self) -> bool:
-        return self.quiet > self.policy.below_floor_penalties * self.penalty
+        return self.below_floor > self.policy.below_floor_penalties * self.penalty
 
     @property
     def shortfall(self) -> str:
@@ -176,7 +176,7 @@ def candidates(library: Mapping[str, Effect], model: Model) -> tuple[Candidate, 
 
     """
     inside = {effect.name for effect in model.effects}
-    found = []
+    candidates = []
     for effect in library.values():
         if effect.name in inside or not effect.gone_through(model.machine):
             continue
@@ -186,8 +186,8 @@ def candidates(library: Mapping[str, Effect], model: Model) -> tuple[Candidate, 
             columns = tuple(effect_columns(effect, model, at))
             start = zero(effect, model)
             start.update({f"{effect.name}.{name}": value for name, value in at})
-            found.append(Candidate(effect, columns, start))
-    return tuple(found)
+            candidates.append(Candidate(effect, columns, start))
+    return tuple(candidates)
 
 
 def widened(
@@ -222,9 +222,9 @@ def widened(
     """
     columns = [c for candidate in offered for c in candidate.columns]
     if before is not None:
-        own = {column.key for column in own_columns(fit.model)}
+        present = {column.key for column in model_columns(fit.model)}
         before = before.along(
-            np.array([n for n, c in enumerate(before.columns) if c.key not in own], dtype=int)
+            np.array([n for n, c in enumerate(before.columns) if c.key not in present], dtype=int)
         )
     return linear_system(fit, columns, before)
 
@@ -263,8 +263,8 @@ def score_all(
         known = best.get(candidate.effect.name)
         if score is not None and (known is None or score.fall > known[0].fall):
             best[candidate.effect.name] = replace(score, penalty=cost), places
-    found = [replace(one, confounder=by.confounder(one, best)) for one, _ in best.values()]
-    return tuple(sorted(found, key=lambda s: (-s.fall, s.candidate.effect.name)))
+    scores = [replace(one, confounder=by.confounder(one, best)) for one, _ in best.values()]
+    return tuple(sorted(scores, key=lambda s: (-s.fall, s.candidate.effect.name)))
 
 
 def placed(
@@ -285,7 +285,7 @@ def placed(
         Indices into `wide.columns`.
 
     """
-    first = wide.own.size
+    first = wide.model_columns.size
     for candidate in offered:
         yield candidate, np.arange(first, first + len(candidate.columns))
         first += len(candidate.columns)
@@ -342,16 +342,16 @@ class _Scoring:
 
     system: LinearSystem
     normal_equations: NormalEquations
-    own: NDArray[np.int64]
+    model_columns: NDArray[np.int64]
     before: Standing
     significant: NDArray[np.bool_]
 
     @classmethod
     def of(cls, system: LinearSystem, significant: NDArray[np.bool_] | None) -> _Scoring:
-        own, normal_equations = system.own, system.normal_equations()
-        before = Standing.of(system, own, normal_equations.along(own).best())
-        left = np.zeros(len(system.labels), dtype=bool) if significant is None else significant
-        return cls(system, normal_equations, own, before, left)
+        model_columns, normal_equations = system.model_columns, system.normal_equations()
+        before = Standing.of(system, model_columns, normal_equations.along(model_columns).best())
+        remaining = np.zeros(len(system.labels), dtype=bool) if significant is None else significant
+        return cls(system, normal_equations, model_columns, before, remaining)
 
     def score(
         self,
@@ -368,23 +368,25 @@ class _Scoring:
         if best is None:
             return None
         live, end = best
-        mine = dict(zip(self._names(live), end.step[self.own.size :].tolist(), strict=True))
+        step = dict(
+            zip(self._names(live), end.step[self.model_columns.size :].tolist(), strict=True)
+        )
         sizes = [
             abs(value) / (known[name].negligible * machine.scale(known[name]))
-            for name, value in mine.items()
+            for name, value in step.items()
             if known[name].negligible > 0
         ]
-        after = Standing.of(system, np.concatenate([self.own, live]), end)
-        names = self._names(self.own)
+        after = Standing.of(system, np.concatenate([self.model_columns, live]), end)
+        names = self._names(self.model_columns)
         return Score(
             candidate,
             self.before.deviance - after.deviance,
             0.0,
-            mine,
-            dict(zip(names, end.step[: self.own.size].tolist(), strict=True)),
+            step,
+            dict(zip(names, end.step[: self.model_columns.size].tolist(), strict=True)),
             share_of(system, candidate.effect, self.before, after),
             max(sizes, default=math.inf),
-            quiet_fall(system, self.before.reduced_chi2, after.reduced_chi2),
+            fall_below_floor(system, self.before.reduced_chi2, after.reduced_chi2),
             candidate.effect.discriminator is None
             and clears(system, self.significant, self.before.reduced_chi2, after.reduced_chi2),
             policy=system.policy.selection,
@@ -404,8 +406,12 @@ class _Scoring:
         """
         live = places
         while live.size:
-            end = self.normal_equations.along(np.concatenate([self.own, live])).best(*effort)
-            steps = zip(self._names(live), end.step[self.own.size :].tolist(), strict=True)
+            end = self.normal_equations.along(np.concatenate([self.model_columns, live])).best(
+                *effort
+            )
+            steps = zip(
+                self._names(live), end.step[self.model_columns.size :].tolist(), strict=True
+            )
             keep = np.array([not _outside(step, known[name]) for name, step in steps])
             if keep.all():
                 return live, end
@@ -434,9 +440,13 @@ class _Scoring:
             return None
         clearest, beside = max(small, key=lambda pair: pair[0].fall)
         thorough = self.system.policy.selection.thorough
-        _, mine = best[score.candidate.effect.name]
-        without = self.normal_equations.along(np.concatenate([self.own, beside])).best(*thorough)
-        both = self.normal_equations.along(np.concatenate([self.own, beside, mine])).best(*thorough)
+        _, shrunk = best[score.candidate.effect.name]
+        without = self.normal_equations.along(np.concatenate([self.model_columns, beside])).best(
+            *thorough
+        )
+        both = self.normal_equations.along(
+            np.concatenate([self.model_columns, beside, shrunk])
+        ).best(*thorough)
         worth = without.deviance - both.deviance > score.penalty
         return None if worth else clearest.candidate.effect.name
 
@@ -463,9 +473,9 @@ def clears(
         False where no group counts.
 
     """
-    over, left = (system.counts * np.maximum(q - 1.0, 0.0) for q in (before, after))
+    over, remaining = (system.counts * np.maximum(q - 1.0, 0.0) for q in (before, after))
     most = system.policy.selection.clears_share * float(over[significant].sum())
-    return bool(significant.any()) and float(left[significant].sum()) < most
+    return bool(significant.any()) and float(remaining[significant].sum()) < most
 
 
 def _outside(value: float, parameter: Parameter) -> bool:
@@ -501,7 +511,7 @@ def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Stan
     """
     policy = system.policy.selection
     excess = system.counts * np.log(np.maximum(before.reduced_chi2, 1.0))
-    left = system.counts * np.log(np.maximum(after.reduced_chi2, 1.0))
+    remaining = system.counts * np.log(np.maximum(after.reduced_chi2, 1.0))
     channel = np.array([name for _, name, _ in system.labels])
     places = [channel == name for name in dict.fromkeys(channel.tolist())]
     places.append(np.array([system.segments[n].test in effect.tests for n, _, _ in system.labels]))
@@ -509,13 +519,13 @@ def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Stan
     for place in places:
         had = float(excess[place].sum())
         if had > min(policy.excess, policy.excess_a_sample * float(system.counts[place].sum())):
-            shares.append(1.0 - float(left[place].sum()) / had)
+            shares.append(1.0 - float(remaining[place].sum()) / had)
     error = min(max(shares), power_share(system, before.reduced_chi2, after.reduced_chi2))
     cost = before.prior_cost
     return max(error, 1.0 - after.prior_cost / cost if cost > policy.excess else 0.0)
 
 
-def quiet_fall(system: LinearSystem, before: Array, after: Array) -> float:
+def fall_below_floor(system: LinearSystem, before: Array, after: Array) -> float:
     """Fall of the deviance in signals without an excess that counts.
 
     Parameters
@@ -531,11 +541,11 @@ def quiet_fall(system: LinearSystem, before: Array, after: Array) -> float:
     fall, policy = 0.0, system.policy.selection
     channel = np.array([name for _, name, _ in system.labels])
     for name in dict.fromkeys(channel.tolist()):
-        mine = channel == name
-        counts = system.counts[mine]
-        excess = float(counts @ np.log(np.maximum(before[mine], 1.0)))
+        in_channel = channel == name
+        counts = system.counts[in_channel]
+        excess = float(counts @ np.log(np.maximum(before[in_channel], 1.0)))
         if excess <= min(policy.excess, policy.excess_a_sample * float(counts.sum())):
-            fall += deviance_of(counts, before[mine]) - deviance_of(counts, after[mine])
+            fall += deviance_of(counts, before[in_channel]) - deviance_of(counts, after[in_channel])
     return fall
 
 

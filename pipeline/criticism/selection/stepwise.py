@@ -19,7 +19,7 @@ from pipeline.criticism.regression.goodness import (
     predicted_chi2,
     significant_groups,
 )
-from pipeline.criticism.regression.identifiability import surely_there
+from pipeline.criticism.regression.identifiability import significantly_nonzero
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.regression.normal_equations import NormalEquations
@@ -32,8 +32,8 @@ from pipeline.criticism.selection.score_test import (
     Score,
     candidates,
     clears,
+    fall_below_floor,
     power_share,
-    quiet_fall,
     score_all,
     widened,
 )
@@ -137,7 +137,7 @@ def _floored_anew(fit: Fit) -> Fit:
 
 
 def _chosen(
-    wide: LinearSystem, passing: Sequence[Score], found: Sequence[Effect]
+    wide: LinearSystem, passing: Sequence[Score], added: Sequence[Effect]
 ) -> LinearSystem | None:
     """The fit with the best candidate of the first few; of the next few, if none of these keeps its
     promise and is surely there.
@@ -147,7 +147,7 @@ def _chosen(
     policy = wide.policy.selection
     for first in range(0, min(len(passing), policy.refit_rounds * policy.refits), policy.refits):
         batch = list(passing[first : first + policy.refits])
-        while (best := _refit_best(wide, batch, found)) is not None:
+        while (best := _refit_best(wide, batch, added)) is not None:
             named = [effect.name for effect in best.fit.model.effects]
             finished = trimmed(gauss_newton(with_all_terms(best.fit), before=best), named)
             if _sure(linear_system(finished.fit)):
@@ -157,7 +157,7 @@ def _chosen(
 
 
 def _refit_best(
-    wide: LinearSystem, passing: Sequence[Score], found: Sequence[Effect]
+    wide: LinearSystem, passing: Sequence[Score], added: Sequence[Effect]
 ) -> LinearSystem | None:
     """Refits candidates that are close to the best fall of deviance; the best one that passes.
 
@@ -166,13 +166,13 @@ def _refit_best(
     1. it matters at its refitted size;
     2. the deviance falls by more than its penalty;
     3. predicted from all other captures, it falls by `held_out_penalties`, even if the forms of
-       effects `found` with the same hook are a little wrong (`form_error`);
+       effects `added` with the same hook are a little wrong (`form_error`);
     4. evidence below the floor does so even if any form found is wrong, and beside an effect of the
        same hook by `same_hook_penalties`, since what a form leaves there is of that size;
     5. so predicted, what it mends is more than what it spoils where it acts.
     """
     policy = wide.policy.selection
-    usual = _Rival.of(wide, found)
+    usual = _Baseline.of(wide, added)
     tests = {segment.test for segment in wide.segments}
     close = [s for s in passing if s.fall >= policy.close_share * passing[0].fall]
     best: LinearSystem | None = None
@@ -181,18 +181,22 @@ def _refit_best(
         effect = score.candidate.effect
         begun = _reweighted(wide, score)
         tried = _refitted(begun, score)
-        rival = usual if begun is wide else _Rival.of(gauss_newton(begun.fit, begun), found)
-        base = rival.wide
+        baseline = usual if begun is wide else _Baseline.of(gauss_newton(begun.fit, begun), added)
+        base = baseline.wide
         # of two that tie, the one that some capture here was made to show
         unsought = policy.tie if set(effect.tests).isdisjoint(tests) else 0.0
         cost = tried.deviance - base.deviance + score.penalty + unsought
-        if _matters(tried, base, rival.significant) and cost < least and rival.loses(tried, score):
+        if (
+            _matters(tried, base, baseline.significant)
+            and cost < least
+            and baseline.is_improved_by(tried, score)
+        ):
             best, least = tried, cost
     return best
 
 
 @dataclass(frozen=True, slots=True)
-class _Rival:
+class _Baseline:
     """The fit without a candidate, as the candidate is judged against it: with the effects `found`
     so far, what it predicts of captures held out, its `shrunk` floors and `doubts` of form [G].
     """
@@ -205,11 +209,11 @@ class _Rival:
     significant: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, wide: LinearSystem, found: Sequence[Effect]) -> _Rival:
+    def of(cls, wide: LinearSystem, added: Sequence[Effect]) -> _Baseline:
         held, significant = leave_out(wide), significant_groups(wide)
-        return cls(wide, found, held, _shrunk(wide), _doubt(wide, found), significant)
+        return cls(wide, added, held, _shrunk(wide), _doubt(wide, added), significant)
 
-    def loses(self, tried: LinearSystem, score: Score) -> bool:
+    def is_improved_by(self, tried: LinearSystem, score: Score) -> bool:
         """Whether a candidate predicts captures held out better, and mends more than it spoils."""
         wide, policy = self.wide, self.wide.policy.selection
         same_hook = _same_hook(score.candidate.effect, self.found)
@@ -272,36 +276,36 @@ def _sure(system: LinearSystem) -> bool:
     sense at a reversal, while its own size is not known at all.
     """
     effect = system.fit.model.effects[-1]
-    sure = surely_there(system, leave_out(system), system.policy.selection.least_u)
+    sure = significantly_nonzero(system, leave_out(system), system.policy.selection.least_u)
     known = effect.parameters_of(system.fit.machine)
-    there = [p for p in known if f"{effect.name}.{p.name}" in sure]
+    nonzero = [p for p in known if f"{effect.name}.{p.name}" in sure]
     twists = [p for p in known if p.negligible > 0 and not p.amplitude]
-    coupled = effect.discriminator is None or not twists or any(p in there for p in twists)
-    return coupled and any(p.amplitude for p in there)
+    coupled = effect.discriminator is None or not twists or any(p in nonzero for p in twists)
+    return coupled and any(p.amplitude for p in nonzero)
 
 
-def _same_hook(effect: Effect, found: Sequence[Effect]) -> list[Effect]:
+def _same_hook(effect: Effect, added: Sequence[Effect]) -> list[Effect]:
     """The found effects that act where an effect does: fluxes and drops in voltages, or drags."""
     voltage = ("flux", "drop")
     acts = voltage if effect.hook in voltage else (effect.hook,)
-    return [one for one in found if one.hook in acts and effect.hook != "sensor"]
+    return [one for one in added if one.hook in acts and effect.hook != "sensor"]
 
 
-def _doubt(wide: LinearSystem, found: Sequence[Effect]) -> Array:
+def _doubt(wide: LinearSystem, added: Sequence[Effect]) -> Array:
     """Factors [G] on χ²/n if the forms of these effects are wrong by a twentieth.
 
     Windage that only takes up what the formula of Stribeck friction leaves is not there.
     """
-    if not found:
+    if not added:
         return np.ones(len(wide.labels))
     model, values = wide.fit.model, wide.fit.values
     share = wide.policy.selection.form_error
-    wrong = np.concatenate([form_tolerance(s, model, values, found, share) for s in wide.segments])
+    wrong = np.concatenate([form_tolerance(s, model, values, added, share) for s in wide.segments])
     noise = np.bincount(wide.group, wide.row_weight**-2, len(wide.labels)) / np.maximum(
         wide.counts, 1.0
     )
-    left: Array = noise / np.maximum(noise + wrong**2, 1e-300)
-    return left
+    residual: Array = noise / np.maximum(noise + wrong**2, 1e-300)
+    return residual
 
 
 def _holds(
@@ -321,12 +325,17 @@ def _holds(
     """
     policy = wide.policy.selection
     same_hook, below = doubts
-    cost, left = (float(one.prior_costs().sum()) for one in (wide, tried))
-    fall = wide.deviance_of(same_hook * before) + cost - tried.deviance_of(same_hook * after) - left
-    priors = cost > policy.excess and left < (1.0 - policy.least_share) * cost
+    cost, after_cost = (float(one.prior_costs().sum()) for one in (wide, tried))
+    fall = (
+        wide.deviance_of(same_hook * before)
+        + cost
+        - tried.deviance_of(same_hook * after)
+        - after_cost
+    )
+    priors = cost > policy.excess and after_cost < (1.0 - policy.least_share) * cost
     helps = priors or power_share(wide, same_hook * before, same_hook * after) >= policy.least_share
-    quiet = min(quiet_fall(wide, some * before, some * after) for some in (1.0, below))
-    return fall > least[0] and (helps or quiet > least[1])
+    below_floor = min(fall_below_floor(wide, some * before, some * after) for some in (1.0, below))
+    return fall > least[0] and (helps or below_floor > least[1])
 
 
 def spoils(tried: LinearSystem, before: Array, after: Array) -> bool:
@@ -350,8 +359,8 @@ def spoils(tried: LinearSystem, before: Array, after: Array) -> bool:
 
     """
     name = f"{tried.fit.model.effects[-1].name}."
-    own = [n for n, column in enumerate(tried.columns) if column.name.startswith(name)]
-    acts = np.bincount(tried.group, np.any(tried.matrix[:, own], axis=1), len(tried.labels)) > 0
+    columns = [n for n, column in enumerate(tried.columns) if column.name.startswith(name)]
+    acts = np.bincount(tried.group, np.any(tried.matrix[:, columns], axis=1), len(tried.labels)) > 0
     change = np.maximum(after, 1.0) - np.maximum(before, 1.0)
     counts = acts & (np.abs(change) > tried.policy.selection.least_share * np.maximum(before, 1.0))
     return float((tried.counts * change)[counts].sum()) > 0.0
@@ -492,9 +501,9 @@ def loss_without(
 
     """
     gone = tuple(f"{name}." for name in names)
-    fit, own = system.fit, system.own
-    out = np.array([n for n in own if system.columns[n].name.startswith(gone)], dtype=int)
-    stay = np.setdiff1d(own, out)
+    fit, model_columns = system.fit, system.model_columns
+    out = np.array([n for n in model_columns if system.columns[n].name.startswith(gone)], dtype=int)
+    stay = np.setdiff1d(model_columns, out)
     if instead is not None:
         stay = np.concatenate([stay, instead])
     machine = fit.machine

@@ -51,10 +51,10 @@ def truncated(
     policy = steps[0].fit.policy.selection
     for count in range(len(steps), 0, -1):
         kept, system = tuple(steps[:count]), steps[count - 1].system
-        left = remainder(system)
+        remainders = remainder(system)
         most = (1.0 - policy.little_share) * held[count - 2].total
         worse = count > 2 and held[count - 1].total > most
-        if count == 1 or not left or (explained(kept, held, left) and not worse):
+        if count == 1 or not remainders or (explained(kept, held, remainders) and not worse):
             break
         if contradiction(steps[count - 1]):
             continue
@@ -62,9 +62,9 @@ def truncated(
             break
         if not worse and _clears_orders(steps[count - 2].system, system):
             break
-        if _clears_its_own(steps[count - 2 : count], held[count - 2 : count]):
+        if _clears_its_side(steps[count - 2 : count], held[count - 2 : count]):
             break
-    return kept, left
+    return kept, remainders
 
 
 def contradiction(step: LadderStep) -> str:
@@ -108,7 +108,7 @@ def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:
     return bool(_waved(before) - _waved(after))
 
 
-def _clears_its_own(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> bool:
+def _clears_its_side(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> bool:
     """Whether the newest effect of two steps takes most of the held-out power over the floor of its
     own side, winding or shaft, while the other side misses as well.
 
@@ -117,8 +117,12 @@ def _clears_its_own(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> boo
     """
     before, after = (step.system for step in steps)
     name = f"{after.fit.model.effects[-1].name}." if after.fit.model.effects else ""
-    own = [n for n, c in enumerate(after.columns[: after.own_count]) if c.name.startswith(name)]
-    out = np.isfinite(held[-1].residual) & np.any(after.matrix[:, own] != 0.0, axis=1)
+    columns = [
+        n
+        for n, c in enumerate(after.columns[: after.model_column_count])
+        if c.name.startswith(name)
+    ]
+    out = np.isfinite(held[-1].residual) & np.any(after.matrix[:, columns] != 0.0, axis=1)
     acts = np.bincount(after.group, out, len(after.labels))
     shaft = np.array([channel in SHAFT for _, channel, _ in after.labels])
     was, now = (
@@ -127,10 +131,10 @@ def _clears_its_own(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> boo
     )
     falls = [float((was - now)[(acts > 0) & side].sum()) for side in (shaft, ~shaft)]
     side = shaft if falls[0] >= falls[1] else ~shaft
-    mine = (acts > 0) & side
+    acting = (acts > 0) & side
     beside = bool(significant_groups(before)[~side].any())
     share = before.policy.selection.clears_share
-    return beside and float(now[mine].sum()) < share * float(was[mine].sum())
+    return beside and float(now[acting].sum()) < share * float(was[acting].sum())
 
 
 def _waved(system: LinearSystem) -> set[str]:
@@ -142,7 +146,7 @@ def _waved(system: LinearSystem) -> set[str]:
 
 
 def explained(
-    steps: Sequence[LadderStep], held: Sequence[HeldOut], left: Sequence[Remainder]
+    steps: Sequence[LadderStep], held: Sequence[HeldOut], remainders: Sequence[Remainder]
 ) -> bool:
     """Whether the effects found explain what is left over the floor.
 
@@ -152,7 +156,7 @@ def explained(
         Steps of the search.
     held
         Held-out residuals of each.
-    left
+    remainders
         What is over the floor at the end.
 
     Returns
@@ -172,19 +176,19 @@ def explained(
     policy = steps[0].fit.policy.selection
     first, last = (max(held[n].total ** 2 - 1.0, 0.0) for n in (0, len(steps) - 1))
     if last > policy.unexplained_share * first:
-        return not left
-    signals = sorted({r.signal for r in left})
+        return not remainders
+    signals = sorted({r.signal for r in remainders})
     before, after = (
         np.array([_excess(step, {name}) for name in signals]) for step in (steps[0], steps[-1])
     )
     large = before > policy.least_share * before.sum()
     taken = bool((after[large] <= (1.0 - policy.least_share) * before[large]).all())
     most = policy.unexplained_share * float(before.sum())
-    return not left or (taken and float(after.sum()) < most)
+    return not remainders or (taken and float(after.sum()) < most)
 
 
 def _excess(step: LadderStep, channels: set[str]) -> float:
     system = step.system
-    reduced_chi2 = system.normal_equations(system.own).best().reduced_chi2
+    reduced_chi2 = system.normal_equations(system.model_columns).best().reduced_chi2
     inside = np.array([channel in channels for _, channel, _ in system.labels])
     return float((system.counts * np.log(np.maximum(reduced_chi2, 1.0)))[inside].sum())

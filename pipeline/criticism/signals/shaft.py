@@ -155,8 +155,8 @@ def unexplained_acceleration(
     finer = x.theta_rad.size // segment.size
     torque = _averaged(torque_nm, finer) if finer > 1 else torque_nm
     acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
-    left: Array = (torque / values["j_kgm2"] - acceleration) / stretch**2
-    return left
+    unexplained: Array = (torque / values["j_kgm2"] - acceleration) / stretch**2
+    return unexplained
 
 
 def sensed_torque(
@@ -280,7 +280,7 @@ def _averaged(fine: Array, finer: int) -> Array:
     ramp = np.arange(finer) / finer**2
     cells = fine.reshape(-1, finer)
     # the part of each cell that counts for its own sample, and for the next one
-    own, after = cells @ (1.0 / finer - ramp), cells @ ramp
-    mean: Array = own.copy()
+    before, after = cells @ (1.0 / finer - ramp), cells @ ramp
+    mean: Array = before.copy()
     mean[1:] += after[:-1]
     return mean

@@ -75,13 +75,15 @@ def window_errors(system: LinearSystem, whitened: Array) -> tuple[Errors, ...]:
         Sorted by signal.
 
     """
-    found = system.segments
+    system_segments = system.segments
     parts: dict[str, list[tuple[int, NDArray[np.bool_]]]] = {}
     for place, (number, channel, order) in enumerate(system.labels):
-        mine = system.group == place
-        if order == 0 and found[number].weak is not None and mine.any():
-            parts.setdefault(reported_signal(found[number], channel), []).append((number, mine))
-    variables = [window_variables(segment) for segment in found]
+        in_group = system.group == place
+        if order == 0 and system_segments[number].weak is not None and in_group.any():
+            parts.setdefault(reported_signal(system_segments[number], channel), []).append(
+                (number, in_group)
+            )
+    variables = [window_variables(segment) for segment in system_segments]
     return tuple(
         _errors_of(signal, groups, variables, system, whitened)
         for signal, groups in sorted(parts.items())
@@ -98,9 +100,9 @@ def _errors_of(
     unit = np.concatenate([system.unit[mine] for _, mine in groups])
     noise_ratio = np.concatenate([system.noise_ratio[mine] for _, mine in groups])
 
-    def variable(name: str, number: int, mine: NDArray[np.bool_]) -> Array:
+    def variable(name: str, number: int, in_capture: NDArray[np.bool_]) -> Array:
         values = variables[number].get(name, np.full(system.segments[number].size, np.nan))
-        chosen: Array = values[system.window[mine]]
+        chosen: Array = values[system.window[in_capture]]
         return chosen
 
     names = sorted({name for number, _ in groups for name in variables[number]})
@@ -244,17 +246,17 @@ def _map(
     y: Bins | None,
 ) -> ErrorMap:
     shape = (x.count,) if y is None else (y.count, x.count)
-    found = cell_means(*errors, cell, visit, math.prod(shape))
+    cells = cell_means(*errors, cell, visit, math.prod(shape))
     return ErrorMap(
         signal,
         unit_of(signal),
         x,
         y,
-        found.count.reshape(shape),
-        found.mean.reshape(shape),
-        found.p_value.reshape(shape),
-        found.explained,
-        found.p_all,
+        cells.count.reshape(shape),
+        cells.mean.reshape(shape),
+        cells.p_value.reshape(shape),
+        cells.explained,
+        cells.p_all,
     )
 
 
@@ -329,7 +331,7 @@ def _by_angle(
     weak = segment.weak
     if weak is None:
         return
-    left = residual(segment, fit.model, fit.values)
+    residuals = residual(segment, fit.model, fit.values)
     theta = segment.recorded["theta_mech_rad"]
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(2, weak.length - 2)[None, :]
@@ -342,7 +344,7 @@ def _by_angle(
         "theta_mech_rad": theta,
     }
     for place, channel in enumerate(segment.channels):
-        inside = left[place][rows]
+        inside = residuals[place][rows]
         inside = inside - inside.mean(axis=1, keepdims=True)
         noise = float(np.sqrt((inside**2).mean())) or 1.0
         for variable, angle in turned.items():

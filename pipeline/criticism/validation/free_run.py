@@ -93,8 +93,8 @@ class Run:
             return error * floor
         axes, size, _ = np.linalg.svd((self.drift[signal] / floor).T, full_matrices=False)
         taken = axes @ ((1.0 - 1.0 / np.sqrt(1.0 + size**2)) * (axes.T @ error))
-        left: Array = (error - taken) * floor
-        return left
+        residual: Array = (error - taken) * floor
+        return residual
 
 
 def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
@@ -129,13 +129,13 @@ def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
     recorded = batch.segment.recorded
     jacobian = jacobian_of(batch)
     most = model.policy.validation.most_rounds
-    found, settled = settle(batch, jacobian, recorded, recorded, most)
+    path, settled = settle(batch, jacobian, recorded, recorded, most)
     if 2 * settled.sum() < batch.windows:
         return None
     names = ("id_a", "iq_a") * batch.currents + (SPEED,) * batch.shaft
     seen = {name: _signal(batch, recorded, name)[settled] for name in names}
-    made = {name: _signal(batch, found, name)[settled] for name in names}
-    moved = _Response(batch, found, jacobian, settled, names)
+    made = {name: _signal(batch, path, name)[settled] for name in names}
+    moved = _Response(batch, path, jacobian, settled, names)
     time = recorded.get("t_s", segment.ts_s * np.arange(batch.segment.size, dtype=np.float64))
     floor, drift = _floor(moved), _drift(moved)
     return Run(segment.capture, batch.inside(time)[settled], seen, made, floor, drift)

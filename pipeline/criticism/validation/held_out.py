@@ -177,7 +177,7 @@ def traces(fit: Fit, simulated: Sequence[Simulated]) -> Iterator[Trace]:
             yield _trace(segment, signal, "free_run", one.split, (run.t_s, recorded, made))
 
 
-def _equations(segment: Segment, fit: Fit, one: Simulated) -> Iterator[Trace]:
+def _equations(segment: Segment, fit: Fit, simulated: Simulated) -> Iterator[Trace]:
     """What the equations predict from the recorded state, averaged over a millisecond.
 
     Without the mean, the noise of the angle's second difference would cover the torque.
@@ -185,15 +185,15 @@ def _equations(segment: Segment, fit: Fit, one: Simulated) -> Iterator[Trace]:
     weak = segment.weak
     if weak is None:
         return
-    left = residual(segment, fit.model, one.values)
+    residuals = residual(segment, fit.model, simulated.values)
     width = max(2 * round(fit.policy.validation.look_s / segment.ts_s / 2) + 1, 1)
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(width // 2, weak.length, max(width // 2, 1))[None, :]
     for place, channel in enumerate(segment.channels):
         recorded = smoothed(segment.recorded[channel], width)[rows]
-        model = recorded - smoothed(left[place], width)[rows]
+        model = recorded - smoothed(residuals[place], width)[rows]
         time = segment.recorded["t_s"][rows]
-        yield _trace(segment, channel, "equation", one.split, (time, recorded, model))
+        yield _trace(segment, channel, "equation", simulated.split, (time, recorded, model))
 
 
 def _trace(

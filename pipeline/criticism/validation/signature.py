@@ -56,8 +56,8 @@ class _Curve:
     def contrast(self) -> float:
         """Rms change of the error over what is left and what noise makes of the means."""
         change = self.before - self.after
-        left = self.after**2 + self.noise**2
-        return math.sqrt(float(self.count @ change**2) / max(float(self.count @ left), 1e-300))
+        variance = self.after**2 + self.noise**2
+        return math.sqrt(float(self.count @ change**2) / max(float(self.count @ variance), 1e-300))
 
 
 def signature(
@@ -109,15 +109,15 @@ def _window_curves(steps: tuple[LadderStep, LadderStep]) -> Iterator[_Curve]:
         if after is None or after.error.size != before.error.size:
             continue
         for number in np.unique(before.segment).tolist():
-            mine = before.segment == number
-            yield from _of_capture(steps[0].system.segments[number], before, after, mine)
+            in_segment = before.segment == number
+            yield from _of_capture(steps[0].system.segments[number], before, after, in_segment)
 
 
 def _of_capture(
-    segment: Segment, before: Errors, after: Errors, mine: NDArray[np.bool_]
+    segment: Segment, before: Errors, after: Errors, in_capture: NDArray[np.bool_]
 ) -> Iterator[_Curve]:
-    sigma = before.sigma[mine]
-    for variable, value in _values(segment, before, mine).items():
+    sigma = before.sigma[in_capture]
+    for variable, value in _values(segment, before, in_capture).items():
         cell, at = _cells(variable, value)
         inside = cell >= 0
         count = np.bincount(cell[inside], minlength=at.size).astype(float)
@@ -140,20 +140,20 @@ def _of_capture(
             variable,
             segment.capture,
             at[seen],
-            mean(before.error[mine]),
-            mean(after.error[mine]),
+            mean(before.error[in_capture]),
+            mean(after.error[in_capture]),
             count[seen],
             np.sqrt(mean(sigma**2) / count[seen]),
         )
 
 
-def _values(segment: Segment, errors: Errors, mine: NDArray[np.bool_]) -> Mapping[str, Array]:
+def _values(segment: Segment, errors: Errors, in_capture: NDArray[np.bool_]) -> Mapping[str, Array]:
     """What a window's error may depend on [n]: means, and the angles at the window's middle."""
-    values = {name: errors.at[name][mine] for name in _VARIABLES if name in errors.at}
+    values = {name: errors.at[name][in_capture] for name in _VARIABLES if name in errors.at}
     theta = segment.recorded.get("theta_mech_rad")
     if theta is not None and segment.weak is not None and float(np.ptp(theta)) > TURN_RAD:
         middle = segment.weak.starts + segment.weak.length // 2
-        values["theta_mech_rad"] = np.mod(theta[middle][errors.window[mine]], TURN_RAD)
+        values["theta_mech_rad"] = np.mod(theta[middle][errors.window[in_capture]], TURN_RAD)
     return values
 
 
@@ -232,5 +232,5 @@ def _folded(curve: _Curve, cells: int) -> _Curve | None:
     return _Curve(curve.signal, curve.variable, None, at, before, after, count, noise, order)
 
 
-def _key(one: ErrorMap) -> tuple[str, str]:
-    return one.signal, one.x.variable
+def _key(error_map: ErrorMap) -> tuple[str, str]:
+    return error_map.signal, error_map.x.variable

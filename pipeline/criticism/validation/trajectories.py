@@ -254,12 +254,12 @@ def _defects(batch: Batch, signals: Mapping[str, Array]) -> tuple[Complex, Array
     x = operate(segment, signals, model, values)
     pieces = evaluate(model, x, values)
     recorded = measured(segment, signals, model, values)
-    left = recorded - predicted(segment, x, pieces, model, values)
+    defects = recorded - predicted(segment, x, pieces, model, values)
     if not batch.currents:
-        torque = -values["j_kgm2"] * batch.folded(left[0])
+        torque = -values["j_kgm2"] * batch.folded(defects[0])
         return np.zeros(torque.shape, dtype=complex), torque
-    voltage = batch.folded(left[0] + 1j * left[1])
-    torque = -batch.folded(left[2]) if batch.shaft else np.zeros(voltage.shape)
+    voltage = batch.folded(defects[0] + 1j * defects[1])
+    torque = -batch.folded(defects[2]) if batch.shaft else np.zeros(voltage.shape)
     if segment.instrument.timing == "held":
         return voltage, torque
     psi = batch.folded(pieces.psi_wb)
@@ -371,7 +371,7 @@ def _corrected(
         np.zeros((n_all, batch.windows)),
     )
     kick = period / batch.values["j_kgm2"]
-    calm = 1.0 / (1.0 + kick * jacobian.damping)
+    damped = 1.0 / (1.0 + kick * jacobian.damping)
     d, q = np.zeros(batch.windows), np.zeros(batch.windows)
     turn = np.zeros(batch.windows)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -379,7 +379,7 @@ def _corrected(
             if batch.shaft:
                 push = jacobian.pull[0, n] * d + jacobian.pull[1, n] * q - jacobian.spring[n] * turn
                 share = 0.5 if n == batch.pad else 1.0
-                speed = (speed + share * kick * (torque[n] + push)) * calm[n]
+                speed = (speed + share * kick * (torque[n] + push)) * damped[n]
                 turn = turn + period * speed
                 angle[n + 1] = turn
             if batch.currents:

@@ -68,7 +68,7 @@ def stepwise_bic(campaign: Campaign) -> Sequence[str] | None:
     matrix = np.vstack([wide.matrix, prior])
     target = np.concatenate([-wide.residual, np.zeros(prior.shape[0])])
     scale = np.linalg.norm(matrix, axis=0)
-    return _chosen(matrix / np.maximum(scale, 1e-300), target, wide.own, blocks)
+    return _chosen(matrix / np.maximum(scale, 1e-300), target, wide.model_columns, blocks)
 
 
 def _chosen(

@@ -13,10 +13,10 @@ from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import (
     HeldOut,
+    form_error_factor,
     in_common,
     leave_out,
     material_size,
-    misfit,
     over_floor,
     predicted_chi2,
     remainder,
@@ -47,7 +47,7 @@ def captures(levels: list[float], seed: int = 4) -> LinearSystem:
         prior_precision=np.zeros(1),
         prior_gradient=np.zeros(1),
         fit=Fit((log(),) * len(levels), Model(machine(), ()), {}, (), {}),
-        own_count=1,
+        model_column_count=1,
         made_at={},
     )
 
@@ -91,7 +91,7 @@ def test_a_column_that_one_capture_carries_predicts_nothing_better():
         matrix=np.column_stack([system.matrix, own]),
         prior_precision=np.zeros(2),
         prior_gradient=np.zeros(2),
-        own_count=2,
+        model_column_count=2,
     )
     alone = leave_out(system), leave_out(wider)
     assert alone[1].total < 0.9 * alone[0].total
@@ -122,7 +122,7 @@ def with_offsets(system: LinearSystem, u: float) -> LinearSystem:
         matrix=np.column_stack([system.matrix, -1.0 * ~last, -1.0 * last]),
         prior_precision=np.array([0.0, u**-2, u**-2]),
         prior_gradient=np.zeros(3),
-        own_count=3,
+        model_column_count=3,
     )
 
 
@@ -272,7 +272,7 @@ def bent_line(count):
         row_weight=np.ones(2 * count),
         prior_precision=np.zeros(2),
         prior_gradient=np.zeros(2),
-        own_count=2,
+        model_column_count=2,
     )
 
 
@@ -282,7 +282,7 @@ def test_a_form_that_misses_is_no_noise_that_windows_average_away():
     for count in (100, 3000):
         whole = bent_line(count)
         bare = known_by(whole, HeldOut(whole.residual, 1.0), np.ones(2))
-        sure = replace(bare, misfit=misfit(whole))
+        sure = replace(bare, form_error_factor=form_error_factor(whole))
         assert sure.u[1] == bare.u[1]
         power = np.sum(whole.matrix[:, 0] ** 2)
         left = np.sum(whole.residual[:count] ** 2)
@@ -295,4 +295,4 @@ def test_a_form_that_misses_is_no_noise_that_windows_average_away():
 
 def test_what_fits_to_its_floor_is_no_misfit():
     system = linear_system(fitted((log(noise=1.0),)))
-    assert not misfit(system).any()
+    assert not form_error_factor(system).any()

@@ -12,7 +12,7 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors
-from pipeline.criticism.regression.linear_system import _kept, linear_system, own_columns
+from pipeline.criticism.regression.linear_system import _kept, linear_system, model_columns
 from pipeline.criticism.regression.linearise import _Sampler, absorb, effect_columns, whitened_anew
 from pipeline.criticism.regression.noise_floors import offsets
 from pipeline.criticism.residuals.residual import operate, residual
@@ -52,7 +52,7 @@ def test_candidates_columns_survive_a_tolerance_of_form():
     doubted = replace(start, tolerance=wrong)
     kept, made = (linear_system(doubted, gain, b).matrix for b in (before, None))
     assert kept == pytest.approx(made, rel=1e-6, abs=1e-9 * np.abs(made).max())
-    names = [column.name for column in own_columns(PLAIN)]
+    names = [column.name for column in model_columns(PLAIN)]
     pair = kept[:, names.index("gain_torque")], kept[:, -1]
     assert pair[1] == pytest.approx(pair[0], rel=1e-6, abs=1e-9 * np.abs(pair[0]).max())
 

@@ -30,7 +30,7 @@ def system(moves, absorbed=False):
         fit=SimpleNamespace(model=model, values={"windage.drag_nm": 0.5}, policy=DEFAULT),
         columns=[SimpleNamespace(name=name) for name in names],
         matrix=np.column_stack([other, column / 0.5]),
-        own=np.arange(2),
+        model_columns=np.arange(2),
         group=group,
         labels=[(n, "torque_shaft_nm", 0) for n in range(4)],
         segments=[SimpleNamespace(capture=f"drive_{n}") for n in range(4)],

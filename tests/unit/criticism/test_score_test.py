@@ -11,7 +11,7 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.linear_system import LinearSystem, own_columns
+from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
 from pipeline.criticism.regression.linearise import effect_columns
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates, score_all, widened
 from pipeline.criticism.selection.stepwise import _floored_anew
@@ -29,20 +29,20 @@ from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, ma
         ),
         ({"share": 0.05}, "takes too small a share of what is over the noise floor"),
         ({"share": 0.5}, "refitted, it does not hold on captures held out, or may be zero"),
-        ({"quiet": 40.0}, "refitted, it does not hold on captures held out, or may be zero"),
+        ({"below_floor": 40.0}, "refitted, it does not hold on captures held out, or may be zero"),
         (
-            {"quiet": 40.0, "effect": "sample_delay"},
+            {"below_floor": 40.0, "effect": "sample_delay"},
             "what it would explain lies below the noise floor",
         ),
         (
-            {"quiet": 40.0, "effect": "compliance"},
+            {"below_floor": 40.0, "effect": "compliance"},
             "what it would explain lies below the noise floor",
         ),
     ],
 )
 def test_what_an_effect_lacks_is_said(what, told):
     effect = effects()[what.pop("effect", "windage")]
-    known = {"fall": 60.0, "share": 0.0, "size": 2.0, "quiet": 0.0, **what}
+    known = {"fall": 60.0, "share": 0.0, "size": 2.0, "below_floor": 0.0, **what}
     score = Score(
         Candidate(effect, ()), penalty=15.0, step={}, moves={}, policy=DEFAULT.selection, **known
     )
@@ -60,7 +60,7 @@ def test_a_fits_own_columns_are_made_where_it_stands():
     offered = candidates(LIBRARY, here.model)
     before = widened(away, offered)
     system, fresh = widened(here, offered, before), widened(here, offered)
-    own = len(own_columns(here.model))
+    own = len(model_columns(here.model))
     # how many columns are projected at a time is a matter of rounding on some processors
     off = np.abs(system.matrix[:, :own] - fresh.matrix[:, :own]).max(axis=0)
     assert (off <= 1e-13 * np.abs(fresh.matrix[:, :own]).max(axis=0)).all()
@@ -114,19 +114,19 @@ def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
     shape = np.concatenate([np.sqrt(2.0) * random.choice([-1.0, 1.0], 100), np.zeros(100)])
     noise = random.choice([-1.0, 1.0], 200)
     system = LinearSystem(
-        columns=(*own_columns(model), column),
+        columns=(*model_columns(model), column),
         residual=noise * np.repeat([1.0, np.sqrt(other)], 100) - shape,
-        matrix=np.column_stack([np.zeros((200, len(own_columns(model)))), shape / 0.1]),
+        matrix=np.column_stack([np.zeros((200, len(model_columns(model)))), shape / 0.1]),
         group=np.repeat([0, 1], 100),
         window=np.tile(np.arange(100), 2),
         unit=np.ones(200),
         noise_ratio=np.ones(200),
         row_weight=np.ones(200),
         labels=((0, "torque_shaft_nm", 0), (1, "torque_shaft_nm", 0)),
-        prior_precision=np.zeros(1 + len(own_columns(model))),
-        prior_gradient=np.zeros(1 + len(own_columns(model))),
+        prior_precision=np.zeros(1 + len(model_columns(model))),
+        prior_gradient=np.zeros(1 + len(model_columns(model))),
         fit=Fit((log(), log()), model, dict(BASE), (), BASE),
-        own_count=len(own_columns(model)),
+        model_column_count=len(model_columns(model)),
         made_at={},
     )
     (score,) = score_all(system, [Candidate(effect, (column,))])

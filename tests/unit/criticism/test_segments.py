@@ -167,7 +167,7 @@ def test_rounding_is_that_of_the_columns_a_segment_holds():
         "motion",
         "drive",
         1e-3,
-        found=turned,
+        recorded=turned,
         sensors=sensors,
         channels=("torque_shaft_nm",),
         weak=None,

@@ -14,7 +14,7 @@ from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
-from pipeline.criticism.regression.linear_system import LinearSystem, own_columns
+from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
 from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.search import Ladder, ladder_from
 from pipeline.criticism.selection.requested_model import BaseFit
@@ -28,9 +28,9 @@ from tests.unit.criticism.machines import BASE, fitted, log, machine, with_drag
 def missing_by(**reduced_chi2):
     """A rung around which signals have these χ²/n in a hundred samples each, and no columns."""
     model = Model(machine(), ())
-    none = np.zeros(len(own_columns(model)))
+    none = np.zeros(len(model_columns(model)))
     system = LinearSystem(
-        columns=tuple(own_columns(model)),
+        columns=tuple(model_columns(model)),
         residual=np.repeat(np.sqrt(list(reduced_chi2.values())), 100),
         matrix=np.zeros((100 * len(reduced_chi2), none.size)),
         group=np.repeat(np.arange(len(reduced_chi2)), 100),
@@ -42,7 +42,7 @@ def missing_by(**reduced_chi2):
         prior_precision=none,
         prior_gradient=none,
         fit=Fit((log(),) * 3, model, dict(BASE), (), BASE),
-        own_count=none.size,
+        model_column_count=none.size,
         made_at={},
     )
     return LadderStep((), system, ())
@@ -69,7 +69,7 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     skin = effects()["skin_effect"]
     first = missing_by(vq_v=1e4)
     model = first.fit.model.with_effects(skin)
-    columns = own_columns(model)
+    columns = model_columns(model)
     matrix = np.zeros((100, len(columns)))
     matrix[:, [c.name == "skin_effect.meter_rise" for c in columns]] = float(observed)
     found = {"rise": 0.5, "meter_rise": meter_rise, "inner": 0.0, "bend": 0.0}
@@ -77,7 +77,7 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     step = missing_by(vq_v=1e3)
     fit = Fit((log(),), model, values, (), BASE)
     system = replace(
-        step.system, columns=tuple(columns), matrix=matrix, fit=fit, own_count=len(columns)
+        step.system, columns=tuple(columns), matrix=matrix, fit=fit, model_column_count=len(columns)
     )
     second = LadderStep(("skin_effect",), system, ())
     over = (Remainder("one", "vq_v", 0, 9.0, 1.0),)
@@ -196,7 +196,7 @@ def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, s
         prior_precision=np.zeros(len(full)),
         prior_gradient=np.zeros(len(full)),
         fit=fit,
-        own_count=len(full),
+        model_column_count=len(full),
     )
     step = np.array([apart.get(key, 0.0) for key in values])
     held = HeldOut(plain.residual, 1.0, {0: step, 1: -step})
@@ -273,13 +273,13 @@ def test_a_misfit_of_the_voltage_is_no_evidence_against_a_friction(
     first = missing_by(vq_v=voltage, torque_shaft_nm=1e4)
     bump = effects()["stribeck"]
     model = first.fit.model.with_effects(bump)
-    columns = own_columns(model)
+    columns = model_columns(model)
     matrix = np.zeros((200, len(columns)))
     matrix[100:, [c.name.startswith("stribeck.") for c in columns]] = 1.0
     step = missing_by(vq_v=voltage, torque_shaft_nm=torque)
     fit = Fit((log(),), model, {**BASE, **zero(bump, model)}, (), BASE)
     system = replace(
-        step.system, columns=tuple(columns), matrix=matrix, fit=fit, own_count=len(columns)
+        step.system, columns=tuple(columns), matrix=matrix, fit=fit, model_column_count=len(columns)
     )
     steps = (first, LadderStep(("stribeck",), system, ()))
     over = (
