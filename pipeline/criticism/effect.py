@@ -663,13 +663,13 @@ class Evidence:
     """What shows an effect: `signals` are the capture columns without which it cannot be seen,
     `tests` those that excite it, the best first, and `experiment` the one to record.
 
-    `rivals`: other effects and the test or calibration that parts them from this.
+    `alternatives`: other effects, each with the test or calibration that discriminates it from this.
     """
 
     tests: tuple[str, ...]
     experiment: str
     signals: tuple[str, ...] = ()
-    rivals: Mapping[str, str] = field(default_factory=dict)
+    alternatives: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -57,7 +57,7 @@ class Doubt:
     """
 
     effect: str
-    rivals: str
+    alternatives: str
     tests: tuple[str, ...]
 
 

@@ -32,6 +32,6 @@ EFFECT = Effect(
         Parameter("sine2_rad", "rad", 0.001, 0.0002, low=-0.1, high=0.1, optional=1),
         Parameter("cosine2_rad", "rad", 0.001, 0.0002, low=-0.1, high=0.1, optional=1),
     ),
-    rivals={"unbalance": "a slow turn: an unbalance shows at rest, an encoder error not"},
+    alternatives={"unbalance": "a slow turn: an unbalance shows at rest, an encoder error not"},
     angle=_angle,
 )

@@ -20,6 +20,6 @@ EFFECT = Effect(
     headline="electrical angle off by {offset_rad}",
     reference="Pillay & Krishnan, IEEE Trans. Ind. Appl. 25 (1989), modelling of PM motor drives",
     parameters=(Parameter("offset_rad", "rad", 0.03, 0.001, low=-1.0, high=1.0),),
-    rivals={"sample_delay": "both rotation senses: a delay is even in speed, an angle odd"},
+    alternatives={"sample_delay": "both rotation senses: a delay is even in speed, an angle odd"},
     angle=_angle,
 )

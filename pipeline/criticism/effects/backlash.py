@@ -43,7 +43,7 @@ EFFECT = Effect(
         Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0, -1.0), choice=True),
     ),
     signals=("torque_shaft_nm",),
-    rivals={
+    alternatives={
         "compliance": "a drive log whose torque changes its sign: only a gap opens then",
         "presliding": "an angle on the load side: friction moves no far mass",
     },

@@ -50,7 +50,7 @@ EFFECT = Effect(
         ),
         Parameter("ripple_share", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
     ),
-    rivals={"cogging": "a slow turn without current"},
+    alternatives={"cogging": "a slow turn without current"},
     coenergy=_coenergy,
     torque=_torque,
 )

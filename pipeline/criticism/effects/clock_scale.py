@@ -37,7 +37,7 @@ EFFECT = Effect(
         ),
     ),
     signals=("t_s",),
-    rivals={
+    alternatives={
         "torque_scale": "steps of current with the rotor locked on the same clock",
         "voltage_scale": "resistance on the same voltmeter",
     },

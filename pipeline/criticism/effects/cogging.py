@@ -68,6 +68,9 @@ EFFECT = Effect(
     reference="Zhu & Howe, IEEE Trans. Energy Convers. 15 (2000), cogging torque",
     expand=_expand,
     signals=("theta_mech_rad",),
-    rivals={"bemf_harmonics": "a slow turn without current", "unbalance": "order 1 is no cogging"},
+    alternatives={
+        "bemf_harmonics": "a slow turn without current",
+        "unbalance": "order 1 is no cogging",
+    },
     torque=_torque,
 )

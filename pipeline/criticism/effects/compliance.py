@@ -37,7 +37,7 @@ EFFECT = Effect(
         Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0, -1.0), choice=True),
     ),
     signals=("torque_shaft_nm",),
-    rivals={
+    alternatives={
         "torque_lag": "an angle recorded on the load side: a lag of the sensor does not move it",
         "backlash": "a drive log whose torque changes its sign: only a gap opens then",
     },

@@ -33,7 +33,7 @@ EFFECT = Effect(
             words="1: it acts on the motor's side of the transducer, 0: beyond it",
         ),
     ),
-    rivals={
+    alternatives={
         "direction_friction": "several speeds in both senses, and a hold at rest: a load stays",
         "torque_offset": "the transducer read with the load taken off",
     },

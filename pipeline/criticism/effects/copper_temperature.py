@@ -23,6 +23,6 @@ EFFECT = Effect(
         Parameter("alpha_1_k", "1/K", 0.0039, 2e-4, low=-0.001, high=0.01, usual=(0.003854, 1e-4)),
     ),
     signals=("temp_winding_degc",),
-    rivals={"skin_effect": "a heat run at standstill has no speed in it"},
+    alternatives={"skin_effect": "a heat run at standstill has no speed in it"},
     drop=_drop,
 )

@@ -21,7 +21,7 @@ EFFECT = Effect(
     headline="dry friction of {torque_nm}",
     reference="Armstrong-Hélouvry, Dupont & Canudas de Wit, Automatica 30 (1994)",
     parameters=(Parameter("torque_nm", "N·m", 0.01, 0.0005, "torque_nm", low=0.0, high=1.0),),
-    rivals={
+    alternatives={
         "iron_hysteresis": "an open-circuit comparison against a rotor without magnet",
         "torque_offset": "both rotation senses",
     },

@@ -31,6 +31,6 @@ EFFECT = Effect(
         Parameter("d_bend", "1", 0.5, 0.0, low=0.0, high=100.0, scan=(1.0,), optional=4),
     ),
     signals=("id_a", "iq_a"),
-    rivals={"saturation": "a torque map with both currents changed one at a time"},
+    alternatives={"saturation": "a torque map with both currents changed one at a time"},
     coenergy=_coenergy,
 )

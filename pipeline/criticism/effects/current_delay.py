@@ -43,7 +43,7 @@ EFFECT = Effect(
         ),
     ),
     signals=("id_a", "iq_a"),
-    rivals={
+    alternatives={
         "skin_effect": "current steps at standstill",
         "sample_delay": "the back-EMF alone: a late current leaves it in place",
     },

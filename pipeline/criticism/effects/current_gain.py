@@ -39,6 +39,6 @@ EFFECT = Effect(
         Parameter("bench", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
     ),
     signals=("id_a", "iq_a"),
-    rivals={"phase_imbalance": "resistance through all three terminal pairs"},
+    alternatives={"phase_imbalance": "resistance through all three terminal pairs"},
     current=_current,
 )

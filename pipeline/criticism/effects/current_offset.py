@@ -28,6 +28,6 @@ EFFECT = Effect(
         Parameter("beta_a", "A", 0.01, 0.0005, "current_a", low=-0.3, high=0.3),
     ),
     signals=("id_a", "iq_a"),
-    rivals={},
+    alternatives={},
     current=_current,
 )

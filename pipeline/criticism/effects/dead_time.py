@@ -55,6 +55,6 @@ EFFECT = Effect(
         Parameter("lag_s", "s", 0.25, 0.0, "period_s", low=-1.0, high=1.0, scan=(0.0,)),
     ),
     signals=("vd_v", "vq_v"),
-    rivals={"copper_temperature": "several currents: dead time does not grow with current"},
+    alternatives={"copper_temperature": "several currents: dead time does not grow with current"},
     drop=_drop,
 )

@@ -26,7 +26,7 @@ EFFECT = Effect(
         Parameter("coulomb_nm", "N·m", 0.01, 0.0005, "torque_nm", low=-0.5, high=0.5),
         Parameter("viscous_nm", "N·m", 0.01, 0.0005, "torque_nm", low=-0.5, high=0.5),
     ),
-    rivals={
+    alternatives={
         "constant_load": "several speeds in both senses, and a hold at rest: a load stays",
         "torque_offset": "coasts in both senses, which no transducer sees",
     },

@@ -57,7 +57,7 @@ EFFECT = Effect(
         Parameter("ripple_share", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
     ),
     signals=("id_a", "iq_a"),
-    rivals={"bemf_harmonics": "an open-circuit spin", "dead_time": "two speeds"},
+    alternatives={"bemf_harmonics": "an open-circuit spin", "dead_time": "two speeds"},
     coenergy=_coenergy,
     torque=_torque,
 )

@@ -37,7 +37,7 @@ EFFECT = Effect(
         PARALLEL,
     ),
     signals=("torque_shaft_nm",),
-    rivals={
+    alternatives={
         "windage": "a wider speed range",
         "load_dependent_friction": "d current without torque: it changes the flux only",
     },

@@ -34,7 +34,7 @@ EFFECT = Effect(
         PARALLEL,
     ),
     signals=("torque_shaft_nm",),
-    rivals={
+    alternatives={
         "coulomb_friction": "an open-circuit comparison against a rotor without magnet",
         "load_dependent_friction": "d current without torque: it changes the flux only",
     },

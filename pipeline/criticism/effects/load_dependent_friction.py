@@ -22,6 +22,6 @@ EFFECT = Effect(
     reference="Duclusaud et al. (2024), extended friction models M1-M6 for servo actuators",
     parameters=(Parameter("share", "1", 0.02, 0.001, low=0.0, high=0.5),),
     signals=("torque_shaft_nm",),
-    rivals={"torque_scale": "motoring and braking: a gain changes sign with torque"},
+    alternatives={"torque_scale": "motoring and braking: a gain changes sign with torque"},
     torque=_torque,
 )

@@ -25,6 +25,8 @@ EFFECT = Effect(
         Parameter("cosine", "1", 0.01, 0.001, low=-0.3, high=0.3),
         Parameter("sine", "1", 0.01, 0.001, low=-0.3, high=0.3),
     ),
-    rivals={"current_gain": "the back-EMF terms: a gain error grows with speed, a resistance not"},
+    alternatives={
+        "current_gain": "the back-EMF terms: a gain error grows with speed, a resistance not"
+    },
     drop=_drop,
 )

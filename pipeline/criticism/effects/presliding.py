@@ -44,6 +44,6 @@ EFFECT = Effect(
             "travel_rad", "rad", 0.001, 0.0001, low=1e-5, high=0.1, scan=(0.0003, 0.003, 0.03)
         ),
     ),
-    rivals={"stribeck": "a spin-down: it has no reversal"},
+    alternatives={"stribeck": "a spin-down: it has no reversal"},
     torque=_torque,
 )

@@ -57,7 +57,7 @@ EFFECT = Effect(
         ),
     ),
     signals=("vd_v", "vq_v"),
-    rivals={
+    alternatives={
         "angle_offset": "both rotation senses: a delay is even in speed, an angle odd",
         "current_delay": "current steps at standstill",
     },

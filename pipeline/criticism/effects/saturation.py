@@ -47,7 +47,7 @@ EFFECT = Effect(
         Parameter("d_bend", "1", 0.5, 0.0, low=0.0, high=100.0, scan=(1.0,), optional=5),
     ),
     signals=("id_a", "iq_a"),
-    rivals={
+    alternatives={
         "cross_saturation": "a torque map with both currents changed one at a time",
         "inductance_harmonics": "a slow turn under current",
     },

@@ -90,7 +90,7 @@ EFFECT = Effect(
         Parameter("bend", "1", 0.3, 0.0, low=0.0, high=11.0, scan=(0.0, 1.0)),
     ),
     signals=("vd_v", "vq_v"),
-    rivals={"current_delay": "current steps at standstill and at speed"},
+    alternatives={"current_delay": "current steps at standstill and at speed"},
     coenergy=_coenergy,
     drop=_drop,
 )

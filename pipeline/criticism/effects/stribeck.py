@@ -42,6 +42,6 @@ EFFECT = Effect(
         Parameter("exponent", "1", 2.0, 0.0, low=0.3, high=4.0, scan=(2.0,)),
         Parameter("tail", "1", 0.5, 0.0, low=0.0, high=1.0, scan=(0.0,), optional=1),
     ),
-    rivals={"presliding": "a reversal slow enough to see the angle within a milliradian"},
+    alternatives={"presliding": "a reversal slow enough to see the angle within a milliradian"},
     torque=_torque,
 )

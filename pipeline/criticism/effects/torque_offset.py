@@ -19,6 +19,6 @@ EFFECT = Effect(
     reference="IEEE 1812-2014, 5: dynamometer tests of permanent magnet machines",
     parameters=(Parameter("offset_nm", "N·m", 0.01, 0.0005, "torque_nm", low=-0.5, high=0.5),),
     signals=("torque_shaft_nm",),
-    rivals={"coulomb_friction": "both rotation senses"},
+    alternatives={"coulomb_friction": "both rotation senses"},
     shaft=_shaft,
 )

@@ -19,7 +19,7 @@ EFFECT = Effect(
     reference="IEEE 1812-2014, 5: dynamometer tests of permanent magnet machines",
     parameters=(Parameter("gain", "1", 0.02, 0.006, low=-0.5, high=0.5),),
     signals=("torque_shaft_nm",),
-    rivals={
+    alternatives={
         "current_scale": "resistance known to 0.2 % from a four-wire meter",
         "voltage_scale": "magnet flux known to 0.2 % from a calibrated voltmeter",
     },

@@ -24,6 +24,8 @@ EFFECT = Effect(
         Parameter("sin_nm", "N·m", 0.01, 0.0002, "torque_nm", low=-1.0, high=1.0, order=1.0),
         Parameter("cos_nm", "N·m", 0.01, 0.0002, "torque_nm", low=-1.0, high=1.0, order=1.0),
     ),
-    rivals={"angle_eccentricity": "a slow turn: an encoder error makes no torque at zero current"},
+    alternatives={
+        "angle_eccentricity": "a slow turn: an encoder error makes no torque at zero current"
+    },
     torque=_torque,
 )

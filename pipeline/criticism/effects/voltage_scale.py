@@ -22,7 +22,7 @@ EFFECT = Effect(
         Parameter("of_drive", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
         Parameter("of_bench", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
     ),
-    rivals={
+    alternatives={
         "current_scale": "resistance known to 0.2 % from a four-wire meter",
         "torque_scale": "magnet flux known to 0.2 % from a calibrated voltmeter",
     },

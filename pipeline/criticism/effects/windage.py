@@ -22,6 +22,6 @@ EFFECT = Effect(
     headline="air drag of {drag_nm} at the highest speed",
     reference="Vrancik, NASA TN D-4849 (1968), windage power loss in alternators",
     parameters=(Parameter("drag_nm", "N·m", 0.01, 0.0005, "torque_nm", low=0.0, high=1.0),),
-    rivals={"iron_eddy": "a wider speed range"},
+    alternatives={"iron_eddy": "a wider speed range"},
     torque=_torque,
 )

@@ -129,8 +129,8 @@ def remedies(
 
     """
     return {
-        other: effect.rivals.get(other)
-        or library[other].rivals.get(effect.name)
+        other: effect.alternatives.get(other)
+        or library[other].alternatives.get(effect.name)
         or library[other].experiment
         for other in confused
     }

@@ -32,7 +32,7 @@ def rung_markdown(result: Diagnosis, place: int) -> str:
         lines += ["", f"**{result.verdict}**: {plain(view.headline)}"]
         for doubt in view.doubts:
             alternatives = (
-                f"{doubt.effect} could as well be {doubt.rivals}: {'; '.join(doubt.tests)}"
+                f"{doubt.effect} could as well be {doubt.alternatives}: {'; '.join(doubt.tests)}"
             )
             lines += ["", plain(alternatives)]
         if result.unknown is not None:

@@ -17,7 +17,7 @@ def ladder_text(result: Diagnosis) -> str:
         change = f", {rung.change}" if rung.change else ""
         text_lines.append(f"  {rung.title}: held-out error {rung.held_out} noise floors{change}")
     for doubt in view.doubts:
-        text_lines.append(f"  {doubt.effect} could as well be {doubt.rivals}")
+        text_lines.append(f"  {doubt.effect} could as well be {doubt.alternatives}")
         text_lines += [f"    {test}" for test in doubt.tests]
     text_lines += [f"  {text}" for text in view.slight]
     if (unknown := result.unknown) is not None:

@@ -34,7 +34,7 @@ def test_an_effect_says_what_the_contract_asks_of_it(name):
     assert set(effect.tests) <= set(TESTS)
     assert set(effect.signals) <= set(COLUMNS)
     known = {*LIBRARY, "backlash"}
-    assert set(effect.rivals) <= known
+    assert set(effect.alternatives) <= known
     assert effect.parameters_of(machine())
     for p in effect.parameters_of(machine()):
         assert p.unit and p.typical > 0 and p.low < p.high

@@ -62,7 +62,7 @@ def test_the_commands_name_folder_motor_and_all_effects() -> None:
 
 def test_a_doubt_names_rivals_and_the_test_that_tells_with_its_power() -> None:
     (doubt,) = ladder_view(make_diagnosis()).doubts
-    assert (doubt.effect, doubt.rivals) == ("dead_time", "phase_imbalance")
+    assert (doubt.effect, doubt.alternatives) == ("dead_time", "phase_imbalance")
     assert doubt.tests == ("low-speed current steps",)
     apart = (Separation("phase_imbalance", "slow steps", 0.97), Separation("x", "y", None))
     told = replace(make_diagnosis().ranking[0], separation=apart)
