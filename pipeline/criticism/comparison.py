@@ -60,8 +60,8 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     -------
     Comparison
         An error marked `held_out` is of a capture predicted from all the others; `fit` marks a
-        capture that alone carries a constant. Without errors, and with a note, where no capture can
-        be used.
+        capture that alone determines a constant. Without errors, and with a note, where no capture
+        can be used.
 
     Raises
     ------

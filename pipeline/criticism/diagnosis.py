@@ -64,7 +64,7 @@ _ALONE = (
     "{} rests on {} alone: predicted from the others, the other captures that it moves do not gain "
     "with it; record that test once more"
 )
-_AGAINST = "captures speak against it: see the note"
+_AGAINST = "captures contradict it: see the note"
 _GUESS = "takes some of what is left, but too little to be named beside what nothing explains"
 
 
@@ -208,7 +208,7 @@ def _records(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> tuple[Ladd
 
 
 def _rests_on_one(ladder: Ladder) -> Iterator[str]:
-    """Notes of the effects that one capture alone asks for, of those that others could show."""
+    """Notes of the effects that one capture alone supports, of those that others could show."""
     for n in range(1, len(ladder.steps)):
         step = ladder.steps[n]
         capture = rests_on((ladder.steps[n - 1].system, step.system), ladder.held[n - 1 : n + 1])
@@ -317,7 +317,8 @@ def _found(
 
 def _loss(last: LinearSystem, effect: Effect, dof: int) -> float:
     """Rise of deviance without a found effect: to first order, or of a refit where that says that
-    the effect is not worth its parameters. Along a bent valley the tangent knows little.
+    the effect is not worth its parameters. The linear step says little where parameters are
+    strongly correlated.
     """
     loss = loss_without(last, (effect.name,))
     if loss > dof * math.log(last.size):

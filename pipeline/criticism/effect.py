@@ -40,7 +40,7 @@ class Parameter:
     typical
         Magnitude that is seen on real benches [scales].
     negligible
-        Magnitude that nobody would act on [scales]; with a shape parameter below it the effect is
+        Magnitude that is negligible in use [scales]; with a shape parameter below it the effect is
         absent.
     scale
         Entry of `Machine.scales`, such as `torque_nm`; `1` for the unit itself.
@@ -663,7 +663,8 @@ class Evidence:
     """What shows an effect: `signals` are the capture columns without which it cannot be seen,
     `tests` those that excite it, the best first, and `experiment` the one to record.
 
-    `alternatives`: other effects, each with the test or calibration that discriminates it from this.
+    `alternatives`: other effects, each with the test or calibration that discriminates it from
+    this.
     """
 
     tests: tuple[str, ...]

@@ -255,7 +255,7 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
 def _confirmed(
     steps: Sequence[LadderStep], alone: Sequence[HeldOut]
 ) -> tuple[tuple[LadderStep, ...], dict[str, str]]:
-    """The steps without trailing ones that one capture alone asks for, of which others show that
+    """The steps without trailing ones that one capture alone supports, of which others show that
     it is not there; and a note of each that goes.
     """
     count, notes = len(steps), {}

@@ -28,7 +28,7 @@ def set_levels(current: Array, policy: Tables) -> NDArray[np.int64]:
 
     Notes
     -----
-    The rows are parted as finely as leaves three rows a level on average, and levels further from
+    The rows are split as finely as leaves three rows a level on average, and levels further from
     each other than twice the width of the widest.
 
     """
@@ -46,7 +46,7 @@ def set_levels(current: Array, policy: Tables) -> NDArray[np.int64]:
 
 
 def levels_of(current: Array, least: float = 0.0) -> NDArray[np.int64]:
-    """The level that each current is at; levels are parted by a gap between them.
+    """The level that each current is at; levels are separated by a gap between them.
 
     Parameters
     ----------

@@ -272,7 +272,7 @@ def _nodes(variable: Variable, policy: Discovery) -> Array:
 
 def _cardinal(knots: Array, at: Array) -> Array:
     """Natural cubic splines [N, K] that are one at a knot and zero at the others."""
-    from scipy.interpolate import CubicSpline  # dear to import, and seldom asked for
+    from scipy.interpolate import CubicSpline  # slow to import and rarely used
 
     spline = CubicSpline(knots, np.eye(knots.size), bc_type="natural")
     curves: Array = spline(np.clip(at, knots[0], knots[-1]))

@@ -395,7 +395,7 @@ def _refined(pursuit: Pursuit, groups: Sequence[Group]) -> list[Group]:
         return -pursuit._fall(curves) / size
 
     reach = pursuit.policy.refining_reach
-    from scipy.optimize import minimize  # dear to import, and seldom asked for
+    from scipy.optimize import minimize  # slow to import and rarely used
 
     size = max(abs(pursuit._fall(pursuit.curves([t for g in groups for t in g]))), 1e-300)
     solution = minimize(
@@ -504,7 +504,7 @@ def curve_about(
 
     Notes
     -----
-    A smooth curve of what the expression leaves is added, so that the data speak where the
+    A smooth curve of what the expression leaves is added, so that the data decide where the
     expression is wrong. The model's own constants stay where the expression put them, since else a
     curve and a constant of one shape cannot be separated.
 

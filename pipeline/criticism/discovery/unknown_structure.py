@@ -176,7 +176,8 @@ def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fit: Fit) -> Arra
 def _simplest(candidates: Sequence[Found], policy: Policy) -> Found:
     """Of the ports that do about as well as the best, the one of fewest variables.
 
-    Of several that no evidence parts it is the one listed first, the commonest in machines.
+    Of several that the data do not discriminate it is the one listed first, the commonest in
+    machines.
     """
     tie = policy.selection.tie
     enough = candidates[0].held - max(tie, policy.discovery.near_share * candidates[0].held)
@@ -202,8 +203,9 @@ def _units(
     """For every row [R] the number of what is held out together: a capture, or a part of one of the
     segments in `missed`; -1 for rows that are always in the fit.
 
-    Always in the fit is what alone carries a constant. With parts it is also every other capture,
-    which has nothing to predict, and the first and last part: no curve is known beyond its ends.
+    Always in the fit is what alone determines a constant. With parts it is also every other
+    capture, which has nothing to predict, and the first and last part: no curve is known beyond its
+    ends.
     """
     segment = system.segment
     units = segment.astype(np.int64)

@@ -319,8 +319,8 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
     Returns
     -------
     Discrimination or None
-        A gap if it is surely there, and wider than the spring's twist at the torque passed on; a
-        spring if such a gap is surely not there; else None. Surely is `sure_u` standard
+        A gap if it is significant, and wider than the spring's twist at the torque passed on; a
+        spring if such a gap is excluded; else None. The limit is `sure_u` standard
         uncertainties.
 
     """

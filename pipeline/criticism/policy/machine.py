@@ -16,7 +16,7 @@ class Torsion:
         why="what a gap does is short",
     )  # fmt: skip
     torque_u: float = chosen(
-        5.0, "standard deviations of noise", "torque that surely is one",
+        5.0, "standard deviations of noise", "torque that is certainly one",
         why="lower, and blocks in which the gap is open count as closed",
     )  # fmt: skip
     noise_share: float = chosen(

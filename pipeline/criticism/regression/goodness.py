@@ -36,7 +36,7 @@ class HeldOut:
     Attributes
     ----------
     residual
-        [R]; NaN in a capture that alone carries a constant, and so is always in the fit.
+        [R]; NaN in a capture that alone determines a constant, and so is always in the fit.
     total
         Rms of the others over what may be expected of a prediction [1]; of the fit itself where
         there are none.
@@ -117,8 +117,8 @@ def leave_out(system: LinearSystem) -> HeldOut:
     Returns
     -------
     HeldOut
-        Of segments that are parted in blocks, every block is predicted from all else. A capture
-        that alone carries a constant stays in the fit.
+        Of segments that are split in blocks, every block is predicted from all else. A capture
+        that alone determines a constant stays in the fit.
 
     Notes
     -----
@@ -183,9 +183,9 @@ def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[He
 
     Notes
     -----
-    A parameter that one capture alone carries keeps that capture in the fit. If it counted in one
-    fit and not in the other, that would pass for a better prediction. So would a prediction that
-    leaves more open: of each row the surest prediction's widening counts in all.
+    A parameter that one capture alone determines keeps that capture in the fit. If it counted in
+    one fit and not in the other, that would pass for a better prediction. So would a prediction
+    that leaves more open: of each row the surest prediction's widening counts in all.
 
     """
     shared = np.all([np.isfinite(one.residual) for one in held], axis=0)
@@ -218,7 +218,7 @@ def predicted_chi2(system: LinearSystem, held: HeldOut) -> Array:
 def _units(system: LinearSystem) -> NDArray[np.int64]:
     """Number of what is held out together, of every row [R]: a capture or a block of one.
 
-    Segments of one capture that are parted alike are held out together.
+    Segments of one capture that are split alike are held out together.
     """
     segment = system.segment
     units = segment.astype(np.int64)

@@ -160,7 +160,8 @@ def _reported(system: LinearSystem, held: HeldOut) -> Known:
 
 
 def significantly_nonzero(system: LinearSystem, held: HeldOut, least: float) -> set[str]:
-    """Parameters that are surely not zero, as they are or over a constant that no motor is without.
+    """Parameters that differ significantly from zero, as they are or over a constant that no motor
+    is without.
 
     Parameters
     ----------
@@ -259,7 +260,7 @@ def _or_stated(parameter: ModelParameter, stated: tuple[float, float] | None) ->
 
 
 def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
-    """Notes of the stated constants that the captures, without them, speak against.
+    """Notes of the stated constants that the captures, fitted without them, contradict.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether an effect is confirmed by more than the one capture that asks for it.
+"""Whether an effect is confirmed by more than the one capture that supports it.
 
 A capture held out in turn is predicted by an effect that the others have fitted. One capture may
 gain so much that the sum gains, while every other that the effect moves is predicted worse or as
@@ -39,7 +39,7 @@ def rests_on(systems: Sequence[LinearSystem], held: Sequence[HeldOut]) -> str | 
 
 
 def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None:
-    """The capture that alone asks for the newest effect, though others could show it.
+    """The only capture that supports the newest effect, though others could show it.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ class Score:
 
     @property
     def matters(self) -> bool:
-        """Whether it is as large as anybody would act on, or what would be left without it is."""
+        """Whether it is large enough to matter in use, or what would be left without it is."""
         return self.size >= 1.0 or self.clears
 
     @property

@@ -140,7 +140,7 @@ def _chosen(
     wide: LinearSystem, passing: Sequence[Score], added: Sequence[Effect]
 ) -> LinearSystem | None:
     """The fit with the best candidate of the first few; of the next few, if none of these keeps its
-    promise and is surely there.
+    predicted fall and differs significantly from zero.
 
     That fit is finished with columns of its own, and without terms that do not pay.
     """
@@ -244,10 +244,10 @@ def _reweighted(wide: LinearSystem, score: Score) -> LinearSystem:
 
 
 def _refitted(wide: LinearSystem, score: Score) -> LinearSystem:
-    """The fit with a candidate, begun from what its score foresees.
+    """The fit with a candidate, started from the step that its score predicts.
 
     If that fit is no better than the one without it, a second one begins with all other parameters
-    where they are: along a bent valley the tangent goes astray.
+    where they are: the linear step overshoots where parameters are strongly correlated.
     """
     tried = gauss_newton(begin_from(wide.fit, score), before=wide)
     if tried.deviance + score.penalty < wide.deviance:
@@ -257,7 +257,7 @@ def _refitted(wide: LinearSystem, score: Score) -> LinearSystem:
 
 
 def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_]) -> bool:
-    """Whether the newest effect of a refit is as large as anybody would act on, or takes most of
+    """Whether the newest effect of a refit is large enough to matter in use, or takes most of
     what was `significant` [G] as a remainder before.
     """
     fit, effect = system.fit, system.fit.model.effects[-1]
@@ -269,8 +269,9 @@ def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np
 
 
 def _sure(system: LinearSystem) -> bool:
-    """Whether some amplitude of the newest effect is surely not zero: two standard uncertainties
-    away, whichever capture is left out. Of a coupling, its twist or gap must be so as well.
+    """Whether some amplitude of the newest effect differs significantly from zero: two standard
+    uncertainties away, whichever capture is left out. Of a coupling, its twist or gap must be so as
+    well.
 
     A counterexample: a drag below the lowest speed of any capture can mend how friction changes
     sense at a reversal, while its own size is not known at all.

@@ -93,7 +93,7 @@ def contradiction(step: LadderStep) -> str:
             if p.at_least and known and values[p.name] < share * values[p.at_least]:
                 other = f"{p.at_least} of {values[p.at_least]:.2g}"
                 return (
-                    f"{effect.name} would take much of what is left, but captures speak against "
+                    f"{effect.name} would take much of what is left, but captures contradict "
                     f"it: its {other} goes with a {p.name} of {values[p.name]:.2g}"
                 )
     return ""
@@ -103,7 +103,7 @@ def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:
     """Whether some signal had waves of the angle over its floor before a step, and none after it.
 
     Cogging is no guess where it takes every wave there was in a torque, however much a drag of
-    nobody's library leaves at order nought, or another capture in a voltage.
+    nobody's library leaves at order zero, or another capture in a voltage.
     """
     return bool(_waved(before) - _waved(after))
 
@@ -113,7 +113,7 @@ def _clears_its_side(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> bo
     own side, winding or shaft, while the other side misses as well.
 
     A bump of friction is no guess where coasts and torques need it, whatever an inverter leaves in
-    the voltages. A capture that alone carries the effect is never held out, and shows nothing.
+    the voltages. A capture that alone determines the effect is never held out, and shows nothing.
     """
     before, after = (step.system for step in steps)
     name = f"{after.fit.model.effects[-1].name}." if after.fit.model.effects else ""

@@ -65,7 +65,7 @@ def values_without(
     Returns
     -------
     values, split
-        `held_out`; those of the full fit, `fit`, where the capture alone carries a parameter.
+        `held_out`; those of the full fit, `fit`, where the capture alone determines a parameter.
 
     """
     step = held.steps.get(number)

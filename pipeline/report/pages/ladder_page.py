@@ -144,7 +144,9 @@ def _ranked(one: RankedEffect) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Sketch:
-    """An unknown structure: its terms, and, where there is one, its curve, formula and alternatives."""
+    """An unknown structure: its terms, and, where there is one, its curve, formula and
+    alternatives.
+    """
 
     terms: tuple[tuple[str, str], ...]
     curve: str

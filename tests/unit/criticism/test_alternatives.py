@@ -44,7 +44,9 @@ def test_a_rival_is_told_whatever_size_it_comes_out_at():
 
 @pytest.mark.parametrize("told", ["brake", "windage", None])
 def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
-    """Two forms that are one: the look's word counts, and without it each is the other's alternative."""
+    """Two forms that are one: the look's word counts, and without it each is the other's
+    alternative.
+    """
 
     def look(wholes, q):
         assert set(q) == {"drag_nm"}

@@ -26,7 +26,7 @@ ALL = effects()
 
 
 def state(name, size, others, segments):
-    """A fit at known values that holds one effect, and the system with its alternatives' columns."""
+    """A fit at known values with one effect, and the system with its alternatives' columns."""
     effect = ALL[name] if isinstance(name, str) else name
     model = Model(machine(), (effect,))
     parameter = effect.parameters[0]

@@ -97,7 +97,7 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
         BaseFit(first.system, ()), (replace(first, scores=(score,)),), held[:1], (), cut
     )
     (ranked,) = _ranking(ladder, (), {})
-    assert ("speak against" in ranked.shortfall) is (kept == 1)
+    assert ("contradict" in ranked.shortfall) is (kept == 1)
 
 
 def with_waves(*reduced_chi2: float) -> LadderStep:
