@@ -71,12 +71,12 @@ def _dark(output: Path, into: Path) -> None:
         _keep(into, "maps", viewer.picture())
         state = viewer.show(places["ladder"])
         last = next(line for line in state.recordings[-1].timelines if line.name == "rung").end
-        rungs = []
-        for name, rung in (("ladder-first", 0), ("ladder-last", last or 0)):
-            viewer.client.set_time("rung", sequence=rung)
-            rungs.append(viewer.picture())
-            _keep(into, name, rungs[-1])
-        (into / "ladder.png").write_bytes(_under_each_other(rungs))
+        steps = []
+        for name, step in (("ladder-first", 0), ("ladder-last", last or 0)):
+            viewer.client.set_time("rung", sequence=step)
+            steps.append(viewer.picture())
+            _keep(into, name, steps[-1])
+        (into / "ladder.png").write_bytes(_under_each_other(steps))
         for name in ("motor", "lots"):
             viewer.show(places[name])
             _keep(into, name, viewer.picture())

@@ -216,7 +216,7 @@ class Diagnoses(ByMotor[Diagnosis]):
             One line a signal; 1 is the noise floor.
 
         """
-        from pipeline.report.charts.rung_chart import rung_chart
+        from pipeline.report.charts.step_chart import step_chart
 
         motor_id = self.motor_or_first(motor)
         ladder = self.ladder.filter(pl.col("motor_id") == motor_id)
@@ -228,7 +228,7 @@ class Diagnoses(ByMotor[Diagnosis]):
         }
         whole = self.motors[motor_id].whole_model
         names = [f"+ {added}" if added else whole for added in steps]
-        return figure(f"{motor_id}: error by step", rung_chart(names, over))
+        return figure(f"{motor_id}: error by step", step_chart(names, over))
 
     def _table(self) -> pl.DataFrame:
         return self.verdicts

@@ -42,10 +42,10 @@ from pipeline.records.comparison import KnownCombination, ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import (
     Diagnosis,
-    LadderRung,
     RankedEffect,
     Remainder,
     ReportedParameter,
+    StepRecord,
     Unexcited,
     Verdict,
 )
@@ -194,7 +194,7 @@ def _notes(
     )
 
 
-def _records(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> tuple[LadderRung, ...]:
+def _records(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> tuple[StepRecord, ...]:
     """The steps for people, each with the signature of what came with it."""
     records = [step_record(step, one) for step, one in zip(steps, held, strict=True)]
     signatures = [

@@ -16,10 +16,10 @@ from pipeline.criticism.validation.error_maps import (
     window_errors,
 )
 from pipeline.physics.glossary import unit_of
-from pipeline.records.diagnosis import LadderRung, ReportedParameter, RungError
+from pipeline.records.diagnosis import ReportedParameter, StepError, StepRecord
 
 
-def step_record(step: LadderStep, held: HeldOut) -> LadderRung:
+def step_record(step: LadderStep, held: HeldOut) -> StepRecord:
     """One step of the search as a record for people.
 
     Parameters
@@ -34,12 +34,12 @@ def step_record(step: LadderStep, held: HeldOut) -> LadderRung:
     policy = step.fit.policy.validation
     errors = window_errors(step.system, residual)
     flat = (speed_current_map(one, policy) for one in errors)
-    return LadderRung(
+    return StepRecord(
         step.added,
         held.total,
         signal_errors(step.system, residual),
         {
-            one.signal: RungError(_rms(one.error), _rms(one.sigma), unit_of(one.signal))
+            one.signal: StepError(_rms(one.error), _rms(one.sigma), unit_of(one.signal))
             for one in errors
         },
         parameters_of(step, held),

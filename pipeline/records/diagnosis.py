@@ -94,7 +94,7 @@ class RankedEffect(PlainRecord):
 
 
 @dataclass(frozen=True, slots=True)
-class RungError(PlainRecord):
+class StepError(PlainRecord):
     """Held-out error of one signal's window means beside their noise floor [unit]."""
 
     rmse: float
@@ -140,7 +140,7 @@ class Signature(PlainRecord):
 
 
 @dataclass(frozen=True, slots=True)
-class LadderRung(PlainRecord):
+class StepRecord(PlainRecord):
     """One step of the search: a model, and its held-out error.
 
     Attributes
@@ -165,7 +165,7 @@ class LadderRung(PlainRecord):
     effects: tuple[str, ...]
     held_out: float
     signals: Mapping[str, float]
-    errors: Mapping[str, RungError] = field(default_factory=dict)
+    errors: Mapping[str, StepError] = field(default_factory=dict)
     parameters: Mapping[str, ReportedParameter] = field(default_factory=dict)
     maps: tuple[ErrorMap, ...] = field(default=())
     histograms: tuple[Histogram, ...] = field(default=())
@@ -344,7 +344,7 @@ class Diagnosis(PlainRecord):
     verdict: Verdict
     missing: tuple[str, ...]
     ranking: tuple[RankedEffect, ...]
-    ladder: tuple[LadderRung, ...]
+    ladder: tuple[StepRecord, ...]
     unknown: UnknownStructure | None
     remainder: tuple[Remainder, ...]
     notes: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""A diagnosis for people: what is missing in words with sizes, and the ladder rung by rung."""
+"""A diagnosis for people: what is missing in words with sizes, and the ladder step by step."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import MINUS, number_text, quantity, significant
-from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Signature
+from pipeline.records.diagnosis import Diagnosis, RankedEffect, Signature, StepRecord
 from pipeline.records.model_verdict import effects_key, number
 from pipeline.views.constants import sentence
 from pipeline.views.names import quantity_words
@@ -20,7 +20,7 @@ _WITH = {1: "With it", 2: "With both"}
 
 @dataclass(frozen=True, slots=True)
 class ErrorCell:
-    """One signal's error on one rung, its floor, their ratio, the change from the rung below."""
+    """One signal's error on one step, its floor, their ratio, the change from the step below."""
 
     signal: str
     rmse: str
@@ -30,8 +30,8 @@ class ErrorCell:
 
 
 @dataclass(frozen=True, slots=True)
-class RungView:
-    """One rung, every text ready to be shown.
+class StepView:
+    """One step, every text ready to be shown.
 
     `came` are the effects that it adds, `parameters` theirs as (name, value ± U), `others` those of
     effects that were there before. `errors` have one cell a signal of the ladder.
@@ -63,9 +63,9 @@ class Doubt:
 
 @dataclass(frozen=True, slots=True)
 class LadderView:
-    """A diagnosis: `headline` in a few sentences; the commands to go on with; the rungs.
+    """A diagnosis: `headline` in a few sentences; the commands to go on with; the steps.
 
-    `signals` are those shown on every rung, the one farthest over its floor on the first one
+    `signals` are those shown on every step, the one farthest over its floor on the first one
     first, those of which no floor is known last.
     """
 
@@ -76,7 +76,7 @@ class LadderView:
     doubts: tuple[Doubt, ...]
     slight: tuple[str, ...]
     signals: tuple[str, ...]
-    rungs: tuple[RungView, ...]
+    steps: tuple[StepView, ...]
 
 
 def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
@@ -95,7 +95,7 @@ def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
         tuple(_doubt(ranked[name]) for name in result.missing if ranked[name].confused_with),
         tuple(f"{r.effect} is {r.shortfall}" for r in result.ranking if r.slight and quiet),
         signals,
-        tuple(_rung(result, n, signals) for n in range(len(result.ladder))),
+        tuple(_step(result, n, signals) for n in range(len(result.ladder))),
     )
 
 
@@ -140,7 +140,7 @@ def _doubt(one: RankedEffect) -> Doubt:
 
 
 def shown_signals(result: Diagnosis) -> tuple[str, ...]:
-    """Signals shown on every rung, the one farthest over its floor on the first rung first, those
+    """Signals shown on every step, the one farthest over its floor on the first step first, those
     of which no floor is known last.
     """
     if not result.ladder:
@@ -155,15 +155,15 @@ def shown_signals(result: Diagnosis) -> tuple[str, ...]:
 
 
 def mapped_signals(result: Diagnosis) -> tuple[str, ...]:
-    """Signals with a floor on every rung, those with a map over speed and current first."""
-    names = [n for n in shown_signals(result) if all(n in rung.errors for rung in result.ladder)]
+    """Signals with a floor on every step, those with a map over speed and current first."""
+    names = [n for n in shown_signals(result) if all(n in step.errors for step in result.ladder)]
     flat = [n for n in names if result.ladder[0].map_of(n, SPEED, CURRENT) is not None]
     return (*flat, *(n for n in names if n not in flat))
 
 
-def over_floor(rung: LadderRung, name: str) -> float:
+def over_floor(step: StepRecord, name: str) -> float:
     """A signal's error over its noise floor, 0 where it is not known."""
-    error = rung.errors.get(name)
+    error = step.errors.get(name)
     return 0.0 if error is None else error.rmse / max(error.noise_floor, 1e-300)
 
 
@@ -172,59 +172,59 @@ def angle_of(signal: str) -> str:
     return "theta_mech_rad" if signal == "torque_shaft_nm" else "theta_elec_rad"
 
 
-def reaches(ladder: Sequence[LadderRung]) -> dict[tuple[str, str], float]:
-    """Full colour, or the axis' end, of each signal's maps: the largest mean on any rung [unit]."""
+def reaches(ladder: Sequence[StepRecord]) -> dict[tuple[str, str], float]:
+    """Full colour, or the axis' end, of each signal's maps: the largest mean on any step [unit]."""
     reach: dict[tuple[str, str], float] = {}
-    for rung in ladder:
-        for one in rung.maps:
+    for step in ladder:
+        for one in step.maps:
             key = (one.signal, one.x.variable)
             reach[key] = max(reach.get(key, 0.0), one.reach)
     return reach
 
 
-def _rung(result: Diagnosis, place: int, signals: Sequence[str]) -> RungView:
-    rung = result.ladder[place]
+def _step(result: Diagnosis, place: int, signals: Sequence[str]) -> StepView:
+    step = result.ladder[place]
     below = result.ladder[place - 1] if place else None
-    came = tuple(e for e in rung.effects if below is None or e not in below.effects)
-    gone = [e for e in below.effects if e not in rung.effects] if below is not None else []
+    came = tuple(e for e in step.effects if below is None or e not in below.effects)
+    gone = [e for e in below.effects if e not in step.effects] if below is not None else []
     title = " ".join([*(f"+ {e}" for e in came), *(f"{MINUS} {e}" for e in gone)])
     ranked = {one.effect: one for one in result.ranking}
-    shown = [(name, number_text(*value)) for name, value in rung.parameters.items()]
+    shown = [(name, number_text(*value)) for name, value in step.parameters.items()]
     own = tuple(one for one in shown if one[0].split(".")[0] in came)
-    return RungView(
+    return StepView(
         place,
         title or result.whole_model,
         came,
         tuple(sentence(ranked[e].headline) for e in came if e in ranked and ranked[e].headline),
         tuple(ranked[e].explanation for e in came if e in ranked),
-        f"{rung.held_out:.4g}",
-        "" if below is None else percent(rung.held_out, below.held_out),
+        f"{step.held_out:.4g}",
+        "" if below is None else percent(step.held_out, below.held_out),
         own,
         tuple(one for one in shown if one not in own),
-        tuple(_cell(rung, below, name) for name in signals),
-        rung.signature,
+        tuple(_cell(step, below, name) for name in signals),
+        step.signature,
     )
 
 
-def _cell(rung: LadderRung, below: LadderRung | None, name: str) -> ErrorCell | None:
-    now, before = _rmse(rung, name), None if below is None else _rmse(below, name)
+def _cell(step: StepRecord, below: StepRecord | None, name: str) -> ErrorCell | None:
+    now, before = _rmse(step, name), None if below is None else _rmse(below, name)
     if now is None:
         return None
-    error = rung.errors.get(name)
+    error = step.errors.get(name)
     return ErrorCell(
         quantity_words(name),
         quantity(now, unit_of(name) if error is None else error.unit, 3),
         "" if error is None else quantity(error.noise_floor, error.unit, 3),
-        "" if error is None else significant(over_floor(rung, name), 3),
+        "" if error is None else significant(over_floor(step, name), 3),
         "" if before is None else percent(now, before),
     )
 
 
-def _rmse(rung: LadderRung, name: str) -> float | None:
+def _rmse(step: StepRecord, name: str) -> float | None:
     """A signal's error, whether its floor is known or not [its unit]."""
-    if name in rung.errors:
-        return rung.errors[name].rmse
-    return rung.signals.get(name)
+    if name in step.errors:
+        return step.errors[name].rmse
+    return step.signals.get(name)
 
 
 def percent(now: float, before: float) -> str:

@@ -34,7 +34,7 @@ class Judged:
     `exact`: all that is hidden named with confidence and nothing else. `found`, `hidden`: how many
     of the hidden effects were named, under `unknown` too. `flagged`: structure left over that
     matters was reported; `left`: any. `sketch`: the unknown was put down to the right variable.
-    `floor`: held-out error of the last rung is at most 1.05 of its floor. `slight`: of what is told
+    `floor`: held-out error of the last step is at most 1.05 of its floor. `slight`: of what is told
     as seen but too small to matter, whether the clearest is hidden there, or a rival that these
     captures cannot exclude; None where nothing is told.
     """

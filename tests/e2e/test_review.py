@@ -149,11 +149,11 @@ def test_a_long_capture_is_drawn_from_its_pack(tmp_path: Path, viewer: Viewer) -
 
 
 def test_the_ladders_map_has_colour_below_and_none_at_the_top(output: Path, viewer: Viewer) -> None:
-    """Rung 0 lacks dead time: errors of opposite sign at opposite currents. Rung 1 has it."""
+    """Step 0 lacks dead time: errors of opposite sign at opposite currents. Step 1 has it."""
     viewer.show(output / "recordings" / f"ladder-{FAULTY}.rrd")
     seen = []
-    for rung in (0, 1):
-        viewer.client.set_time("rung", sequence=rung)
+    for step in (0, 1):
+        viewer.client.set_time("rung", sequence=step)
         view = next(v.name for v in viewer.client.get_state().views if "mean error, full" in v.name)
         picture = pixels(viewer.picture(view))
         map_only = picture[:, : int(0.53 * picture.shape[1])]  # the colour bar is at the right

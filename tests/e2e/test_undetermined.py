@@ -150,9 +150,9 @@ def test_windage_of_coasts_alone_is_named_without_a_size(tmp_path, capsys):
     assert document["missing"] == ["windage"]
     (ranked,) = (one for one in document["ranking"] if one["effect"] == "windage")
     assert {(p["value"], p["u"]) for p in ranked["parameters"].values()} == {(None, None)}
-    rung = document["ladder"][-1]["parameters"]
-    assert rung["windage.drag_nm"]["value"] is None
-    assert rung[DRY_NAME]["value"] is None
+    step = document["ladder"][-1]["parameters"]
+    assert step["windage.drag_nm"]["value"] is None
+    assert step[DRY_NAME]["value"] is None
     assert combined(document)["windage.drag_nm/j_kgm2"]["value"] > size / J
     page = next((tmp_path / "diagnose-windage" / "diagnosis").glob("*.html")).read_text("utf-8")
     assert "not identifiable" in page

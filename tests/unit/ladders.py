@@ -1,4 +1,4 @@
-"""A diagnosis of two rungs with maps, as the page and the recording get it."""
+"""A diagnosis of two steps with maps, as the page and the recording get it."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 
 from pipeline.records.diagnosis import (
     Diagnosis,
-    LadderRung,
     RankedEffect,
     Remainder,
     ReportedParameter,
-    RungError,
     Signature,
     SketchTerm,
+    StepError,
+    StepRecord,
     Unexcited,
     UnknownStructure,
 )
@@ -48,13 +48,13 @@ def make_signature() -> Signature:
     return Signature("vq_v", "V", "iq_a", "drive_0.mcap", at, before, (0.001,) * 11)
 
 
-def make_rung(effects: tuple[str, ...], scale: float) -> LadderRung:
+def make_step(effects: tuple[str, ...], scale: float) -> StepRecord:
     parameters = {"coulomb_friction.torque_nm": ReportedParameter(0.004, 1e-5, "N·m")}
     if effects:
         parameters["dead_time.loss_v"] = ReportedParameter(0.1799, 1.2e-4, "V")
-    errors = {"vq_v": RungError(0.13 * scale, 2e-3, "V"), "v_pair_v": RungError(5e-4, 5e-4, "V")}
+    errors = {"vq_v": StepError(0.13 * scale, 2e-3, "V"), "v_pair_v": StepError(5e-4, 5e-4, "V")}
     edges = tuple(np.linspace(-8.0, 8.0, 9).tolist())
-    return LadderRung(
+    return StepRecord(
         effects,
         20.5 * scale,
         {"vq_v": 0.13 * scale, "v_pair_v": 5e-4},
@@ -87,7 +87,7 @@ def make_diagnosis(motor_id: str = "joint-P1", *, unknown: bool = False) -> Diag
         "unknown" if unknown else "missing",
         ("dead_time",),
         (found, other),
-        (make_rung((), 1.0), make_rung(("dead_time",), 0.02)),
+        (make_step((), 1.0), make_step(("dead_time",), 0.02)),
         structure if unknown else None,
         (Remainder("drive_0.mcap", "vq_v", 0, 3.5, 4e-3),),
         (),

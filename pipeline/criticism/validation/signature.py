@@ -20,7 +20,7 @@ from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.criticism.validation.error_maps import Errors, window_errors
 from pipeline.physics.glossary import unit_of
 from pipeline.physics.units import TURN_RAD
-from pipeline.records.diagnosis import LadderRung, Signature
+from pipeline.records.diagnosis import Signature, StepRecord
 from pipeline.records.error_map import ErrorMap
 
 _CELLS, _FEWEST = 48, 6
@@ -62,7 +62,7 @@ class _Curve:
 
 def signature(
     steps: tuple[LadderStep, LadderStep],
-    records: tuple[LadderRung, LadderRung],
+    records: tuple[StepRecord, StepRecord],
 ) -> Signature | None:
     """The curve in which two neighbouring steps differ most clearly; None where none has cells.
 
@@ -70,7 +70,7 @@ def signature(
     ----------
     steps : pair of LadderStep
         Without and with what came.
-    records : pair of LadderRung
+    records : pair of StepRecord
         The same steps as records, whose maps over the angle of a turn are candidates too.
 
     Returns
@@ -179,7 +179,7 @@ def _cells(variable: str, value: Array) -> tuple[NDArray[np.int64], Array]:
     return np.where(fine, cell, -1).astype(np.int64), (edges[1:] + edges[:-1]) / 2.0
 
 
-def _turn_curves(records: tuple[LadderRung, LadderRung]) -> Iterator[_Curve]:
+def _turn_curves(records: tuple[StepRecord, StepRecord]) -> Iterator[_Curve]:
     """The maps over the angle of a turn, sample by sample, of all captures together."""
     after = {_key(one): one for one in records[1].maps if one.y is None}
     for one in records[0].maps:

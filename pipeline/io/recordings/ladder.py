@@ -2,13 +2,13 @@
 
 A recording holds, on the sequence timeline `rung` and for every SIGNAL whose error is known,
 
-    /sheet                 what this rung adds, with parameters and errors, as a markdown page
-    /errors/SIGNAL         rms error of the rungs up to here (bars), in /floor/SIGNAL their floor
-    /map/SIGNAL/picture    mean error over speed and q current, one colour scale for all rungs
+    /sheet                 what this step adds, with parameters and errors, as a markdown page
+    /errors/SIGNAL         rms error of the steps up to here (bars), in /floor/SIGNAL their floor
+    /map/SIGNAL/picture    mean error over speed and q current, one colour scale for all steps
     /map/SIGNAL/values     the same numbers [unit of the signal] as a tensor
     /angle/SIGNAL          mean error over the electrical angle (torque: the mechanical one)
     /spread/SIGNAL         how the errors are spread, in noise floors
-    /over/SIGNAL           the error over its floor, as a line over the rungs
+    /over/SIGNAL           the error over its floor, as a line over the steps
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ import numpy as np
 
 from pipeline.io.recordings.error_map import send_frame, send_map
 from pipeline.io.recordings.font import drawable
-from pipeline.io.recordings.ladder_page import rung_markdown
+from pipeline.io.recordings.ladder_page import step_markdown
 from pipeline.io.recordings.ladder_scales import (
-    RUNG,
+    TIMELINE,
     angle_reach,
     angle_scale,
     error_scale,
@@ -85,36 +85,36 @@ def ladder_bytes(result: Diagnosis) -> bytes:
     return made.content
 
 
-def _send(stream: RecordingStream, entity: str, rungs: Sequence[int], columns: Any) -> None:
+def _send(stream: RecordingStream, entity: str, steps: Sequence[int], columns: Any) -> None:
     import rerun as rr
 
-    index = rr.TimeColumn(RUNG, sequence=list(rungs))
+    index = rr.TimeColumn(TIMELINE, sequence=list(steps))
     rr.send_columns(entity, indexes=[index], columns=columns, recording=stream)
 
 
 def _send_sheets(stream: RecordingStream, result: Diagnosis) -> None:
     import rerun as rr
 
-    pages = [drawable(rung_markdown(result, place)) for place in range(len(result.ladder))]
+    pages = [drawable(step_markdown(result, place)) for place in range(len(result.ladder))]
     kinds = [rr.MediaType.MARKDOWN] * len(pages)
-    rungs = range(len(pages))
-    _send(stream, "/sheet", rungs, rr.TextDocument.columns(text=pages, media_type=kinds))
+    steps = range(len(pages))
+    _send(stream, "/sheet", steps, rr.TextDocument.columns(text=pages, media_type=kinds))
 
 
 def _send_errors(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
-    """Bars that grow with the rung, and the same over the noise floor as a line."""
+    """Bars that grow with the step, and the same over the noise floor as a line."""
     import rerun as rr
 
     scale = error_scale(result, signal)
-    errors = [rung.errors[signal] for rung in result.ladder]
+    errors = [step.errors[signal] for step in result.ladder]
     rmse = np.array([scale.shown(error.rmse) for error in errors])
     floor = np.array([scale.shown(error.noise_floor) for error in errors])
     places = np.arange(rmse.size, dtype=np.float64)
     for entity, values, colour in (("errors", rmse, MODEL), ("floor", floor, MEASURED)):
-        for rung in range(rmse.size):
-            shown = np.where(places <= rung, values, 0.0)
+        for step in range(rmse.size):
+            shown = np.where(places <= step, values, 0.0)
             entity_path = f"/{entity}/{signal}"
-            send_bars(stream, entity_path, shown, places, 0.7, colour, (RUNG, rung))
+            send_bars(stream, entity_path, shown, places, 0.7, colour, (TIMELINE, step))
     over = rmse / np.maximum(floor, 1e-300)
     columns = rr.Scalars.columns(scalars=over)
     _send(stream, f"/over/{signal}", range(rmse.size), columns)
@@ -122,32 +122,40 @@ def _send_errors(stream: RecordingStream, result: Diagnosis, signal: str) -> Non
 
 def _send_maps(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
     reach = map_reach(result, signal)
-    for place, rung in enumerate(result.ladder):
-        flat = rung.map_of(signal, SPEED, CURRENT)
+    for place, step in enumerate(result.ladder):
+        flat = step.map_of(signal, SPEED, CURRENT)
         if flat is not None:
-            send_map(stream, f"/map/{signal}", flat, reach, (RUNG, place))
+            send_map(stream, f"/map/{signal}", flat, reach, (TIMELINE, place))
             if place == 0:
                 send_frame(stream, f"/map/{signal}", flat, reach, WORDS)
-        turn = rung.map_of(signal, angle_of(signal))
+        turn = step.map_of(signal, angle_of(signal))
         if turn is not None:
             edges = np.degrees(np.array(turn.x.edges))
             shown = np.nan_to_num(turn.mean) / 10.0 ** angle_scale(result, signal).exponent
             width = float(edges[1] - edges[0])
-            send_bars(stream, f"/angle/{signal}", shown, edges[:-1], width, RESIDUAL, (RUNG, place))
+            send_bars(
+                stream,
+                f"/angle/{signal}",
+                shown,
+                edges[:-1],
+                width,
+                RESIDUAL,
+                (TIMELINE, place),
+            )
 
 
 def _send_angle_ends(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
-    """Two marks beyond the turn that keep the bars' axis the same on every rung."""
+    """Two marks beyond the turn that keep the bars' axis the same on every step."""
     reach = angle_scale(result, signal).shown(angle_reach(result, signal))
     send_axis_ends(stream, f"/angle_axis/{signal}", (reach, -reach), 360.0)
 
 
 def _send_spread(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
-    for place, rung in enumerate(result.ladder):
-        for spread in rung.histograms:
+    for place, step in enumerate(result.ladder):
+        for spread in step.histograms:
             if spread.signal == signal:
                 edges = np.array(spread.edges)
                 share = 100.0 * np.array(spread.count) / max(sum(spread.count), 1)
                 width = float(edges[1] - edges[0])
-                at = (RUNG, place)
+                at = (TIMELINE, place)
                 send_bars(stream, f"/spread/{signal}", share, edges[:-1], width, MEASURED, at)

@@ -1,4 +1,4 @@
-"""The units and reaches in which a ladder's errors are drawn, the same on all rungs."""
+"""The units and reaches in which a ladder's errors are drawn, the same on all steps."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pipeline.physics.notation import Scale, scale_for
 from pipeline.records.diagnosis import Diagnosis
 from pipeline.views.ladder import SPEED, angle_of, reaches
 
-RUNG = "rung"
+TIMELINE = "rung"
 
 
 def map_reach(result: Diagnosis, signal: str) -> float:
@@ -40,7 +40,7 @@ def error_scale(result: Diagnosis, signal: str) -> Scale:
         Glossary name.
 
     """
-    errors = [rung.errors[signal] for rung in result.ladder]
+    errors = [step.errors[signal] for step in result.ladder]
     return scale_for(max(e.rmse for e in errors), errors[0].unit)
 
 

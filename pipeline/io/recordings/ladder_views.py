@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipeline.io.recordings.error_map import map_view
-from pipeline.io.recordings.ladder_scales import RUNG, angle_scale, error_scale, map_reach
+from pipeline.io.recordings.ladder_scales import TIMELINE, angle_scale, error_scale, map_reach
 from pipeline.io.recordings.views import PALETTE, bar_view, page_view, workspace
 from pipeline.physics.notation import quantity
 from pipeline.records.diagnosis import Diagnosis
@@ -28,11 +28,11 @@ def ladder_layout(result: Diagnosis) -> Blueprint:
     signals = mapped_signals(result)
     tabs = [_workspace(result, signal) for signal in signals]
     tabs = [*tabs, _overview(signals)] if tabs else [_page()]
-    return workspace(*tabs, timeline=RUNG, panel="expanded")
+    return workspace(*tabs, timeline=TIMELINE, panel="expanded")
 
 
 def _page() -> Any:
-    return page_view("/sheet", "What this rung adds")
+    return page_view("/sheet", "What this step adds")
 
 
 def _workspace(result: Diagnosis, signal: str) -> Any:
@@ -44,13 +44,13 @@ def _workspace(result: Diagnosis, signal: str) -> Any:
     upper = [_page()]
     if flat is not None:
         reach = map_reach(result, signal)
-        colour = f"full colour ±{quantity(reach, flat.unit, 2)} on every rung"
+        colour = f"full colour ±{quantity(reach, flat.unit, 2)} on every step"
         upper.append(map_view(f"/map/{signal}", flat, f"{named}: mean error, {colour}"))
     angle = angle_of(signal)
     turn = "electrical" if angle == "theta_elec_rad" else "mechanical"
     lower = [
         bar_view(
-            f"rms error per rung [{unit}], beside its noise floor",
+            f"rms error per step [{unit}], beside its noise floor",
             f"/errors/{signal}",
             f"/floor/{signal}",
             legend=True,
@@ -87,12 +87,12 @@ def _overview(signals: tuple[str, ...]) -> Any:
     return rrb.Horizontal(
         rrb.TimeSeriesView(
             origin="/over",
-            name="error over noise floor, rung by rung",
+            name="error over noise floor, step by step",
             contents=list(lines),
             overrides=lines,
             plot_legend=rrb.Corner2D.RightTop,
         ),
         _page(),
         column_shares=[1.6, 1.0],
-        name="All rungs",
+        name="All steps",
     )

@@ -9,19 +9,19 @@ import numpy as np
 
 from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import MINUS, quantity, significant
-from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Signature
+from pipeline.records.diagnosis import Diagnosis, RankedEffect, Signature, StepRecord
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.charts.chart import chart
 from pipeline.report.charts.curve_chart import curve_chart
 from pipeline.report.charts.heatmap import angle_bars, heatmap
-from pipeline.report.charts.rung_chart import rung_chart
+from pipeline.report.charts.step_chart import step_chart
 from pipeline.report.pages.link_block import Link, link_block
 from pipeline.report.pages.page import render
 from pipeline.views.ladder import (
     CURRENT,
     SPEED,
     LadderView,
-    RungView,
+    StepView,
     angle_of,
     ladder_view,
     over_floor,
@@ -35,7 +35,7 @@ MOST_RANKED = 12
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One signal of one rung: map over speed and current, bars over the angle."""
+    """One signal of one step: map over speed and current, bars over the angle."""
 
     signal: str
     flat: str
@@ -44,9 +44,9 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What gives away an effect that came with a rung: its words, its drawing, whose capture."""
+    """What gives away an effect that came with a step: its words, its drawing, whose capture."""
 
-    rung: RungView
+    step: StepView
     svg: str
     caption: str
 
@@ -67,9 +67,9 @@ def render_ladder(result: Diagnosis, folder: str = "FOLDER", links: Sequence[Lin
         links=link_block(links),
         notes=notes,
         folded=folded,
-        shown=[_shown(rung) for rung in view.rungs if rung.signature is not None],
-        chart=rung_chart([_short(one) for one in view.rungs], _over_floors(result.ladder, view)),
-        figures=[tuple(_figures(rung, view.signals, reach)) for rung in result.ladder],
+        shown=[_shown(step) for step in view.steps if step.signature is not None],
+        chart=step_chart([_short(one) for one in view.steps], _over_floors(result.ladder, view)),
+        figures=[tuple(_figures(step, view.signals, reach)) for step in result.ladder],
         signals=[quantity_words(name) for name in view.signals],
         found=[one for one in ranked if one["effect"] in result.missing],
         others=[one for one in ranked if one["effect"] not in result.missing][:MOST_RANKED],
@@ -88,22 +88,22 @@ def render_ladder(result: Diagnosis, folder: str = "FOLDER", links: Sequence[Lin
     )
 
 
-def _over_floors(ladder: Sequence[LadderRung], view: LadderView) -> dict[str, list[float]]:
+def _over_floors(ladder: Sequence[StepRecord], view: LadderView) -> dict[str, list[float]]:
     """What the chart draws: each signal's error over its floor, else that of all together."""
-    drawn = [name for name in view.signals if all(name in rung.errors for rung in ladder)]
+    drawn = [name for name in view.signals if all(name in step.errors for step in ladder)]
     if not drawn:
-        return {"all signals": [rung.held_out for rung in ladder]} if ladder else {}
-    return {name: [over_floor(rung, name) for rung in ladder] for name in drawn}
+        return {"all signals": [step.held_out for step in ladder]} if ladder else {}
+    return {name: [over_floor(step, name) for step in ladder] for name in drawn}
 
 
 def _figures(
-    rung: LadderRung, signals: Sequence[str], reach: dict[tuple[str, str], float]
+    step: StepRecord, signals: Sequence[str], reach: dict[tuple[str, str], float]
 ) -> Iterator[Figure]:
-    mapped = [n for n in signals if rung.map_of(n, SPEED, CURRENT) is not None]
+    mapped = [n for n in signals if step.map_of(n, SPEED, CURRENT) is not None]
     for name in [*mapped, *(n for n in signals if n not in mapped)]:
-        flat = rung.map_of(name, SPEED, CURRENT)
+        flat = step.map_of(name, SPEED, CURRENT)
         angle = angle_of(name)
-        turn = rung.map_of(name, angle)
+        turn = step.map_of(name, angle)
         if flat is None and turn is None:
             continue
         yield Figure(
@@ -113,20 +113,20 @@ def _figures(
         )
 
 
-def _shown(rung: RungView) -> Shown:
+def _shown(step: StepView) -> Shown:
     """Points: what the model without the effect leaves; line: what it explains; below: the rest."""
-    assert rung.signature is not None
-    one: Signature = rung.signature
+    assert step.signature is not None
+    one: Signature = step.signature
     before, after = np.array(one.before), np.array(one.after)
     series = (Series("", np.array(one.at), before, before - after),)
-    drawn = Evidence("", rung.title, one.x_name, one.signal, "scatter", series, one.capture)
+    drawn = Evidence("", step.title, one.x_name, one.signal, "scatter", series, one.capture)
     words = f"{quantity_words(one.signal)} over {quantity_words(one.x_name)}"
     where = one.capture or "all captures"
-    return Shown(rung, chart(drawn), f"{words}, {where}")
+    return Shown(step, chart(drawn), f"{words}, {where}")
 
 
-def _short(view: RungView) -> str:
-    return f"{view.number}: {view.title}" if len(view.title) < 26 else f"rung {view.number}"
+def _short(view: StepView) -> str:
+    return f"{view.number}: {view.title}" if len(view.title) < 26 else f"step {view.number}"
 
 
 def _ranked(one: RankedEffect) -> dict[str, str]:

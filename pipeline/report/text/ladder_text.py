@@ -13,9 +13,9 @@ def ladder_text(result: Diagnosis) -> str:
     missing = ", ".join(result.missing)
     text_lines = [f"{result.motor_id}: {result.verdict}" + (f": {missing}" if missing else "")]
     text_lines.append(f"  {view.headline}")
-    for rung in view.rungs:
-        change = f", {rung.change}" if rung.change else ""
-        text_lines.append(f"  {rung.title}: held-out error {rung.held_out} noise floors{change}")
+    for step in view.steps:
+        change = f", {step.change}" if step.change else ""
+        text_lines.append(f"  {step.title}: held-out error {step.held_out} noise floors{change}")
     for doubt in view.doubts:
         text_lines.append(f"  {doubt.effect} could as well be {doubt.alternatives}")
         text_lines += [f"    {test}" for test in doubt.tests]

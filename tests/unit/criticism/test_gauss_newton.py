@@ -64,7 +64,7 @@ def test_whichever_end_is_better_stays(monkeypatch):
 
 @pytest.mark.parametrize(("share", "times"), [(1e-3, 1), (0.7, 0), (3.0, 1)])
 def test_a_fit_is_begun_anew_only_from_another_inertia(monkeypatch, share, times):
-    """What is left over the floor may be no fault of the fit: two seconds a rung for nothing."""
+    """What is left over the floor may be no fault of the fit: two seconds a step for nothing."""
     segments = tuple(log(seed=n, noise=1.0) for n in (1, 2))
     values = {**astray(segments).values, "j_kgm2": share * BASE["j_kgm2"]}
     lost = Fit(segments, STRIBECK, values, floors(segments, STRIBECK, values), values)

@@ -39,7 +39,7 @@ def test_what_is_hidden_is_named_exactly(name):
     assert set(result.missing) == set(truth(name)["hidden"])
     assert result.ladder[-1].held_out < 0.3 * result.ladder[0].held_out
     if name == "P3":
-        shown = {rung.effects[-1]: rung.signature for rung in result.ladder[1:]}
+        shown = {step.effects[-1]: step.signature for step in result.ladder[1:]}
         told = {effect: (s.signal, s.variable) for effect, s in shown.items() if s is not None}
         assert told == {
             "angle_eccentricity": ("vd_v", "theta_mech_rad"),

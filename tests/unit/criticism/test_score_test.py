@@ -53,7 +53,7 @@ def test_what_an_effect_lacks_is_said(what, told):
 
 
 def test_a_fits_own_columns_are_made_where_it_stands():
-    """Those of candidates may stay from the rung before, 3 % of ψ away."""
+    """Those of candidates may stay from the step before, 3 % of ψ away."""
     segments = (log(noise=1.0),)
     here = fitted(segments)
     away = replace(here, values={**here.values, "psi_wb": 1.03 * here.values["psi_wb"]})

@@ -12,11 +12,11 @@ import pytest
 from pipeline.criticism.validation import signature as module
 from pipeline.criticism.validation.error_maps import Errors
 from pipeline.criticism.validation.signature import signature
-from pipeline.records.diagnosis import LadderRung, Signature
+from pipeline.records.diagnosis import Signature, StepRecord
 from pipeline.records.error_map import Bins, ErrorMap
 
 N, TURNS, INERTIA_KGM2 = 2000, 40, 3e-5
-EMPTY = LadderRung((), 1.0, {})
+EMPTY = StepRecord((), 1.0, {})
 
 
 def segment(capture: str, *, turning: bool = True) -> Any:
@@ -36,7 +36,7 @@ def errors(signal: str, shape: np.ndarray, of: int = 0, seed: int = 1) -> Errors
 
 
 def twice(*captures: str, fit: Any = None) -> tuple[Any, Any]:
-    """Two equal rungs of segments of these captures."""
+    """Two equal steps of segments of these captures."""
     segments = tuple(segment(name) for name in captures)
     step = SimpleNamespace(system=SimpleNamespace(residual=np.empty(0), segments=segments), fit=fit)
     return step, step
@@ -45,9 +45,9 @@ def twice(*captures: str, fit: Any = None) -> tuple[Any, Any]:
 def found_in(
     monkeypatch: pytest.MonkeyPatch,
     before: list[Errors],
-    records: tuple[LadderRung, LadderRung] = (EMPTY, EMPTY),
+    records: tuple[StepRecord, StepRecord] = (EMPTY, EMPTY),
 ) -> Signature | None:
-    """The signature of rungs with these errors and with nothing but noise."""
+    """The signature of steps with these errors and with nothing but noise."""
     quiet = [errors(one.signal, np.zeros(N), int(one.segment[0]), seed=2) for one in before]
     told = iter([before, quiet])
     monkeypatch.setattr(module, "window_errors", lambda *_: next(told))
@@ -87,7 +87,7 @@ def test_an_error_of_acceleration_is_told_as_torque(monkeypatch: pytest.MonkeyPa
     assert one.before[0] == pytest.approx(-40.0 * INERTIA_KGM2, rel=0.01)
 
 
-def turn_maps(order: int, cells: int, variable: str) -> tuple[LadderRung, LadderRung]:
+def turn_maps(order: int, cells: int, variable: str) -> tuple[StepRecord, StepRecord]:
     """Records whose torque has a wave over the angle, without and nearly without it."""
     turn = Bins(variable, tuple(np.linspace(0.0, 2 * np.pi, cells + 1).tolist()))
     middles = (np.array(turn.edges[1:]) + np.array(turn.edges[:-1])) / 2.0

@@ -42,7 +42,7 @@ def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none
     assert search(cautious(none, 3.0), LIBRARY)[-1].added == ()
 
 
-def test_choices_are_made_again_on_every_rung_and_at_the_end_of_what_is_asked_for(monkeypatch):
+def test_choices_are_made_again_on_every_step_and_at_the_end_of_what_is_asked_for(monkeypatch):
     made = []
 
     def watched(system):

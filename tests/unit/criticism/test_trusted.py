@@ -26,7 +26,7 @@ from tests.unit.criticism.machines import BASE, fitted, log, machine, with_drag
 
 
 def missing_by(**reduced_chi2):
-    """A rung around which signals have these χ²/n in a hundred samples each, and no columns."""
+    """A step around which signals have these χ²/n in a hundred samples each, and no columns."""
     model = Model(machine(), ())
     none = np.zeros(len(model_columns(model)))
     system = LinearSystem(
@@ -101,7 +101,7 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
 
 
 def with_waves(*reduced_chi2: float) -> LadderStep:
-    """A rung that misses the torque by these χ²/n at the orders 0, 7 and 84 of a turn."""
+    """A step that misses the torque by these χ²/n at the orders 0, 7 and 84 of a turn."""
     names = ("plain", "seventh", "cogging")
     step = missing_by(**dict(zip(names, reduced_chi2, strict=True)))
     labels = tuple((0, "torque_shaft_nm", order) for order in (0, 7, 84))
@@ -237,8 +237,8 @@ def test_a_refit_begins_again_where_the_tangent_goes_astray(
     assert asked == begun
 
 
-def test_an_effect_s_drop_is_that_of_the_rung_it_came_with():
-    """A removal on the way leaves rungs and names of different counts."""
+def test_an_effect_s_drop_is_that_of_the_step_it_came_with():
+    """A removal on the way leaves steps and names of different counts."""
     steps = [
         LadderStep(added, None, ())  # type: ignore[arg-type]
         for added in ((), ("cogging",), ("saturation",), ("saturation", "windage"))

@@ -19,7 +19,7 @@ from pipeline.io.recordings.comparison import (
 )
 from pipeline.io.recordings.error_map import CELL, diverging, map_labels, map_picture
 from pipeline.io.recordings.ladder import write_ladder_recording
-from pipeline.io.recordings.ladder_page import rung_markdown
+from pipeline.io.recordings.ladder_page import step_markdown
 from pipeline.io.recordings.ladder_scales import error_scale, map_reach
 from pipeline.records.comparison import Comparison, SignalError, Trace
 from pipeline.views.ladder import ladder_view, mapped_signals
@@ -63,7 +63,7 @@ def test_the_map_read_back_is_the_documents(ladder: Path) -> None:
         np.testing.assert_array_equal(numbers(component(row, "Tensor:data")), expected)
 
 
-def test_error_bars_grow_rung_by_rung_and_hold_the_documents_errors(ladder: Path) -> None:
+def test_error_bars_grow_step_by_step_and_hold_the_documents_errors(ladder: Path) -> None:
     result = make_diagnosis()
     unit = 10.0 ** error_scale(result, "vq_v").exponent
     assert unit == 1e-3
@@ -88,7 +88,7 @@ def test_the_picture_shows_the_map_upside_up_with_its_gap_hatched(ladder: Path) 
         assert len(buffer) == picture.size
 
 
-def test_colours_of_all_rungs_share_one_scale() -> None:
+def test_colours_of_all_steps_share_one_scale() -> None:
     result = make_diagnosis()
     assert map_reach(result, "vq_v") == pytest.approx(0.21)
     quiet = map_picture(make_map(0.02), 0.21)
@@ -97,19 +97,19 @@ def test_colours_of_all_rungs_share_one_scale() -> None:
     assert {"+210", "-210", "mV", "speed [rad/s]"} <= set(labels.texts)
 
 
-def test_the_page_of_a_rung_says_what_came_and_every_error_so_far(ladder: Path) -> None:
+def test_the_page_of_a_step_says_what_came_and_every_error_so_far(ladder: Path) -> None:
     result = make_diagnosis(unknown=True)
     view = ladder_view(result)
-    assert view.rungs[0].came == ()
-    assert view.rungs[1].came == ("dead_time",)
-    text = rung_markdown(result, 1).replace("\\", "")
+    assert view.steps[0].came == ()
+    assert view.steps[1].came == ("dead_time",)
+    text = step_markdown(result, 1).replace("\\", "")
     for words in ("+ dead_time", "179.90 ± 0.24 mV", "130 mV", "2.60 mV", "(−98 %)", "noise floor"):
         assert words in text
     assert "dead_time could as well be phase_imbalance: low-speed current steps" in text
     assert "Left over in vq_v: odd in iq_a" in text
     pages = dict(rows(ladder, "/sheet"))
     (page,) = component(pages[1], "TextDocument:text")
-    assert page == rung_markdown(make_diagnosis(), 1)
+    assert page == step_markdown(make_diagnosis(), 1)
 
 
 def test_the_signal_farthest_over_its_floor_comes_first_and_one_without_map_last() -> None:

@@ -24,7 +24,7 @@ from pipeline.report.pages.ladder_page import render_ladder
 from pipeline.report.pages.lot_page import render_regression
 from pipeline.report.pages.motor_page import render_motor
 from pipeline.report.pages.sheet_page import render_sheet
-from tests.unit.ladders import make_diagnosis, make_rung
+from tests.unit.ladders import make_diagnosis, make_step
 from tests.unit.performance.constants import salient
 from tests.unit.performance.sheets import sheet_of
 from tests.unit.regressions import make_regression
@@ -59,9 +59,9 @@ document.body.innerHTML = `<pre id="told">${JSON.stringify(told).replace(/[&<>]/
 
 def long_ladder() -> Diagnosis:
     """Names of signals and effects as long as they come."""
-    rungs = [make_rung(("dead_time",) * (n > 0), 0.5**n) for n in range(4)]
+    steps = [make_step(("dead_time",) * (n > 0), 0.5**n) for n in range(4)]
     longest = "temp_coefficient_of_something_torque_shaft_nm"
-    told = [replace(r, errors={**r.errors, longest: r.errors["vq_v"]}) for r in rungs]
+    told = [replace(r, errors={**r.errors, longest: r.errors["vq_v"]}) for r in steps]
     return replace(make_diagnosis(LONG, unknown=True), ladder=tuple(told))
 
 

@@ -1,4 +1,4 @@
-"""The ladder's page: every number of the document, one scale for all rungs, no injection."""
+"""The ladder's page: every number of the document, one scale for all steps, no injection."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from pipeline.records.comparison import Comparison, Dependence, Move, SignalError
-from pipeline.records.diagnosis import LadderRung, Remainder, Unexcited
+from pipeline.records.diagnosis import Remainder, StepRecord, Unexcited
 from pipeline.report.charts.curve_chart import curve_chart
 from pipeline.report.charts.heatmap import angle_bars, colour, heatmap
-from pipeline.report.charts.rung_chart import rung_chart
+from pipeline.report.charts.step_chart import step_chart
 from pipeline.report.pages.ladder_page import render_ladder
 from pipeline.report.text.comparison_text import comparison_text
 from pipeline.views.notes import shown_and_folded
@@ -157,7 +157,7 @@ def test_bars_over_the_angle_keep_their_axis() -> None:
 
 
 def test_the_chart_puts_the_floor_and_the_errors_on_one_logarithmic_scale() -> None:
-    svg = rung_chart(["0: standard", "1: + dead_time"], {"vq_v": [65.0, 1.3], "vd_v": [10.0, 1.0]})
+    svg = step_chart(["0: standard", "1: + dead_time"], {"vq_v": [65.0, 1.3], "vd_v": [10.0, 1.0]})
     root = ElementTree.fromstring(svg)
     lines = [p.attrib["d"] for p in root.iter("path") if p.attrib["class"] in ("c0", "c1")]
     ys = [[float(y) for y in re.findall(r" ([\d.]+)", line)] for line in lines]
@@ -170,7 +170,7 @@ def test_the_chart_puts_the_floor_and_the_errors_on_one_logarithmic_scale() -> N
 def test_the_chart_reaches_down_to_the_lowest_error_and_marks_what_is_below_it() -> None:
     """Far below its floor is a finding as well: a floor too high, or a signal fitted twice."""
     over = {"alpha_mech_rad_s2": [0.017, 0.011], "vq_v": [9.0, 0.0]}
-    root = ElementTree.fromstring(rung_chart(["0", "1"], over))
+    root = ElementTree.fromstring(step_chart(["0", "1"], over))
     lines = {p.attrib["class"]: p.attrib["d"] for p in root.iter("path")}
     first, second = (float(y) for y in re.findall(r" ([\d.]+)", lines["c0"]))
     grid = {
@@ -184,11 +184,11 @@ def test_the_chart_reaches_down_to_the_lowest_error_and_marks_what_is_below_it()
 
 def test_errors_without_a_floor_are_on_the_page_and_all_together_in_the_chart() -> None:
     """A table of flux levels has no windows and so no floors: its error is told all the same."""
-    rungs = [
-        LadderRung((), 1.6, {"vq_v": 0.00778, "alpha_mech_rad_s2": 3.0}),
-        LadderRung(("saturation",), 1.1, {"vq_v": 0.00544, "alpha_mech_rad_s2": 3.0}),
+    steps = [
+        StepRecord((), 1.6, {"vq_v": 0.00778, "alpha_mech_rad_s2": 3.0}),
+        StepRecord(("saturation",), 1.1, {"vq_v": 0.00544, "alpha_mech_rad_s2": 3.0}),
     ]
-    html = render_ladder(replace(make_diagnosis(), ladder=tuple(rungs)))
+    html = render_ladder(replace(make_diagnosis(), ladder=tuple(steps)))
     for words in ("v_q", "7.78 mV", "5.44 mV", "−30 %", "all signals", "3.00 rad/s²"):
         assert words in html
     assert "no errors to draw" not in html
@@ -212,10 +212,10 @@ def test_what_is_left_has_its_unit(signal: str, words: str, size: str) -> None:
     assert places == sorted(places)
 
 
-def test_words_of_neighbouring_rungs_do_not_meet() -> None:
+def test_words_of_neighbouring_steps_do_not_meet() -> None:
     """Six pixels a letter at the size of the chart's words."""
     names = [f"{n}: + {name}" for n, name in enumerate(["magnet_temperature", "cogging"] * 3)]
-    root = ElementTree.fromstring(rung_chart(names, {"vq_v": [60.0, 9.0, 7.0, 5.0, 2.0, 1.0]}))
+    root = ElementTree.fromstring(step_chart(names, {"vq_v": [60.0, 9.0, 7.0, 5.0, 2.0, 1.0]}))
     words = [t for t in root.iter("text") if t.attrib["class"] == "tick x"]
     assert [t.text for t in words] == names
     rows: dict[str, float] = {}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Separation
+from pipeline.records.diagnosis import Diagnosis, RankedEffect, Separation, StepRecord
 from pipeline.report.text.ladder_text import ladder_text
 from pipeline.views.ladder import headline, ladder_view, mapped_signals, shown_signals
-from tests.unit.ladders import make_diagnosis, make_rung
+from tests.unit.ladders import make_diagnosis, make_step
 
 
 def ranked(effect: str, words: str) -> RankedEffect:
@@ -18,12 +18,12 @@ def two() -> Diagnosis:
     """What P3 of the rig comes to."""
     words = ("encoder disc off-centre by 9.0 ± 0.1 mrad", "extra friction below 7.0 rad/s")
     names = ("angle_eccentricity", "stribeck")
-    rungs = [
-        LadderRung(names[:n], held_out, {})
+    steps = [
+        StepRecord(names[:n], held_out, {})
         for n, held_out in enumerate((76.29498559941, 1.1646, 0.5162))
     ]
     ranking = tuple(map(ranked, names, words))
-    return replace(make_diagnosis(), missing=names, ranking=ranking, ladder=tuple(rungs))
+    return replace(make_diagnosis(), missing=names, ranking=ranking, ladder=tuple(steps))
 
 
 def test_the_headline_says_what_is_missing_with_sizes_and_what_adding_it_does() -> None:
@@ -70,8 +70,8 @@ def test_a_doubt_names_rivals_and_the_test_that_tells_with_its_power() -> None:
     assert doubt.tests == ("against phase_imbalance: slow steps, predicted power 97%",)
 
 
-def test_rungs_tell_what_came_its_numbers_and_the_fall() -> None:
-    first, last = ladder_view(make_diagnosis()).rungs
+def test_steps_tell_what_came_its_numbers_and_the_fall() -> None:
+    first, last = ladder_view(make_diagnosis()).steps
     assert (first.title, first.came, first.change) == ("model standard", (), "")
     assert (last.title, last.came, last.change) == ("+ dead_time", ("dead_time",), "−98 %")
     assert last.parameters == (("dead_time.loss_v", "179.90 ± 0.24 mV"),)
@@ -81,8 +81,8 @@ def test_rungs_tell_what_came_its_numbers_and_the_fall() -> None:
         ("v_q", "2.60 mV", "2.00 mV", "1.30", "−98 %"),
         ("v pair", "500 µV", "500 µV", "1.00", "+0 %"),
     ]
-    gone = replace(make_diagnosis(), ladder=(make_rung(("dead_time",), 1.0), make_rung((), 1.0)))
-    assert ladder_view(gone).rungs[1].title == "− dead_time"
+    gone = replace(make_diagnosis(), ladder=(make_step(("dead_time",), 1.0), make_step((), 1.0)))
+    assert ladder_view(gone).steps[1].title == "− dead_time"
 
 
 def test_the_signal_farthest_over_its_floor_comes_first_and_one_without_map_last() -> None:

@@ -1,4 +1,4 @@
-"""The ladder in one picture: every signal's error over its noise floor, rung by rung."""
+"""The ladder in one picture: every signal's error over its noise floor, step by step."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ END_LETTER = 8.2
 LEAST = 1e-3
 
 
-def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str:
-    """SVG of `over`, each signal's error over its noise floor [rungs], on a logarithmic scale.
+def step_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str:
+    """SVG of `over`, each signal's error over its noise floor [steps], on a logarithmic scale.
 
-    `names` are the rungs in words. The band below 1 is the noise floor. What is below `LEAST`
+    `names` are the steps in words. The band below 1 is the noise floor. What is below `LEAST`
     stands at the foot with an arrow.
     """
     finite = [max(v, LEAST) for values in over.values() for v in values if math.isfinite(v)]
@@ -35,8 +35,8 @@ def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
         place = (math.log10(max(value, 10**low)) - low) / (high - low)
         return bottom - HEIGHT * place
 
-    def x(rung: int) -> float:
-        return LEFT + (right - LEFT) * (rung + 0.5) / len(names)
+    def x(step: int) -> float:
+        return LEFT + (right - LEFT) * (step + 0.5) / len(names)
 
     parts = [
         f'<rect class="band" x="{LEFT:g}" y="{y(1.0):.1f}" width="{right - LEFT:g}" '
@@ -49,8 +49,8 @@ def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
             f'<text class="tick y" x="{LEFT - 6:g}" y="{place + 4:.1f}">{10.0**decade:g}</text>'
         )
     levels = _levels(names, right - LEFT)
-    for rung, name in enumerate(names):
-        where = f'x="{x(rung):.1f}" y="{bottom + 16 + LABEL_PITCH * (rung % levels):.1f}"'
+    for step, name in enumerate(names):
+        where = f'x="{x(step):.1f}" y="{bottom + 16 + LABEL_PITCH * (step % levels):.1f}"'
         parts.append(f'<text class="tick x" {where}>{escape(name)}</text>')
     parts += _lines(over, ends, x, y)
     parts += [
@@ -61,7 +61,7 @@ def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
     ]
     return (
         f'<svg class="ladder" viewBox="0 0 {WIDTH:g} {bottom + BOTTOM:g}" role="img" '
-        'aria-label="error over noise floor of every signal, rung by rung">'
+        'aria-label="error over noise floor of every signal, step by step">'
         f'<text class="title" x="2" y="12">held-out error over noise floor</text>'
         f'<text class="tick" x="{LEFT + 8:g}" y="{y(1.0) + 14:.1f}">noise floor</text>'
         f"{''.join(parts)}</svg>"
@@ -73,7 +73,7 @@ def _short(text: str) -> str:
 
 
 def _levels(names: Sequence[str], wide: float) -> int:
-    """Over how many lines the rungs' words go in turn, so that neighbours do not meet."""
+    """Over how many lines the steps' words go in turn, so that neighbours do not meet."""
     pitch = wide / len(names)
     longest = LETTER * max(map(len, names))
     return min(math.ceil(longest / pitch), MOST_LEVELS, len(names))
