@@ -11,7 +11,7 @@ from typing import TextIO
 
 from pipeline.cli.colour import coloured, wanted
 from pipeline.cli.commands import COMMANDS, Command, overview, program, usage
-from pipeline.cli.flags import Flags, parted
+from pipeline.cli.flags import Flags, split_flags
 from pipeline.records.errors import PipelineError, UsageError, meant
 from pipeline.records.naming import printable
 from pipeline.records.outcome import INTERRUPTED, Outcome, first_that_applies
@@ -43,7 +43,7 @@ def _guarded(perform: Callable[[], Outcome]) -> Outcome:
 
 
 def _perform(arguments: Sequence[str]) -> Outcome:
-    flags, words = parted(arguments)
+    flags, words = split_flags(arguments)
     if flags.version:
         from pipeline import __version__
 

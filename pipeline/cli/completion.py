@@ -33,12 +33,12 @@ compdef _motor_datasheets motor-datasheets""",
 }
 
 
-def completed(asked: str) -> str:
+def completed(request: str) -> str:
     """What `--shell-completion` prints: `install=SHELL` the lines, `query=SHELL` the words.
 
     The line so far is in the environment's COMP_WORD, up to the cursor.
     """
-    act, _, shell = asked.partition("=")
+    act, _, shell = request.partition("=")
     if act == "install":
         program = f"{sys.executable} -m pipeline"
         return _INSTALL[shell].format(program=program)

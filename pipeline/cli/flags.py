@@ -44,7 +44,7 @@ class Flags:
     shell_completion: str | None = None
 
 
-def parted(arguments: Sequence[str]) -> tuple[Flags, list[str]]:
+def split_flags(arguments: Sequence[str]) -> tuple[Flags, list[str]]:
     """Parts flags from the other words, wherever they stand.
 
     Parameters

@@ -35,7 +35,7 @@ def sweep(command: Command, words: Sequence[str], run: Callable[[list[str]], Out
     texts, errors, codes, results = [], [], [], []
     for combination in runs:
         name = ",".join(combination[number] for number in swept)
-        outcome = run(_apart(command, combination, name))
+        outcome = run(_run_words(command, combination, name))
         texts.append(f"[{name}]\n{outcome.text}".rstrip())
         errors += [f"[{name}] {line}" for line in outcome.errors]
         results.append({"words": name, "exit_code": outcome.exit_code, "result": outcome.result})
@@ -43,7 +43,7 @@ def sweep(command: Command, words: Sequence[str], run: Callable[[list[str]], Out
     return Outcome(first_that_applies(*codes), "\n".join(texts), tuple(errors), result=results)
 
 
-def _apart(command: Command, words: Sequence[str], name: str) -> list[str]:
+def _run_words(command: Command, words: Sequence[str], name: str) -> list[str]:
     """The words of one run, its `output` in a folder of its own where the command has one."""
     fields = command.settings.__dataclass_fields__
     if "output" not in fields or fields["output"].metadata.get("result", True):

@@ -21,7 +21,7 @@ CONSEQUENCE = {
 }
 
 # Saliency and iron's bend part the time constants of one rotor by far less.
-STEPS_APART = 100.0
+SETTLING_RATIO = 100.0
 
 
 def agree(campaign: Campaign) -> tuple[Finding, ...]:
@@ -183,10 +183,10 @@ def _extremes(capture: Capture) -> tuple[float, float]:
 def _step_clocks(campaign: Campaign) -> list[Finding]:
     found = [(c, _settling_s(c)) for c in campaign.of("current_step")]
     times = [seconds for _, seconds in found if 0.0 < seconds < math.inf]
-    if not times or max(times) < STEPS_APART * min(times):
+    if not times or max(times) < SETTLING_RATIO * min(times):
         return []
     usual = float(np.exp(np.median(np.log(times))))
-    least = math.sqrt(STEPS_APART)
+    least = math.sqrt(SETTLING_RATIO)
     return [
         Finding(
             c.path,

@@ -118,12 +118,12 @@ def broken(table: pl.LazyFrame, columns: tuple[str, ...]) -> list[tuple[str, str
         In the order of the columns and of their rules.
 
     """
-    asked = [(column, code) for column in columns for code in _rules_of(column)]
+    rules = [(column, code) for column in columns for code in _rules_of(column)]
     kept = table.select(
-        RULES[code](column).all().alias(str(place)) for place, (column, code) in enumerate(asked)
+        RULES[code](column).all().alias(str(place)) for place, (column, code) in enumerate(rules)
     )
-    answers = kept.collect().row(0) if asked else ()
-    return [one for one, holds in zip(asked, answers, strict=True) if not holds]
+    answers = kept.collect().row(0) if rules else ()
+    return [one for one, holds in zip(rules, answers, strict=True) if not holds]
 
 
 def check_tables(capture: Capture) -> None:

@@ -79,7 +79,7 @@ def validate(
     if refusals or broken:
         raise merged(_causes_first(refusals) or broken)
     settings = {**missing_values.GATE.settings(), **options.get(missing_values.NAME, {})}
-    parted = _streams_apart(capture, settings["dense_share"])
+    parted = _streams_split(capture, settings["dense_share"])
     return parted.with_masks(*masks), tuple(findings)
 
 
@@ -147,7 +147,7 @@ def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:
     return replace(capture, tables=tuple(tables)), [found]
 
 
-def _streams_apart(capture: Capture, dense_share: float) -> Capture:
+def _streams_split(capture: Capture, dense_share: float) -> Capture:
     """The capture with every slow stream of a fast table in a further table, on its own clock.
 
     A stream is slow where fewer than `dense_share` of the rows hold a value, most of them with

@@ -82,9 +82,9 @@ def disagreements(readings: Iterable[Reading]) -> tuple[Disagreement, ...]:
         by_quantity.setdefault(reading.quantity, []).append(reading)
     found = []
     for _, own in sorted(by_quantity.items()):
-        groups = max((_parted(way) for way in _ways(own)), key=len, default=[])
+        groups = max((_clusters(way) for way in _ways(own)), key=len, default=[])
         if len(groups) > 1:
-            found.append(_told(own, groups))
+            found.append(_disagreement(own, groups))
     return tuple(found)
 
 
@@ -97,7 +97,7 @@ def _ways(readings: Sequence[Reading]) -> list[list[Reading]]:
     return [sorted(own, key=lambda r: (r.value, r.path)) for _, own in ordered]
 
 
-def _parted(readings: list[Reading]) -> list[list[Reading]]:
+def _clusters(readings: list[Reading]) -> list[list[Reading]]:
     """Readings, in order of value, as groups that agree in themselves; one where they all do.
 
     Two neighbouring groups that are wider than the gap between them are one group that drifts.
@@ -108,9 +108,9 @@ def _parted(readings: list[Reading]) -> list[list[Reading]]:
     low, high = readings[:cut], readings[cut:]
     gap = math.log(high[0].value / low[-1].value)
     if gap < max(_width(low), _width(high)) and len(readings) > 2:
-        finer = [_parted(low), _parted(high)]
+        finer = [_clusters(low), _clusters(high)]
         return [readings] if max(map(len, finer)) == 1 else [*finer[0], *finer[1]]
-    return [*_parted(low), *_parted(high)]
+    return [*_clusters(low), *_clusters(high)]
 
 
 def _width(readings: Sequence[Reading]) -> float:
@@ -161,7 +161,7 @@ def _covariance(readings: Sequence[Reading], *, shared: bool = True) -> Array:
     return covariance + np.diag(spread**2)
 
 
-def _told(readings: Sequence[Reading], groups: list[list[Reading]]) -> Disagreement:
+def _disagreement(readings: Sequence[Reading], groups: list[list[Reading]]) -> Disagreement:
     """The groups of one way, joined by the readings of other ways that lie near one of them."""
     p_value = _p_value([r for own in groups for r in own])
     means = [_mean(own)[:2] for own in groups]

@@ -18,7 +18,7 @@ from pipeline.lots.gauge import study
 from pipeline.lots.lot_test import detectable, power
 from pipeline.lots.outliers import critical_z, robust_z
 from pipeline.lots.sample import Value
-from pipeline.lots.variance import parted
+from pipeline.lots.variance import variance_components
 from pipeline.lots.verdict import judge
 from pipeline.records.limits import ConstantLimits, Limits
 from pipeline.records.lot_constant import (
@@ -251,7 +251,7 @@ def _variance(made: Material, lots: Mapping[str, Sequence[float]]) -> tuple[Comp
         again.setdefault((value.motor_id, label(value)), []).append(value.value)
     biases = [b.bias for b in _stations(made) if b.bias is not None and b.u is not None]
     scatter = [v.u_a for v in made.found.values if v.u_a > 0.0]
-    return parted(lots, list(again.values()), scatter, biases)
+    return variance_components(lots, list(again.values()), scatter, biases)
 
 
 def gauge_of(repeats: Sequence[Value]) -> Gauge | None:

@@ -70,7 +70,7 @@ def _constant(one: ConstantLimits, term: Term) -> Iterable[str]:
     else:
         width = one.tolerance.in_unit(one.nominal, None, None)
     yield from _tighter(one, width or 0.0)
-    yield from _room(one, width)
+    yield from _width_faults(one, width)
 
 
 def _sizes(one: ConstantLimits) -> Iterable[str]:
@@ -110,7 +110,7 @@ def _tighter(one: ConstantLimits, width: float) -> Iterable[str]:
         yield f"maximum {one.maximum:g} is tighter than its design, which allows {high:g}"
 
 
-def _room(one: ConstantLimits, width: float | None) -> Iterable[str]:
+def _width_faults(one: ConstantLimits, width: float | None) -> Iterable[str]:
     nominal = one.nominal or 0.0
     low = one.minimum if one.minimum is not None else None if width is None else nominal - width
     high = one.maximum if one.maximum is not None else None if width is None else nominal + width

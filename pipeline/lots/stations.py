@@ -228,14 +228,16 @@ def _solve(
     solution = inverse @ right
     # The constraint's own share of the inverse carries no information.
     spread = inverse - np.ones((size, size)) / (scale * size)
-    spread *= max(1.0, _misfit(by_block.values(), column, solution, floor) / max(readings_left, 1))
+    spread *= max(
+        1.0, _chi_squared(by_block.values(), column, solution, floor) / max(readings_left, 1)
+    )
     for a, k in column.items():
         bias[a] = float(solution[k] - solution.mean())
         for b, j in column.items():
             covariance[a, b] = float(spread[k, j])
 
 
-def _misfit(
+def _chi_squared(
     blocks: Iterable[Sequence[Reading]],
     column: Mapping[str, int],
     solution: Array,

@@ -76,7 +76,7 @@ def nested(groups: Sequence[Sequence[float]]) -> Nested:
     return Nested(between, within, count - 1, dof_within)
 
 
-def parted(
+def variance_components(
     lots: Mapping[str, Sequence[float]],
     repeats: Sequence[Sequence[float]],
     u_a: Sequence[float],

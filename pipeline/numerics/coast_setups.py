@@ -121,7 +121,7 @@ def coast_setups(captures: Sequence[Capture], limits: Limits) -> tuple[Setup, ..
         falls = _falls(capture)
         if not falls:
             continue
-        fitting = (g for g in groups if not any(_apart(falls, others, limits) for _, others in g))
+        fitting = (g for g in groups if not any(_differ(falls, others, limits) for _, others in g))
         group = next(fitting, None)
         if group is not None:
             group.append((capture, falls))
@@ -190,7 +190,7 @@ def _ratios(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> li
     return found
 
 
-def _apart(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> bool:
+def _differ(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> bool:
     share = limits.share
     return any(abs(r - 1.0) > share * 0.5 * (r + 1.0) for r in _ratios(falls, others, limits))
 

@@ -174,7 +174,7 @@ class ModelVerdict(PlainRecord):
 
         """
         where = f"input={shlex.quote(folder)} motor={shlex.quote(motor_id)}"
-        return f"diagnose {where}{self._asked(self.effects)}"
+        return f"diagnose {where}{self._model_flags(self.effects)}"
 
     def adding(self, folder: str = "FOLDER") -> str:
         """The command that runs a folder with the effects that were found; empty where none was.
@@ -187,9 +187,9 @@ class ModelVerdict(PlainRecord):
         """
         if not self.missing:
             return ""
-        return f"run input={shlex.quote(folder)}{self._asked((*self.effects, *self.missing))}"
+        return f"run input={shlex.quote(folder)}{self._model_flags((*self.effects, *self.missing))}"
 
-    def _asked(self, effects: Sequence[str]) -> str:
+    def _model_flags(self, effects: Sequence[str]) -> str:
         model = "" if self.model == "standard" else f" model={self.model}"
         return model + effects_key(effects)
 

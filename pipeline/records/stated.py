@@ -52,7 +52,7 @@ def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:
     found = []
     names = {key for c in campaign.captures for key in c.meta.extra} | set(campaign.stated)
     for name in sorted(filter(may_be_stated, names)):
-        stated = _said(campaign.stated, name)
+        stated = _stated_value(campaign.stated, name)
         paths: tuple[str, ...] = ()
         if stated is None:
             pairs = {c.path: _pair(c.meta.extra, name) for c in campaign.captures}
@@ -65,7 +65,7 @@ def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:
     return tuple(found)
 
 
-def _said(stated: Mapping[str, float], name: str) -> tuple[float, float | None] | None:
+def _stated_value(stated: Mapping[str, float], name: str) -> tuple[float, float | None] | None:
     return (stated[name], stated.get(f"u_{name}")) if name in stated else None
 
 

@@ -123,10 +123,10 @@ def record(
     recording = _TESTS[test](session, how)
     if bench.temperature_hz is None:
         return recording
-    return replace(recording, tables=_parted(recording.tables[0], bench.temperature_hz))
+    return replace(recording, tables=_by_rate(recording.tables[0], bench.temperature_hz))
 
 
-def _parted(table: Table, rate_hz: float) -> tuple[Table, ...]:
+def _by_rate(table: Table, rate_hz: float) -> tuple[Table, ...]:
     """Thermometers on a slower clock of their own, first and last instant kept."""
     slow = [name for name in table if name.startswith("temp_")]
     if "t_s" not in table or not slow or len(slow) + 1 == len(table):

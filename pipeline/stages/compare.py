@@ -50,16 +50,16 @@ def _next(task: Task, result: Comparison) -> str:
     """A diagnosis where the model is off; a run with what was added, where that explains it."""
     if not result.errors:
         return ""
-    asked = shlex.quote
+    quote = shlex.quote
     model = "" if task.spec.name == "standard" else f" model={task.spec.name}"
     model += effects_key(task.spec.effects)
-    where = f"input={asked(task.folder)} motor={asked(task.campaign.motor_id)}"
-    output = f" output={asked(str(task.output))}"
+    where = f"input={quote(task.folder)} motor={quote(task.campaign.motor_id)}"
+    output = f" output={quote(str(task.output))}"
     if result.held_out is None or result.held_out > 1.0:
         return f"diagnose {where}{model}{output}"
     if task.spec.effects:
-        return f"run input={asked(task.folder)}{model}{output}"
-    return f"review motor={asked(task.campaign.motor_id)}{output}"
+        return f"run input={quote(task.folder)}{model}{output}"
+    return f"review motor={quote(task.campaign.motor_id)}{output}"
 
 
 def _write_page(output: Path, result: Comparison) -> None:

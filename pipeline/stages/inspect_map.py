@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pipeline.io.inspection.starter_map import Shape
 
 PREVIEW_ROWS = 3
-_ASKED = "asked, for neither names nor numbers say it:"
+_QUESTIONS = "asked, for neither names nor numbers say it:"
 _STATED = frozenset(METADATA) - {"contract", "sha256_rows"}
 
 
@@ -78,13 +78,13 @@ def folder(settings: InspectSettings) -> Outcome:
     seen = in_workers(_look_or_fault, tasks)
     looked = [one for one in seen if isinstance(one, Looked)]
     unread = [one for one in seen if isinstance(one, str)]
-    strangers = [one for one in looked if one.report.shape and not one.report.source]
-    known = [one for one in looked if one not in strangers and one.report.streams]
+    unmapped = [one for one in looked if one.report.shape and not one.report.source]
+    known = [one for one in looked if one not in unmapped and one.report.streams]
     lines = [f"{settings.file}: {counted(len(paths), 'file')}"]
     lines += _known_lines(known)
-    empty = [one.file for one in looked if one not in strangers and one not in known]
+    empty = [one.file for one in looked if one not in unmapped and one not in known]
     lines += [f"no table of numbers: {printable(path)}" for path in empty] + unread
-    more = finish(settings, settings.file, strangers, None, known)
+    more = finish(settings, settings.file, unmapped, None, known)
     result = {"files": [file_record(one.file, one.report) for one in looked], **more.result}
     return Outcome(more.exit_code, "\n".join(lines) + "\n" + more.text, more.errors, result=result)
 
@@ -122,7 +122,7 @@ def _is_data(path: str) -> bool:
 def finish(
     settings: InspectSettings,
     root: str,
-    strangers: Sequence[Looked],
+    unmapped: Sequence[Looked],
     only: tuple[str, ...] | None,
     known: Sequence[Looked] = (),
 ) -> Outcome:
@@ -137,15 +137,16 @@ def finish(
     text = ""
     asked: dict[str, str] = {}
     metadata = {key: value for key, value in settings.answers.items() if "." not in key}
-    if strangers:
-        groups = _groups(strangers)
-        names = name_patterns([one.file for one in strangers], frozenset(settings.answers))
-        by_name = any("contract" in dict(one.report.metadata) for one in strangers)
+    if unmapped:
+        groups = _groups(unmapped)
+        names = name_patterns([one.file for one in unmapped], frozenset(settings.answers))
+        by_name = any("contract" in dict(one.report.metadata) for one in unmapped)
         text = map_text([shape for shape, _ in groups], names, metadata, by_name=by_name)
         if only is None:
             lines += _shape_lines(groups, names)
         asked = _questions(groups, names, settings)
-        lines += [_ASKED, *(f"  {key}=  {words}" for key, words in asked.items())] if asked else []
+        if asked:
+            lines += [_QUESTIONS, *(f"  {key}=  {words}" for key, words in asked.items())]
         tasks = [PreviewTask(root, files[0], _read_limits(settings), text) for _, files in groups]
         lines += [line for preview in in_workers(preview_of, tasks) for line in preview]
     if metadata or settings.map or text:
@@ -178,11 +179,11 @@ def _with_known(
     return adopted_text([map_file(name, config_dir) for name in files], metadata, text)
 
 
-def _groups(strangers: Sequence[Looked]) -> list[tuple[Shape, list[str]]]:
+def _groups(unmapped: Sequence[Looked]) -> list[tuple[Shape, list[str]]]:
     """The shapes of the files, each with its files and what is seen in any of them."""
     shapes: dict[tuple[object, ...], Shape] = {}
     files: dict[tuple[object, ...], list[str]] = defaultdict(list)
-    for one in strangers:
+    for one in unmapped:
         shape = one.report.shape
         if shape is None:
             continue

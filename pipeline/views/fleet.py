@@ -117,13 +117,13 @@ def _row(
 ) -> MotorRow:
     failed = tuple((c.name, c.status) for c in sheet.checks if c.status in ("fail", "marginal"))
     common = {reason.text: number for number, reason in enumerate(reasons, 1)}
-    parted = [(reason, kind_of_reason(sheet, reason)) for reason in current.why]
-    own = [_less_badge(reason, failed) for reason, kind in parted if kind not in common]
+    kinds = [(reason, kind_of_reason(sheet, reason)) for reason in current.why]
+    own = [_less_badge(reason, failed) for reason, kind in kinds if kind not in common]
     return MotorRow(
         sheet,
         current,
         "; ".join((*status_lines(current), *own)),
-        tuple(sorted({common[kind] for _, kind in parted if kind in common})),
+        tuple(sorted({common[kind] for _, kind in kinds if kind in common})),
         failed,
         model_words(sheet.model, sheet.motor_id),
         tuple(_cell(sheet.constants.get(column.name), column.scale) for column in columns),

@@ -28,10 +28,10 @@ def blocks(
     """The same in tables of at most `width` characters that all begin with the first column."""
     cells = [[safe(cell) for cell in row] for row in rows]
     widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))]
-    return [_block(cells, columns, right) for columns in _parted(widths, width)]
+    return [_block(cells, columns, right) for columns in _column_blocks(widths, width)]
 
 
-def _parted(widths: Sequence[int], width: int) -> Iterator[list[int]]:
+def _column_blocks(widths: Sequence[int], width: int) -> Iterator[list[int]]:
     columns, used = [0], widths[0]
     for column, own in enumerate(widths[1:], 1):
         if used + len(GAP) + own > width and len(columns) > 1:

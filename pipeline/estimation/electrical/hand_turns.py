@@ -66,39 +66,39 @@ def turns_of(spin: Spin) -> list[Turn]:
     λ = ∫(v - v_0) dt, so the speed of the hand does not enter.
 
     """
-    loud = [
+    moving = [
         c
         for c in spin.channels
         if float(np.quantile(np.abs(c.v_v), 0.9)) > 5.0 * white_noise_sigma(c.v_v)
     ]
-    if not loud or spin.t_s.size < 2:
+    if not moving or spin.t_s.size < 2:
         return []
     if spin.theta_rad is not None and np.isfinite(spin.theta_rad).all():
-        return _by_angle(spin, loud, spin.theta_rad)
-    if len(loud) >= 2:
-        return _by_vector(replace(spin, channels=tuple(loud)))
-    return [t for t in (_by_swings(spin, c) for c in loud) if t is not None]
+        return _by_angle(spin, moving, spin.theta_rad)
+    if len(moving) >= 2:
+        return _by_vector(replace(spin, channels=tuple(moving)))
+    return [t for t in (_by_swings(spin, c) for c in moving) if t is not None]
 
 
 def _flux_of(spin: Spin, channel: Channel) -> Array:
     """Integral of a voltage [Wb], phase to star point, less the offset seen at rest."""
-    v = channel.v_v - float(np.mean(channel.v_v[_quiet(channel.v_v)]))
+    v = channel.v_v - float(np.mean(channel.v_v[_at_rest(channel.v_v)]))
     flux: Array = cubic(spin.t_s, v) / channel.gain
     return flux
 
 
-def _quiet(v: Array) -> NDArray[np.bool_]:
+def _at_rest(v: Array) -> NDArray[np.bool_]:
     """Rows at rest: the first and last stretch below five sigma, or all where there is none."""
     sigma = max(white_noise_sigma(v), 1e-12)
-    loud = np.flatnonzero(np.abs(v - np.median(v)) > 5.0 * sigma)
-    quiet = np.zeros(v.size, dtype=bool)
-    if loud.size:
-        quiet[: loud[0]] = True
-        quiet[loud[-1] + 1 :] = True
-    return quiet if np.count_nonzero(quiet) >= 20 else np.ones(v.size, dtype=bool)
+    moving = np.flatnonzero(np.abs(v - np.median(v)) > 5.0 * sigma)
+    at_rest = np.zeros(v.size, dtype=bool)
+    if moving.size:
+        at_rest[: moving[0]] = True
+        at_rest[moving[-1] + 1 :] = True
+    return at_rest if np.count_nonzero(at_rest) >= 20 else np.ones(v.size, dtype=bool)
 
 
-def _by_angle(spin: Spin, loud: Sequence[Channel], theta: Array) -> list[Turn]:
+def _by_angle(spin: Spin, moving: Sequence[Channel], theta: Array) -> list[Turn]:
     """Cycles a turn as a real number: a scan of whole ones by the first voltage, then each own."""
     if float(np.ptp(theta)) < 0.5 * TURN_RAD:
         return []
@@ -107,17 +107,17 @@ def _by_angle(spin: Spin, loud: Sequence[Channel], theta: Array) -> list[Turn]:
         return []
     t, angle = spin.t_s[rows], theta[rows]
 
-    def misfit(flux: Array, cycles: float) -> float:
+    def residual_square(flux: Array, cycles: float) -> float:
         residuals = _steps_fit(t, flux, cycles * angle).residuals
         return float(residuals @ residuals)
 
     highest = int(min(200, math.pi / float(np.abs(np.diff(angle)).max())))
-    first = _flux_of(spin, loud[0])[rows]
-    best = min(range(1, max(highest, 2)), key=lambda cycles: misfit(first, cycles))
+    first = _flux_of(spin, moving[0])[rows]
+    best = min(range(1, max(highest, 2)), key=lambda cycles: residual_square(first, cycles))
     turns = []
-    for channel in loud:
+    for channel in moving:
         flux = _flux_of(spin, channel)
-        cycles = _least(partial(misfit, flux[rows]), best - 0.4, best + 0.4)
+        cycles = _least(partial(residual_square, flux[rows]), best - 0.4, best + 0.4)
         turns.append(_amplitude(spin, channel, flux, cycles * theta, cycles))
     return [turn for turn in turns if turn is not None]
 
@@ -164,7 +164,7 @@ def _by_vector(spin: Spin) -> list[Turn]:
     The centre c0 + c1 t is where |flux - centre|² is constant: |f|² = 2 Re(conj(f) centre) + k,
     linear in c0, c1 and k with the small |centre|² left in k.
     """
-    rest = [replace(c, v_v=c.v_v - float(np.mean(c.v_v[_quiet(c.v_v)]))) for c in spin.channels]
+    rest = [replace(c, v_v=c.v_v - float(np.mean(c.v_v[_at_rest(c.v_v)]))) for c in spin.channels]
     vector = replace(spin, channels=tuple(rest)).vector_v(centred=False)
     flux = cubic(spin.t_s, vector)
     flux = flux - flux.mean()
@@ -264,14 +264,14 @@ def _rest(v: Array) -> tuple[float, float]:
     """
     sigma = max(white_noise_sigma(v), 1e-12)
     level = float(np.median(np.concatenate([v[:10], v[-10:]])))
-    loud = np.flatnonzero(np.abs(v - level) > 5.0 * sigma)
-    if loud.size == 0 or loud[0] < 3 or v.size - 1 - loud[-1] < 3:
+    moving = np.flatnonzero(np.abs(v - level) > 5.0 * sigma)
+    if moving.size == 0 or moving[0] < 3 or v.size - 1 - moving[-1] < 3:
         return float(np.mean(v)), float(np.std(v))
-    first, last = int(loud[0]), int(v.size - 1 - loud[-1])
+    first, last = int(moving[0]), int(v.size - 1 - moving[-1])
     outer = np.concatenate([v[: first // 3], v[v.size - last // 3 :]])
-    quiet = np.concatenate([v[:first], v[v.size - last :]])
+    at_rest = np.concatenate([v[:first], v[v.size - last :]])
     offset = float(np.mean(outer))
-    moved = 0.5 * (float(np.mean(quiet)) - offset)
+    moved = 0.5 * (float(np.mean(at_rest)) - offset)
     return offset, math.hypot(sigma / math.sqrt(outer.size), moved)
 
 

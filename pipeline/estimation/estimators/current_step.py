@@ -145,7 +145,7 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
     """
     del known
     records, notes = _records(campaign.of("current_step"))
-    axes = _axes_told(records, options["least_share"])
+    axes = _axes_identified(records, options["least_share"])
     odd = disagreement(records)
     if odd or not axes:
         return METHOD.nothing(GIVES, "; ".join([*notes, odd or EXPERIMENT]))
@@ -185,7 +185,7 @@ def _records(captures: Sequence[Capture]) -> tuple[list[StepRecord], list[str]]:
     return records, notes
 
 
-def _axes_told(records: Sequence[StepRecord], least_share: float) -> tuple[str, ...]:
+def _axes_identified(records: Sequence[StepRecord], least_share: float) -> tuple[str, ...]:
     """Which of Ld and Lq these rotor angles separate: L = 2 (cos² Ld + sin² Lq)."""
     if not records:
         return ()

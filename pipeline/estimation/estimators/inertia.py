@@ -19,7 +19,7 @@ from pipeline.estimation.mechanical.drag import (
     drag_of,
     drag_words,
     too_short,
-    torque_is_parted,
+    torque_is_separable,
 )
 from pipeline.estimation.mechanical.setups import setups_of
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
@@ -202,7 +202,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     rows = _rows(known, campaign) if torque is not None else None
     if torque is None or rows is None or not np.any(rows.kind == DRIVE):
         missing = "a torque constant is not known" if torque is None else "no usable drive log"
-        missing = f"{missing}; {_parted(setups)}" if len(setups) > 1 else missing
+        missing = f"{missing}; {_setups_reason(setups)}" if len(setups) > 1 else missing
         return METHOD.nothing(GIVES, f"{missing}; {EXPERIMENT}")
     nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
     nuisances += [] if torque.reluctance_known else [RELUCTANCE]
@@ -212,7 +212,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if short := too_short(rows):
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
     found = drag_of(rows, acceleration(rows, driving), nuisances, options["level"])
-    if not torque_is_parted(found.design, found.sigma):
+    if not torque_is_separable(found.design, found.sigma):
         note = f"the drive's torque cannot be told from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     strange = _share_of_no_torque(rows, found)
@@ -224,7 +224,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         drags = METHOD.nothing(GIVES[1:], f"{_of_no_torque(strange)}; {LOAD}").estimates
         estimates = (estimates[0], *drags)
     if len(setups) > 1:
-        words = _parted(setups)
+        words = _setups_reason(setups)
         estimates = tuple(replace(e, note=f"{words}; {e.note}") for e in estimates)
     inertia = estimates[0]
     if inertia.known and inertia.u >= abs(inertia.number):
@@ -237,7 +237,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     return Fit(estimates, _evidence(rows, y, found))
 
 
-def _parted(setups: Sequence[Setup]) -> str:
+def _setups_reason(setups: Sequence[Setup]) -> str:
     """Why coasts were not used, in words."""
     return f"{setup_words(setups)}, so none is used beside the drives"
 

@@ -171,7 +171,7 @@ def _fit(captures: Sequence[Capture], options: Mapping[str, float]) -> Fit:
         wider = _wider(motion, coasts, found, options["level"])
         if wider == motion:
             break
-        found = _solve(wider, coasts, _carry(motion, wider, found.parameters, len(coasts)))
+        found = _solve(wider, coasts, _transferred(motion, wider, found.parameters, len(coasts)))
         motion = wider
     if not np.isfinite([found.u(0), found.u(1)]).all():
         return METHOD.nothing(
@@ -229,7 +229,7 @@ def _solve(motion: Motion, coasts: Sequence[Coast], start: Array | None) -> Nonl
     measured = np.concatenate([c.measured for c in coasts])
     weights = _weights(coasts)
     if start is None:
-        start = _first_guess(motion, coasts)
+        start = _initial_values(motion, coasts)
 
     def predict(parameters: Array) -> Array:
         return np.concatenate([motion.predict(i, c, parameters) for i, c in enumerate(coasts)])
@@ -243,7 +243,7 @@ def _solve(motion: Motion, coasts: Sequence[Coast], start: Array | None) -> Nonl
     return gauss_newton(model, start, iterations=15)
 
 
-def _first_guess(motion: Motion, coasts: Sequence[Coast]) -> Array:
+def _initial_values(motion: Motion, coasts: Sequence[Coast]) -> Array:
     span = max(float(c.t_s[-1]) for c in coasts)
     parts = [np.array([0.5 * motion.fastest_rad_s / span, 0.5 / span])]
     parts += [np.array([0.0, c.speed_rad_s]) for c in coasts]
@@ -266,7 +266,7 @@ def _wider(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit, level: 
     sigma = np.ones(found.residuals.size)
     tau = autocorrelation_time(found.residuals)
     trial = Motion(motion.extras + extras, motion.ripples, motion.fastest_rad_s)
-    start = _carry(motion, trial, found.parameters, len(coasts))
+    start = _transferred(motion, trial, found.parameters, len(coasts))
     weights = _weights(coasts)
 
     def predict(parameters: Array) -> Array:
@@ -293,7 +293,7 @@ def _wider(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit, level: 
     )
 
 
-def _carry(old: Motion, new: Motion, parameters: Array, coasts: int) -> Array:
+def _transferred(old: Motion, new: Motion, parameters: Array, coasts: int) -> Array:
     """Parameters of the old motion in the places of the new one, additions at zero."""
     drag = parameters[: len(SHARED) + len(old.extras)]
     parts = [drag, np.zeros(len(new.extras) - len(old.extras))]
@@ -349,8 +349,8 @@ def _form(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit) -> Array
                     coast.of_angle, coast.sigma,
                 )
             )  # fmt: skip
-        first = _first_guess(plain, halves)
-        start = _carry(Motion((), (), plain.fastest_rad_s), plain, first, len(halves))
+        first = _initial_values(plain, halves)
+        start = _transferred(Motion((), (), plain.fastest_rad_s), plain, first, len(halves))
         values.append(_solve(plain, halves, start).parameters[:2])
     apart = np.abs(values[1] - values[0])
     beside = np.abs(0.5 * (values[0] + values[1]) - found.parameters[:2])

@@ -281,16 +281,17 @@ def _drag(points: Sequence[Point], model: Regression) -> tuple[Array, Array, int
     covariance = inverse @ block @ inverse.T
     dof = model.dof
     if part.dof > 0:
-        lack = _lack(part.residuals, block, part.dof)
-        covariance = np.maximum(1.0, lack) * covariance
-        dof = part.dof if fdtrc(part.dof, model.dof, lack) < policy().torque_map.level else dof
+        lack_of_fit = _lack_of_fit(part.residuals, block, part.dof)
+        covariance = np.maximum(1.0, lack_of_fit) * covariance
+        if fdtrc(part.dof, model.dof, lack_of_fit) < policy().torque_map.level:
+            dof = part.dof
     least = -policy().evidence.sigmas * np.sqrt(np.diag(covariance)[:2])
     if np.any(part.coefficients[:2] < least):
         return *blank, "drag is not Coulomb and viscous: a fitted coefficient is negative"
     return part.coefficients[:2], covariance[:2, :2], dof, ""
 
 
-def _lack(residuals: Array, block: Array, dof: int) -> float:
+def _lack_of_fit(residuals: Array, block: Array, dof: int) -> float:
     return float(np.sum(residuals**2) / np.mean(np.diag(block)) / dof)
 
 

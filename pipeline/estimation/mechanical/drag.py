@@ -311,7 +311,7 @@ def too_short(rows: ShaftRows) -> str:
     )
 
 
-def torque_is_parted(design: Array, sigma: Array) -> bool:
+def torque_is_separable(design: Array, sigma: Array) -> bool:
     """Whether the torque is no linear combination of the other columns.
 
     Parameters

@@ -8,8 +8,8 @@ from pipeline.execution.caches.keys import key_of, model_parts
 from pipeline.execution.caches.run_cache import FOLDER
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.tasks.work import Stamp
+from pipeline.io.storage.checksummed import keep_checksummed, read_checksummed
 from pipeline.io.storage.code_version import closure_digest, libraries_version
-from pipeline.io.storage.sealed import keep_sealed, read_sealed
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.model_verdict import ModelVerdict
@@ -40,11 +40,11 @@ class ModelMemory:
 
     def recall(self, key: str) -> ModelVerdict | None:
         """The cached verdict of this key, else None."""
-        entry = read_sealed(self._path)
+        entry = read_checksummed(self._path)
         if entry is None or entry["key"] != key:
             return None
         return ModelVerdict.of(entry["model"])
 
     def keep(self, key: str, found: ModelVerdict) -> None:
         """Stores a verdict; a place that cannot be written is no failure."""
-        keep_sealed(self._path, {"key": key, "model": found.document()})
+        keep_checksummed(self._path, {"key": key, "model": found.document()})

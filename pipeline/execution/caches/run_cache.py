@@ -20,8 +20,8 @@ from pipeline.execution.jobs import Files, Finished
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Answer, Entry, Question
 from pipeline.io.maps.source_map import SourceMap
+from pipeline.io.storage.checksummed import keep_checksummed, read_checksummed
 from pipeline.io.storage.identity import Identities, Identity, identity, notes_folder
-from pipeline.io.storage.sealed import keep_sealed, read_sealed
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
@@ -48,7 +48,7 @@ class Batch:
 
 def note_motor(output: Path, motor_id: str, key: str, finished: Finished) -> None:
     """Records that a motor is done; its files are on the disk already."""
-    keep_sealed(
+    keep_checksummed(
         motor_note(output, motor_id),
         {
             "key": key,
@@ -64,12 +64,12 @@ def note_files(output: Path, motor_id: str, files: Files) -> None:
     An entry that cannot be written is no failure: the motor is then processed again.
     """
     path = motor_note(output, motor_id)
-    entry = read_sealed(path)
+    entry = read_checksummed(path)
     if entry is None:
         return
     changed = dict(files)
     entry["files"] = [[name, changed.get(name, sha256)] for name, sha256 in entry["files"]]
-    keep_sealed(path, entry)
+    keep_checksummed(path, entry)
 
 
 class RunCache:
@@ -93,7 +93,7 @@ class RunCache:
         recover: bool,
     ) -> dict[int, Answer]:
         """Answers by the number of the question, for files that have not changed."""
-        entries = (read_sealed(self._notes / "survey.json") if self.on else None) or {}
+        entries = (read_checksummed(self._notes / "survey.json") if self.on else None) or {}
         self._context = partial(
             answer_parts, tools(SURVEY), sources=sources, limits=limits, recover=recover
         )
@@ -118,7 +118,7 @@ class RunCache:
             if before == identity(self._folder / answer.path):
                 self._inputs.note(answer.path, before, answer.sha256)
                 notes[answer.path] = _answer_note(self._key(question, answer.sha256), answer)
-        keep_sealed(self._notes / "survey.json", notes)
+        keep_checksummed(self._notes / "survey.json", notes)
         self._inputs.save()
 
     def _key(self, question: Question, sha256: str) -> str:
@@ -132,7 +132,7 @@ class RunCache:
 
     def finished(self, motor_id: str, key: str) -> Finished | None:
         """The finished motor of this key, or None where a file of it is missing or changed."""
-        entry = read_sealed(motor_note(self._notes.parent, motor_id)) if self.on else None
+        entry = read_checksummed(motor_note(self._notes.parent, motor_id)) if self.on else None
         if entry is None or entry["key"] != key:
             return None
         files = tuple((name, sha256) for name, sha256 in entry["files"])
@@ -142,7 +142,7 @@ class RunCache:
 
     def outcome(self, key: str) -> Batch | None:
         """The finished batch of this key, or None where a file of it is missing or changed."""
-        entry = read_sealed(self._notes / "run.json") if self.on else None
+        entry = read_checksummed(self._notes / "run.json") if self.on else None
         if entry is None or entry["key"] != key:
             return None
         if not all(self._outputs.holds(name, sha256) for name, sha256 in entry["files"]):
@@ -167,7 +167,7 @@ class RunCache:
             "files": [list(file) for file in files],
             "contents": [[*key, sha256] for key, sha256 in batch.contents],
         }
-        keep_sealed(self._notes / "run.json", entry)
+        keep_checksummed(self._notes / "run.json", entry)
 
     def forget_others(self, motors: Sequence[str]) -> None:
         """Removes the entries of motors that are no longer in the batch."""

@@ -96,7 +96,7 @@ def check(
 ) -> Judged:
     """Makes every check of fitted constants, and compares the model with the captures."""
     with watch.stage("crosscheck"):
-        apart = captures_apart(campaign, job.fit)
+        apart = disagreements_between_captures(campaign, job.fit)
         checks = check_all(constants, campaign, job.crosscheck, apart)
     with watch.stage("residual test"):
         tested = judged_model(campaign, job.model, constants, verdicts, job.diagnose)
@@ -104,7 +104,7 @@ def check(
     return Judged(constants, (), checks, tested.verdict, findings, tested.diagnosis)
 
 
-def captures_apart(
+def disagreements_between_captures(
     campaign: Campaign, options: Mapping[str, Mapping[str, float]]
 ) -> tuple[Disagreement, ...]:
     """Disagreements between captures that are not of one motor.

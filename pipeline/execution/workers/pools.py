@@ -155,14 +155,14 @@ class _Dask:
         from distributed.client import FutureCancelledError
         from distributed.comm.core import CommClosedError
 
-        with _quiet(), _client(self.cluster, workers) as client:
+        with _silenced(), _client(self.cluster, workers) as client:
             executor = client.get_executor(pure=False)
             lost = (CancelledError, FutureCancelledError, CommClosedError)
             yield Pool(executor, (KilledWorker,), lost, isolates_crashes=True)
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def _silenced() -> Iterator[None]:
     """Silences the tracebacks of Dask's own threads; the driver reports failures in one line."""
     names = [n for n in logging.root.manager.loggerDict if n.split(".")[0] in NOISY_LOGGERS]
     before = {logger: logger.level for logger in map(logging.getLogger, names)}

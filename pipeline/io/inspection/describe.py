@@ -31,7 +31,7 @@ from pipeline.records.errors import CaptureError
 from pipeline.records.naming import counted
 from pipeline.records.parse import whole
 
-_WORTH_TELLING = 0.01
+_NOTABLE_JITTER = 0.01
 _GAP = 1.5
 
 
@@ -325,7 +325,7 @@ def _clock_words(steps: NDArray[np.float64], step: float) -> str:
     """Jitter and gaps of a clock, steps [s] against their median, where there are any."""
     remarks = []
     jitter = float(np.nanmedian(np.abs(steps - step))) / step
-    if jitter > _WORTH_TELLING:
+    if jitter > _NOTABLE_JITTER:
         remarks.append(f"steps vary by {jitter:.1%}")
     gaps = int(np.count_nonzero(steps > _GAP * step))
     if gaps:

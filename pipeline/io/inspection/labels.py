@@ -59,7 +59,7 @@ def read_label(name: str, unit_row: str | None = None) -> Label:
     """
     if last_part(name) in COLUMNS and not unit_row:
         return Label((last_part(name),), None, None, exact=True)
-    stem, text = _parted(name.strip(), unit_row)
+    stem, text = _without_unit(name.strip(), unit_row)
     stem = last_part(stem.rstrip("."))
     dimensions = {unit for unit in FOREIGN_UNITS if text and known_unit(unit, text) is not None}
     found = tuple(c for c in _columns(stem) if not dimensions or COLUMNS[c].unit in dimensions)
@@ -128,8 +128,8 @@ def words_of(text: str) -> tuple[str, ...]:
         The name.
 
     """
-    parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
-    return tuple(re.findall(r"[^\W_]+", plain(parted)))
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
+    return tuple(re.findall(r"[^\W_]+", plain(spaced)))
 
 
 def plain(text: str) -> str:
@@ -160,7 +160,7 @@ def matches(words: tuple[str, ...], stems: tuple[str, ...]) -> bool:
     return any(word in stems or any(stem in word for stem in long) for word in words)
 
 
-def _parted(bare: str, unit_row: str | None) -> tuple[str, str | None]:
+def _without_unit(bare: str, unit_row: str | None) -> tuple[str, str | None]:
     """The name without its unit, and the unit that is written, if any."""
     bracket = _BRACKET.match(bare)
     if bracket:

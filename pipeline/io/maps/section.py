@@ -22,8 +22,8 @@ class Section:
             plain = {}
         if not isinstance(plain, dict):
             raise self.fault("", "is no map of keys", "write `key: value` lines")
-        self.left: dict[str, Any] = dict(plain)
-        self.asked: list[str] = []
+        self.remaining: dict[str, Any] = dict(plain)
+        self.known_keys: list[str] = []
 
     def fault(self, key: str, what: str, remedy: str) -> UsageError:
         """An error that names the map and the key.
@@ -50,14 +50,18 @@ class Section:
             The key.
 
         """
-        self.asked.append(key)
-        return self.left.pop(key, None)
+        self.known_keys.append(key)
+        return self.remaining.pop(key, None)
 
     def close(self) -> None:
         """Raises UsageError for a key that nobody asked for."""
-        for key in self.left:
-            near = difflib.get_close_matches(key, self.asked, 1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known keys: {', '.join(self.asked)}"
+        for key in self.remaining:
+            near = difflib.get_close_matches(key, self.known_keys, 1)
+            hint = (
+                f"did you mean {near[0]!r}?"
+                if near
+                else f"known keys: {', '.join(self.known_keys)}"
+            )
             raise self.fault(key, "is no key of a source map", hint)
 
     def section(self, key: str) -> Section:

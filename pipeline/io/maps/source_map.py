@@ -454,7 +454,7 @@ def _whole(section: Section, key: str, default: int) -> int:
 
 def _fields(section: Section) -> tuple[FieldMap, ...]:
     found: list[FieldMap] = []
-    for name in list(section.left):
+    for name in list(section.remaining):
         plain = section.take(name)
         plain = {"column": plain} if isinstance(plain, str) else plain
         part = Section(section.source, f"fields.{name}", plain)
@@ -497,11 +497,11 @@ def _positive(section: Section, key: str) -> float | None:
 
 
 def _pairs(section: Section) -> Pairs:
-    return tuple((key, section.text(key) or "") for key in list(section.left))
+    return tuple((key, section.text(key) or "") for key in list(section.remaining))
 
 
 def _per_key(section: Section) -> tuple[tuple[str, Pairs], ...]:
-    return tuple((key, _pairs(section.section(key))) for key in list(section.left))
+    return tuple((key, _pairs(section.section(key))) for key in list(section.remaining))
 
 
 def _file_names(section: Section) -> tuple[str, ...]:

@@ -74,8 +74,8 @@ class Column:
         if self._dtype is not None:
             dtype = np.result_type(self._dtype, dtype)
         if dtype != self._dtype or stop > self._buffer.size:
-            room = max(int(_SLACK * values.size * batches), 2 * self._size, stop)
-            moved = np.empty(room, dtype)
+            capacity = max(int(_SLACK * values.size * batches), 2 * self._size, stop)
+            moved = np.empty(capacity, dtype)
             moved[: self._size] = self._buffer[: self._size]
             self._buffer, self._dtype = moved, dtype
         self._buffer[self._size : stop].reshape(values.shape)[...] = values

@@ -36,7 +36,7 @@ from pipeline.io.recordings.capture_traces import (
 from pipeline.io.recordings.capture_views import Shown, capture_layout
 from pipeline.io.recordings.datasheet_page import sheet_markdown
 from pipeline.io.recordings.error_map import send_frame, send_map
-from pipeline.io.recordings.seal import write_sealed
+from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
     recording,
     send_axis_ends,
@@ -86,7 +86,7 @@ def write_recording(
         The disk refuses.
 
     """
-    write_sealed(path, recording_bytes(capture, evidence, datasheet, findings))
+    write_checksummed(path, recording_bytes(capture, evidence, datasheet, findings))
 
 
 def recording_bytes(

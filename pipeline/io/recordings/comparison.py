@@ -16,7 +16,7 @@ import numpy as np
 import polars as pl
 
 from pipeline.io.recordings.datasheet_page import plain
-from pipeline.io.recordings.seal import write_sealed
+from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
     TIME,
     recording,
@@ -66,7 +66,7 @@ def write_comparison_recording(result: Comparison, path: Path) -> None:
         The disk refuses.
 
     """
-    write_sealed(path, comparison_bytes(result))
+    write_checksummed(path, comparison_bytes(result))
 
 
 def comparison_bytes(result: Comparison) -> bytes:

@@ -30,7 +30,7 @@ from pipeline.io.recordings.ladder_scales import (
     map_reach,
 )
 from pipeline.io.recordings.ladder_views import ladder_layout
-from pipeline.io.recordings.seal import write_sealed
+from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import recording, send_axis_ends, send_bars, send_property
 from pipeline.io.recordings.views import MEASURED, MODEL, RESIDUAL
 from pipeline.io.storage.publish import canonical_json
@@ -59,7 +59,7 @@ def write_ladder_recording(result: Diagnosis, path: Path) -> None:
         The disk refuses.
 
     """
-    write_sealed(path, ladder_bytes(result))
+    write_checksummed(path, ladder_bytes(result))
 
 
 def ladder_bytes(result: Diagnosis) -> bytes:

@@ -36,7 +36,7 @@ from pipeline.io.recordings.lots_traces import (
     histogram,
 )
 from pipeline.io.recordings.lots_views import lots_layout
-from pipeline.io.recordings.seal import write_sealed
+from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
     Trace,
     recording,
@@ -87,7 +87,7 @@ def write_lots_recording(result: LotRegression, path: Path) -> None:
         The disk refuses.
 
     """
-    write_sealed(path, lots_bytes(result))
+    write_checksummed(path, lots_bytes(result))
 
 
 def lots_bytes(result: LotRegression) -> bytes:

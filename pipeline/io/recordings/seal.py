@@ -17,7 +17,7 @@ MAGIC = b"RRF2"
 REMEDY = "run the command that wrote it again"
 
 
-def write_sealed(path: Path, content: bytes) -> None:
+def write_checksummed(path: Path, content: bytes) -> None:
     """Writes a recording and its checksum, each whole or not at all.
 
     Parameters

@@ -26,8 +26,8 @@ from typing import Any
 
 import pipeline
 from pipeline.io.storage import syntax
+from pipeline.io.storage.checksummed import keep_checksummed, read_checksummed
 from pipeline.io.storage.identity import notes_folder
-from pipeline.io.storage.sealed import keep_sealed, read_sealed
 from pipeline.io.storage.syntax import BY_TEXT, Import, Syntax, syntax_of
 from pipeline.plugins import outside_version
 
@@ -222,7 +222,7 @@ class Code:
         """Keeps what sources say for the next start; without a place it is found out again."""
         if self._notes is not None and self._new:
             kept = [*self._kept.items(), *self._new.items()][-MOST_KEPT:]
-            keep_sealed(self._notes, {"form": _form(), "syntax": dict(kept)})
+            keep_checksummed(self._notes, {"form": _form(), "syntax": dict(kept)})
         self._kept |= self._new
         self._new = {}
 
@@ -255,7 +255,7 @@ class Code:
 
 def _kept(notes: Path | None) -> dict[str, Any]:
     """What is known of sources by the sha256 of their bytes."""
-    kept = None if notes is None else read_sealed(notes)
+    kept = None if notes is None else read_checksummed(notes)
     if not isinstance(kept, dict) or kept.get("form") != _form():
         return {}
     return dict(kept["syntax"])

@@ -15,7 +15,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from pipeline.io.storage.sealed import keep_sealed, read_sealed
+from pipeline.io.storage.checksummed import keep_checksummed, read_checksummed
 
 Identity = tuple[int, int, int, int, int]
 _FINE_NS = 50_000_000
@@ -73,7 +73,7 @@ class Identities:
         if notes is not None:
             name = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:32]
             self._path = notes / f"{name}.json"
-            found = read_sealed(self._path)
+            found = read_checksummed(self._path)
             files = found.get("files", {}) if isinstance(found, dict) else {}
             self._known = {file: (_identity(noted[0]), noted[1]) for file, noted in files.items()}
         self._changed = False
@@ -143,7 +143,7 @@ class Identities:
             for file, (seen, sha256) in self._known.items()
             if now - max(seen[3], seen[4]) > _instant_ns(seen)
         }
-        keep_sealed(self._path, {"files": files})
+        keep_checksummed(self._path, {"files": files})
         _prune(self._path.parent)
 
 

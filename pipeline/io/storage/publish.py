@@ -106,9 +106,9 @@ def together(folder: Path) -> Iterator[Callable[[str, bytes], None]]:
         for temporary, path in reversed(waiting):
             with _refusals(path):
                 temporary.replace(path)
-        for room in dict.fromkeys(path.parent for _, path in waiting):
-            with _refusals(room):
-                sync_folder(room)
+        for parent in dict.fromkeys(path.parent for _, path in waiting):
+            with _refusals(parent):
+                sync_folder(parent)
     finally:
         for temporary, _ in waiting:
             with suppress(OSError):

@@ -72,7 +72,7 @@ def syntax_of(content: bytes, package: str) -> Syntax:
         if (text := _place(node, package)) is not None:
             own.append(Import(0, text, "", BY_TEXT))
     parts: list[str] = []
-    _tell(tree, package, parts)
+    _append_text(tree, package, parts)
     return Syntax(
         hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest(),
         tuple(dict.fromkeys(own)),
@@ -115,7 +115,7 @@ def _place(node: Any, package: str) -> str | None:
     return node.value if top == package and rest and all(map(str.isidentifier, rest)) else None
 
 
-def _tell(value: Any, package: str, parts: list[str]) -> None:
+def _append_text(value: Any, package: str, parts: list[str]) -> None:
     """The tree as text: the same for every release of Python that has the syntax.
 
     Fields that are empty are left out, for a release may know more of them than another.
@@ -131,12 +131,12 @@ def _tell(value: Any, package: str, parts: list[str]) -> None:
             if name in NO_MEANING or part is None or part == []:
                 continue
             parts.append(name)
-            _tell(part, package, parts)
+            _append_text(part, package, parts)
         parts.append(")")
     elif isinstance(value, list):
         parts.append("[")
         for part in value:
-            _tell(part, package, parts)
+            _append_text(part, package, parts)
         parts.append("]")
     else:
         parts.append(repr(value))

@@ -106,7 +106,7 @@ def efficiency_chart(cells: Sequence[MapCell], envelope: Curve | None) -> str:
         marks.append(
             f'<rect fill="{heat_colour(share)}" x="{across[0]:.1f}" y="{up[1]:.1f}" '
             f'width="{across[1] - across[0] + 0.3:.1f}" height="{up[0] - up[1] + 0.3:.1f}">'
-            f"<title>{escape(_told(c))}</title></rect>"
+            f"<title>{escape(_cell_title(c))}</title></rect>"
         )
     if envelope is not None:
         within = [(w, t) for w, t in zip(envelope.x, envelope.value, strict=True) if t <= top]
@@ -129,7 +129,7 @@ def heat_colour(share: float) -> str:
     return "#" + "".join(f"{round(float(c)):02x}" for c in mixed)
 
 
-def _told(c: MapCell) -> str:
+def _cell_title(c: MapCell) -> str:
     parts = [
         f"{c.omega_mech_rad_s:.4g} rad/s, {quantity(c.torque_shaft_nm, 'N·m', 3)}",
         f"{100 * c.efficiency:.2f} % ({100 * c.low:.2f} to {100 * c.high:.2f})",

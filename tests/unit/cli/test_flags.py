@@ -16,7 +16,7 @@ from pipeline.cli import multirun
 from pipeline.cli.commands import COMMANDS
 from pipeline.cli.completion import candidates
 from pipeline.cli.configuration import load_settings
-from pipeline.cli.flags import FLAGS, Flags, parted
+from pipeline.cli.flags import FLAGS, Flags, split_flags
 from pipeline.records.outcome import Outcome
 
 ROOT = Path(__file__).parents[3]
@@ -29,7 +29,7 @@ def printed(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> s
 
 
 def test_flags_stand_anywhere_and_leave_the_other_words_in_order() -> None:
-    flags, rest = parted(["run", "-m", "input=a", "--config-dir", "b c", "--cfg=job", "x=-1"])
+    flags, rest = split_flags(["run", "-m", "input=a", "--config-dir", "b c", "--cfg=job", "x=-1"])
     assert flags == Flags(multirun=True, config_dir="b c", cfg="job")
     assert rest == ["run", "input=a", "x=-1"]
 
@@ -83,7 +83,7 @@ def test_every_example_of_the_help_is_taken(name: str) -> None:
     command = COMMANDS[name]
     assert command.examples
     for example in command.examples:
-        flags, (word, *words) = parted(example.replace("'", "").split())
+        flags, (word, *words) = split_flags(example.replace("'", "").split())
         assert word == name
         swept = [each for each in words if not each.startswith("model=")]
         load_settings(command, [w for w in (swept if flags.multirun else words) if "=" in w])

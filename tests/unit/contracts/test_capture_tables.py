@@ -13,7 +13,7 @@ from pipeline.contracts.validate import (
     _filled_rows,
     _rows_once,
     _slow_columns,
-    _streams_apart,
+    _streams_split,
     _without_blanks,
 )
 from pipeline.records.errors import CaptureError
@@ -32,14 +32,14 @@ def test_slow_streams_have_a_table_of_their_own() -> None:
     assert _slow_columns(table, 0.3) == []
     assert _slow_columns(table.drop("iq_a"), 0.5) == []
     made = replace(capture("drive", iq_a=t_s), tables=(table,))
-    parted = _streams_apart(made, 0.5)
+    parted = _streams_split(made, 0.5)
     assert [t.columns for t in parted.tables] == [
         ["t_s", "iq_a", "id_a"],
         ["t_s", "temp_case_degc"],
     ]
     assert parted.tables[1].height == 134
     assert parted.tables[1]["t_s"][1] == pytest.approx(3e-3)
-    assert _streams_apart(made, 0.3) is made
+    assert _streams_split(made, 0.3) is made
 
 
 def test_columns_without_a_value_are_not_there() -> None:

@@ -10,6 +10,7 @@ import pytest
 from pipeline.estimation.electrical.back_emf import Channel, Spin
 from pipeline.estimation.electrical.hand_turns import (
     _amplitude,
+    _at_rest,
     _by_angle,
     _by_swings,
     _by_vector,
@@ -21,7 +22,6 @@ from pipeline.estimation.electrical.hand_turns import (
     _knots,
     _least,
     _one_swing,
-    _quiet,
     _rest,
     _steps_fit,
     turns_of,
@@ -106,17 +106,17 @@ def test_a_step_of_longer_duration_weighs_less() -> None:
 def test_rest_is_what_lies_before_the_first_loud_row_and_after_the_last() -> None:
     v = alternating(100, 0.01)
     v[30:70] += 5.0
-    quiet = _quiet(v)
+    quiet = _at_rest(v)
     assert list(np.flatnonzero(~quiet)) == list(range(30, 70))
     # a median of 5 makes the ends loud: too few rows at rest are none
     v = alternating(100, 0.01)
     v[9:91] += 5.0
-    assert _quiet(v).all()
+    assert _at_rest(v).all()
     for rest, count in ((19, 60), (20, 20)):
         v = alternating(60, 0.01)
         v[10 : 30 + (rest == 19)] += 5.0
         v[30 + (rest == 19) : 70 - rest] -= 5.0
-        assert np.count_nonzero(_quiet(v)) == count
+        assert np.count_nonzero(_at_rest(v)) == count
 
 
 def test_flux_is_the_integral_of_the_voltage_less_its_rest_over_the_gain() -> None:

@@ -158,12 +158,12 @@ def test_inertia_of_a_short_drive_is_right_or_refused(length_s: float) -> None:
 
 
 def test_torque_that_is_friction_in_disguise_is_not_parted() -> None:
-    from pipeline.estimation.mechanical.drag import torque_is_parted
+    from pipeline.estimation.mechanical.drag import torque_is_separable
 
     sense, speed = np.ones(40), np.linspace(1.0, 3.0, 40)
     rest = [sense, speed]
-    assert not torque_is_parted(np.column_stack([0.2 * sense + 0.1 * speed, *rest]), sense)
-    assert torque_is_parted(np.column_stack([speed**2, *rest]), sense)
+    assert not torque_is_separable(np.column_stack([0.2 * sense + 0.1 * speed, *rest]), sense)
+    assert torque_is_separable(np.column_stack([speed**2, *rest]), sense)
 
 
 def test_what_inertia_added_is_said_and_claims_no_effect() -> None:

@@ -26,7 +26,7 @@ from pipeline.estimation.mechanical.drag import (
     _without_dip,
     freedom,
     too_short,
-    torque_is_parted,
+    torque_is_separable,
 )
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
@@ -98,8 +98,8 @@ def test_a_torque_that_goes_with_speed_is_not_parted() -> None:
     sigma = np.full(30, 2.0)
     for torque, parted in ((np.cos(speed), True), (3.0 * speed - sense, False)):
         design = np.column_stack([torque, sense, speed])
-        assert torque_is_parted(design, sigma) is parted
-        assert torque_is_parted(1e-9 * design, sigma) is parted
+        assert torque_is_separable(design, sigma) is parted
+        assert torque_is_separable(1e-9 * design, sigma) is parted
 
 
 def test_each_kind_of_row_has_the_noise_that_it_leaves() -> None:
@@ -388,7 +388,7 @@ def test_deceleration_and_its_ripples() -> None:
     motion = spin_down.Motion(("windage",), ("cos", "sin"), 200.0)
     shared, own = motion.of_coast(1, np.arange(11.0))
     assert (shared.tolist(), own.tolist()) == ([0, 1, 2], [7, 8, 9, 10])
-    wider = spin_down._carry(
+    wider = spin_down._transferred(
         spin_down.Motion((), (), 200.0), motion, np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), 2
     )
     assert wider.tolist() == [1, 2, 0, 3, 4, 0, 0, 5, 6, 0, 0]

@@ -12,7 +12,7 @@ from pipeline.lots.capability import capability
 from pipeline.lots.chart import ewma_chart
 from pipeline.lots.equivalence import equivalence
 from pipeline.lots.outliers import critical_z, robust_z
-from pipeline.lots.variance import nested, parted
+from pipeline.lots.variance import nested, variance_components
 
 
 def test_equivalence_is_inclusion_of_the_90_percent_interval() -> None:
@@ -87,7 +87,7 @@ def test_components_come_back() -> None:
             name: (np.array(values) + 0.3 * rng.standard_normal(len(values))).tolist()
             for name, values in lots.items()
         }
-        found.append([part.sd for part in parted(noisy, again, [], [])])
+        found.append([part.sd for part in variance_components(noisy, again, [], [])])
     squares = np.square(np.array([[sd or 0.0 for sd in row] for row in found])).mean(axis=0)
     assert squares[0] == pytest.approx(0.25, rel=0.2)
     assert squares[2] == pytest.approx(1.0, rel=0.05)
@@ -132,7 +132,9 @@ def test_nested_by_hand() -> None:
 def test_the_parts_of_a_spread_by_hand() -> None:
     """Repeats ±0.1 (variance 0.02), motors within lots of variance 2, two stations ±0.5."""
     lots = {"a": [1.0, 3.0], "b": [6.0, 8.0]}
-    lot, station, motor, capture = parted(lots, [[4.9, 5.1], [7.0]], [0.3], [0.5, -0.5])
+    lot, station, motor, capture = variance_components(
+        lots, [[4.9, 5.1], [7.0]], [0.3], [0.5, -0.5]
+    )
     assert lot.sd == pytest.approx(math.sqrt((25.0 - 2.0) / 2.0))
     assert station.sd == pytest.approx(math.sqrt(0.5))
     assert motor.sd == pytest.approx(math.sqrt(2.0 - 0.02))
@@ -144,20 +146,20 @@ def test_the_parts_of_a_spread_by_hand() -> None:
 
 def test_without_repeats_the_fits_say_what_a_capture_scatters() -> None:
     lots = {"a": [1.0, 3.0]}
-    lot, station, motor, capture = parted(lots, [[5.0]], [0.3, 0.4], [0.7])
+    lot, station, motor, capture = variance_components(lots, [[5.0]], [0.3, 0.4], [0.7])
     assert (lot.sd, station.sd) == (None, None)
     assert capture.sd == pytest.approx(math.sqrt(0.125))
     assert capture.dof is None
     assert motor.sd == pytest.approx(math.sqrt(2.0 - 0.125))
     assert motor.share == pytest.approx(1.875 / 2.0)
-    nothing = parted({"a": [1.0, 3.0]}, [], [], [])
+    nothing = variance_components({"a": [1.0, 3.0]}, [], [], [])
     assert nothing[3].sd is None
     assert nothing[2].sd == pytest.approx(math.sqrt(2.0))
     assert nothing[0].note == "needs two lots"
-    single = parted({"a": [1.0], "b": [3.0]}, [], [], [])
+    single = variance_components({"a": [1.0], "b": [3.0]}, [], [], [])
     assert single[0].sd is None
     assert single[0].note == single[2].note == "needs two motors in a lot"
-    still = parted({"a": [1.0, 1.0], "b": [1.0, 1.0]}, [], [], [])
+    still = variance_components({"a": [1.0, 1.0], "b": [1.0, 1.0]}, [], [], [])
     assert [part.share for part in still] == [None, None, None, None]
 
 

@@ -13,7 +13,7 @@ from pipeline.records.errors import PipelineError
 _MAX_BYTES = 2**28
 
 
-def write_sealed(path: Path, document: Any) -> None:
+def write_checksummed(path: Path, document: Any) -> None:
     """Writes a document under its sha256, whole or not at all.
 
     Parameters
@@ -33,7 +33,7 @@ def write_sealed(path: Path, document: Any) -> None:
     write_whole(path, hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
 
 
-def read_sealed(path: Path) -> Any:
+def read_checksummed(path: Path) -> Any:
     """The document, or None where there is none that is whole.
 
     Parameters
@@ -65,7 +65,7 @@ def read_sealed(path: Path) -> Any:
         return None
 
 
-def keep_sealed(path: Path, document: Any) -> None:
+def keep_checksummed(path: Path, document: Any) -> None:
     """Writes a document that only saves time: a place that cannot be written is no failure.
 
     Parameters
@@ -77,6 +77,6 @@ def keep_sealed(path: Path, document: Any) -> None:
 
     """
     try:
-        write_sealed(path, document)
+        write_checksummed(path, document)
     except PipelineError:
         return
