@@ -14,7 +14,7 @@ from pipeline.estimation.estimators.torque_map import (
     _chosen,
     _drag,
     _enough,
-    _lack,
+    _lack_of_fit,
     _regress,
     _sigma,
     _untested_form,
@@ -142,7 +142,7 @@ def test_drag_is_the_line_through_the_offsets() -> None:
     _, wide, dof, why = _drag(points, regression(model.names, off, block, dof=12))
     left = linear_fit(design, np.array(off)).residuals
     lack = float(left @ left) / 2.5e-6
-    assert _lack(left, block, 1) == pytest.approx(lack)
+    assert _lack_of_fit(left, block, 1) == pytest.approx(lack)
     assert wide == pytest.approx(lack * covariance)
     assert dof == 1
     assert _untested_form(points, model, 0) == ()
