@@ -179,12 +179,12 @@ def _disagreement(readings: Sequence[Reading], groups: list[list[Reading]]) -> D
     )
 
 
-def parties(found: Sequence[Disagreement]) -> tuple[list[str], list[str]]:
+def parties(disagreements: Sequence[Disagreement]) -> tuple[list[str], list[str]]:
     """The captures of the usual motor and the odd ones, over all quantities.
 
     Parameters
     ----------
-    found
+    disagreements
         Disagreements of one motor.
 
     Returns
@@ -200,7 +200,7 @@ def parties(found: Sequence[Disagreement]) -> tuple[list[str], list[str]]:
     """
     odd: set[str] = set()
     usual: set[str] = set()
-    for one in sorted(found, key=lambda one: one.tied):
+    for one in sorted(disagreements, key=lambda one: one.tied):
         mine, others = set(one.usual.paths), set(one.odd_paths)
         as_it_is = len(mine & usual) + len(others & odd)
         exchanged = len(mine & odd) + len(others & usual)
@@ -211,17 +211,17 @@ def parties(found: Sequence[Disagreement]) -> tuple[list[str], list[str]]:
     return sorted(usual - odd), sorted(odd)
 
 
-def suspects(found: Sequence[Disagreement]) -> str:
+def suspects(disagreements: Sequence[Disagreement]) -> str:
     """Which files are of another motor, in words.
 
     Parameters
     ----------
-    found
+    disagreements
         Disagreements, at least one.
 
     """
-    usual, odd = parties(found)
-    if all(one.tied for one in found):
+    usual, odd = parties(disagreements)
+    if all(one.tied for one in disagreements):
         return f"{_named(usual)} against {_named(odd)}: of two motors?"
     agree = "agree with each other and not" if len(odd) > 1 else "does not agree"
     rest = f"with the other {len(usual)}" if len(usual) > 1 else f"with {usual[0]}"
@@ -251,12 +251,12 @@ def describe(one: Disagreement) -> str:
     return f"{one.quantity}{unit} is {' but '.join(groups)} (k=2)"
 
 
-def findings(found: Sequence[Disagreement]) -> tuple[Finding, ...]:
+def findings(disagreements: Sequence[Disagreement]) -> tuple[Finding, ...]:
     """One warning that names the odd files and every quantity in which they differ.
 
     Parameters
     ----------
-    found
+    disagreements
         Disagreements.
 
     Returns
@@ -265,10 +265,10 @@ def findings(found: Sequence[Disagreement]) -> tuple[Finding, ...]:
         Empty where there is none.
 
     """
-    if not found:
+    if not disagreements:
         return ()
-    words = f"{suspects(found)} {'; '.join(map(describe, found))}"
-    return (Finding(parties(found)[1][0], "warning", CODE, words, REMEDY),)
+    words = f"{suspects(disagreements)} {'; '.join(map(describe, disagreements))}"
+    return (Finding(parties(disagreements)[1][0], "warning", CODE, words, REMEDY),)
 
 
 def failing(name: str, concerned: Sequence[Disagreement]) -> Check:

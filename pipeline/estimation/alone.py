@@ -87,7 +87,7 @@ def readings(motor_id: str, captures: Iterable[Capture], options: Options) -> tu
 
 
 def _readings(motor_id: str, captures: Iterable[Capture], options: Options) -> tuple[Reading, ...]:
-    found: list[Reading] = []
+    readings: list[Reading] = []
     for capture in captures:
         constants, _, _ = fit_all(Campaign(motor_id, (capture,)), options)
         for name, quantity in QUANTITIES.items():
@@ -96,8 +96,8 @@ def _readings(motor_id: str, captures: Iterable[Capture], options: Options) -> t
                 continue
             reading = _reading(capture, estimate, quantity)
             if math.isfinite(reading.u_rel_model):
-                found.append(reading)
-    return tuple(found)
+                readings.append(reading)
+    return tuple(readings)
 
 
 def _reading(capture: Capture, estimate: Estimate, quantity: Quantity) -> Reading:

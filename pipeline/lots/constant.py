@@ -122,15 +122,15 @@ def result(
     )
 
 
-def _test(found: Assessment, family: Family, limits: Limits) -> LotTest:
-    lots, needed = len(found.base), limits.min_lots
-    if found.confounded:
+def _test(assessment: Assessment, family: Family, limits: Limits) -> LotTest:
+    lots, needed = len(assessment.base), limits.min_lots
+    if assessment.confounded:
         return LotTest("CONFOUNDED", lots, needed, None, None, None, None, False)
-    if found.contrast is None:
+    if assessment.contrast is None:
         return LotTest("not_evaluated", lots, needed, None, None, None, None, False)
     if lots < needed or family.lot_p_holm is None:
         return LotTest("INSUFFICIENT_HISTORY", lots, needed, None, None, None, None, False)
-    contrast = found.contrast
+    contrast = assessment.contrast
     t = contrast.lot_t
     return LotTest(
         "evaluated",
@@ -144,35 +144,35 @@ def _test(found: Assessment, family: Family, limits: Limits) -> LotTest:
     )
 
 
-def _equivalence(found: Assessment, margin: float | None, alpha: float) -> Equivalence:
-    if found.contrast is None or margin is None or found.within_sd is None:
+def _equivalence(assessment: Assessment, margin: float | None, alpha: float) -> Equivalence:
+    if assessment.contrast is None or margin is None or assessment.within_sd is None:
         return NOT_EVALUATED
-    contrast = found.contrast
+    contrast = assessment.contrast
     return equivalence(contrast.difference, contrast.u, contrast.dof, margin, alpha)
 
 
-def _effect(found: Assessment, k: float) -> EffectSize:
-    contrast = found.contrast
+def _effect(assessment: Assessment, k: float) -> EffectSize:
+    contrast = assessment.contrast
     if contrast is None:
         return EffectSize(None, None, None, None, None, None)
-    before = float(np.mean(found.base_means))
+    before = float(np.mean(assessment.base_means))
     return EffectSize(
         contrast.difference,
         contrast.u,
         k,
         k * contrast.u,
         contrast.difference / abs(before) if before else None,
-        contrast.difference / found.within_sd if found.within_sd else None,
+        contrast.difference / assessment.within_sd if assessment.within_sd else None,
     )
 
 
-def _power(found: Assessment, limits: Limits, family: int) -> Power:
+def _power(assessment: Assessment, limits: Limits, family: int) -> Power:
     """Against a shift of 1.5 standard deviations of motors, at the hardest step of Holm's."""
-    contrast = found.contrast
-    if contrast is None or not found.within_sd:
+    contrast = assessment.contrast
+    if contrast is None or not assessment.within_sd:
         return Power("none", None, None, None)
-    shift, alpha = SHIFT_SD * found.within_sd, limits.alpha / max(family, 1)
-    by_lots = len(found.base) >= limits.min_lots and contrast.lot_se is not None
+    shift, alpha = SHIFT_SD * assessment.within_sd, limits.alpha / max(family, 1)
+    by_lots = len(assessment.base) >= limits.min_lots and contrast.lot_se is not None
     se = contrast.lot_se if by_lots and contrast.lot_se is not None else contrast.u
     dof = contrast.lot_dof if by_lots and contrast.lot_dof is not None else contrast.dof
     return Power(
@@ -183,25 +183,28 @@ def _power(found: Assessment, limits: Limits, family: int) -> Power:
     )
 
 
-def _motors(found: Assessment, held: Held) -> tuple[MotorValue, ...]:
+def _motors(assessment: Assessment, held: Held) -> tuple[MotorValue, ...]:
     by_lot: dict[tuple[Side, str], list[Value]] = {}
-    for value in found.values:
+    for value in assessment.values:
         if value.side is not None:
             by_lot.setdefault((value.side, value.lot), []).append(value)
     keys = {key: f"{key[0]}/{key[1]}" for key in by_lot}
     scores = robust_z(
-        {keys[key]: [found.corrected[v.motor_id] for v in of_lot] for key, of_lot in by_lot.items()}
+        {
+            keys[key]: [assessment.corrected[v.motor_id] for v in of_lot]
+            for key, of_lot in by_lot.items()
+        }
     )
-    limit = critical_z(len(found.values), len(by_lot))
+    limit = critical_z(len(assessment.values), len(by_lot))
     return tuple(
         MotorValue(
             motor_id=value.motor_id,
             lot=value.lot,
             side=key[0],
             stations=value.stations,
-            value=found.corrected[value.motor_id],
+            value=assessment.corrected[value.motor_id],
             u=value.u,
-            correction=-found.correction.of(label(value)),
+            correction=-assessment.correction.of(label(value)),
             decision=held.decisions.get(value.motor_id, "not_evaluated"),
             z=z,
             outlier=abs(z) > limit,
@@ -212,21 +215,23 @@ def _motors(found: Assessment, held: Held) -> tuple[MotorValue, ...]:
     )
 
 
-def _lots(found: Assessment, limits: Limits, started: Mapping[str, str]) -> tuple[LotMean, ...]:
+def _lots(
+    assessment: Assessment, limits: Limits, started: Mapping[str, str]
+) -> tuple[LotMean, ...]:
     """Lot means in order of time; charted where the baseline has lots enough."""
     sides: list[tuple[Side, str, tuple[float, ...]]] = [
-        ("baseline", lot, values) for lot, values in found.base.items()
+        ("baseline", lot, values) for lot, values in assessment.base.items()
     ]
-    sides += [("candidate", lot, values) for lot, values in found.candidate.items()]
-    charted = len(found.base) >= limits.min_lots and bool(found.lots_sd)
+    sides += [("candidate", lot, values) for lot, values in assessment.candidate.items()]
+    charted = len(assessment.base) >= limits.min_lots and bool(assessment.lots_sd)
     if charted:
         means = np.array([np.mean(values) for _, _, values in sides])
-        centre = np.asarray(np.mean(found.base_means))
-        chart = ewma_chart(means, centre, np.asarray(found.lots_sd))
+        centre = np.asarray(np.mean(assessment.base_means))
+        chart = ewma_chart(means, centre, np.asarray(assessment.lots_sd))
     drawn = []
     for i, (side, lot, values) in enumerate(sides):
         sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
-        within_sd = found.within_sd if sd is None else sd
+        within_sd = assessment.within_sd if sd is None else sd
         drawn.append(
             LotMean(
                 lot,

@@ -57,71 +57,75 @@ def _rules(limits: Limits) -> Iterable[str]:
         yield "rules: code_negligible is above code_limit"
 
 
-def _constant(one: ConstantLimits, term: Term) -> Iterable[str]:
-    yield from _sizes(one)
-    low, high = one.minimum, one.maximum
+def _constant(limits: ConstantLimits, term: Term) -> Iterable[str]:
+    yield from _sizes(limits)
+    low, high = limits.minimum, limits.maximum
     if low is not None and high is not None and low >= high:
         yield f"minimum {low:g} is not below maximum {high:g}"
-    if one.nominal is None:
+    if limits.nominal is None:
         return
-    yield from _plausible(one, term)
-    if one.tolerance is None or one.tolerance.per not in ("unit", "nominal"):
+    yield from _plausible(limits, term)
+    if limits.tolerance is None or limits.tolerance.per not in ("unit", "nominal"):
         width = None
     else:
-        width = one.tolerance.in_unit(one.nominal, None, None)
-    yield from _tighter(one, width or 0.0)
-    yield from _width_faults(one, width)
+        width = limits.tolerance.in_unit(limits.nominal, None, None)
+    yield from _tighter(limits, width or 0.0)
+    yield from _width_faults(limits, width)
 
 
-def _sizes(one: ConstantLimits) -> Iterable[str]:
-    if one.tolerance is not None and one.tolerance.value <= 0.0:
+def _sizes(limits: ConstantLimits) -> Iterable[str]:
+    if limits.tolerance is not None and limits.tolerance.value <= 0.0:
         yield "tolerance is not positive"
-    if one.tolerance is not None and one.tolerance.per == "U":
+    if limits.tolerance is not None and limits.tolerance.per == "U":
         yield "tolerance counts in U: a worse bench would pass more motors"
-    if one.guard_band.value < 0.0:
+    if limits.guard_band.value < 0.0:
         yield "guard_band is negative: it would accept motors outside the tolerance"
-    if any(margin.value <= 0.0 for margin in one.margins):
+    if any(margin.value <= 0.0 for margin in limits.margins):
         yield "equivalence_margin is not positive"
-    if one.tolerate and not one.margins:
+    if limits.tolerate and not limits.margins:
         yield "tolerate_within_margin needs an equivalence_margin"
 
 
-def _plausible(one: ConstantLimits, term: Term) -> Iterable[str]:
-    nominal = one.nominal or 0.0
+def _plausible(limits: ConstantLimits, term: Term) -> Iterable[str]:
+    nominal = limits.nominal or 0.0
     low = -math.inf if term.low is None else term.low
     high = math.inf if term.high is None else term.high
     if not low <= nominal <= high:
         yield f"nominal {nominal:g} {term.unit} is beyond what the glossary takes for plausible"
-    for word, limit in (("minimum", one.minimum), ("maximum", one.maximum)):
+    for word, limit in (("minimum", limits.minimum), ("maximum", limits.maximum)):
         beyond = limit is not None and (limit > nominal if word == "minimum" else limit < nominal)
         if beyond:
             yield f"{word} {limit:g} leaves the nominal {nominal:g} outside"
 
 
-def _tighter(one: ConstantLimits, width: float) -> Iterable[str]:
+def _tighter(limits: ConstantLimits, width: float) -> Iterable[str]:
     """Test limits inside the design's own range."""
-    if width == 0.0 or one.nominal is None:
+    if width == 0.0 or limits.nominal is None:
         return
-    slack = 1e-12 * abs(one.nominal)
-    low, high = one.nominal - width, one.nominal + width
-    if one.minimum is not None and one.minimum > low + slack:
-        yield f"minimum {one.minimum:g} is tighter than its design, which allows {low:g}"
-    if one.maximum is not None and one.maximum < high - slack:
-        yield f"maximum {one.maximum:g} is tighter than its design, which allows {high:g}"
+    slack = 1e-12 * abs(limits.nominal)
+    low, high = limits.nominal - width, limits.nominal + width
+    if limits.minimum is not None and limits.minimum > low + slack:
+        yield f"minimum {limits.minimum:g} is tighter than its design, which allows {low:g}"
+    if limits.maximum is not None and limits.maximum < high - slack:
+        yield f"maximum {limits.maximum:g} is tighter than its design, which allows {high:g}"
 
 
-def _width_faults(one: ConstantLimits, width: float | None) -> Iterable[str]:
-    nominal = one.nominal or 0.0
-    low = one.minimum if one.minimum is not None else None if width is None else nominal - width
-    high = one.maximum if one.maximum is not None else None if width is None else nominal + width
+def _width_faults(limits: ConstantLimits, width: float | None) -> Iterable[str]:
+    nominal = limits.nominal or 0.0
+    low = (
+        limits.minimum if limits.minimum is not None else None if width is None else nominal - width
+    )
+    high = (
+        limits.maximum if limits.maximum is not None else None if width is None else nominal + width
+    )
     if low is None or high is None:
         return
-    guard = one.guard_band
-    if guard.per in ("unit", "nominal") and one.rule != "simple":
+    guard = limits.guard_band
+    if guard.per in ("unit", "nominal") and limits.rule != "simple":
         band = guard.in_unit(nominal, None, None) or 0.0
         if 2.0 * band >= high - low:
             yield f"guard_band {band:g} leaves nothing of the tolerance {low:g} to {high:g}"
-    for margin in one.margins:
+    for margin in limits.margins:
         size = margin.in_unit(nominal, None, None) if margin.per in ("unit", "nominal") else None
         if size is not None and size > high - low:
             yield f"equivalence_margin {size:g} is wider than the tolerance itself"

@@ -185,19 +185,26 @@ def _families(materials: Sequence[Material], limits: Limits) -> list[Family]:
     ]
 
 
-def _lot_p(found: Assessment, needed: int) -> float | None:
-    if found.contrast is None or len(found.base) < needed or _constant(found):
+def _lot_p(assessment: Assessment, needed: int) -> float | None:
+    if assessment.contrast is None or len(assessment.base) < needed or _constant(assessment):
         return None
-    return found.contrast.lot_p
+    return assessment.contrast.lot_p
 
 
-def _motor_p(found: Assessment) -> float | None:
-    return None if found.contrast is None or _constant(found) else found.contrast.motor_p
+def _motor_p(assessment: Assessment) -> float | None:
+    return (
+        None
+        if assessment.contrast is None or _constant(assessment)
+        else assessment.contrast.motor_p
+    )
 
 
-def _constant(found: Assessment) -> bool:
+def _constant(assessment: Assessment) -> bool:
     """Whether nothing scatters and nothing changed, as a count of poles does: no test of it."""
-    return found.contrast is not None and found.contrast.u == 0.0 == found.contrast.difference
+    return (
+        assessment.contrast is not None
+        and assessment.contrast.u == 0.0 == assessment.contrast.difference
+    )
 
 
 def _adjusted(p_values: Sequence[float | None]) -> list[float | None]:

@@ -50,7 +50,7 @@ class Judged(NamedTuple):
 def judge(
     limits: ConstantLimits,
     unit: str,
-    found: Assessment,
+    assessment: Assessment,
     conformity: Conformity,
     test: LotTest,
     same: Equivalence,
@@ -65,7 +65,7 @@ def judge(
         Of the constant.
     unit
         Of the constant.
-    found
+    assessment
         Its values and their contrast.
     conformity
         Decisions on the candidate's motors.
@@ -85,22 +85,22 @@ def judge(
         The verdict, and its reason in one sentence.
 
     """
-    if not found.candidate or not found.base:
-        side = "candidate" if not found.candidate else "baseline"
+    if not assessment.candidate or not assessment.base:
+        side = "candidate" if not assessment.candidate else "baseline"
         return Judged("not_evaluated", f"no motor of the {side} has it")
-    moved = _moved(found, unit)
+    moved = _moved(assessment, unit)
     if conformity.worst in ("fail", "conditional_fail"):
         return Judged("fail", f"{moved}: {_outside(conformity)}")
-    if found.confounded:
-        return Judged("CONFOUNDED", found.confounded)
-    changed = _changed(limits, unit, found, test, same, motor_p_holm, alpha, moved)
+    if assessment.confounded:
+        return Judged("CONFOUNDED", assessment.confounded)
+    changed = _changed(limits, unit, assessment, test, same, motor_p_holm, alpha, moved)
     return changed or _not_failed(conformity, test, same, moved)
 
 
 def _changed(
     limits: ConstantLimits,
     unit: str,
-    found: Assessment,
+    assessment: Assessment,
     test: LotTest,
     same: Equivalence,
     motor_p_holm: float | None,
@@ -116,7 +116,7 @@ def _changed(
             return Judged("marginal", f"{words}, yet within the margin")
         small = ", although within the margin" if same.status == "equivalent" else ""
         return Judged("fail", words + small)
-    if not _beyond(found, same, motor_p_holm, alpha):
+    if not _beyond(assessment, same, motor_p_holm, alpha):
         return None
     margin = quantity(same.margin or 0.0, unit, 3)
     return Judged("fail", f"{moved}: beyond the margin of {margin}, p {_p(motor_p_holm)} by motors")
@@ -177,15 +177,17 @@ def overall(
     return ("marginal", doubtful) if doubtful else ("pass", ())
 
 
-def _reasons(found: Sequence[ConstantResult | EffectChange], verdict: Verdict) -> tuple[str, ...]:
-    return tuple(f"{one.name}: {one.why}" for one in found if one.verdict == verdict)
+def _reasons(results: Sequence[ConstantResult | EffectChange], verdict: Verdict) -> tuple[str, ...]:
+    return tuple(f"{one.name}: {one.why}" for one in results if one.verdict == verdict)
 
 
-def _beyond(found: Assessment, same: Equivalence, motor_p_holm: float | None, alpha: float) -> bool:
+def _beyond(
+    assessment: Assessment, same: Equivalence, motor_p_holm: float | None, alpha: float
+) -> bool:
     """Whether the difference is beyond the margin and beyond the chance of drawing motors."""
-    if found.contrast is None or same.margin is None or motor_p_holm is None:
+    if assessment.contrast is None or same.margin is None or motor_p_holm is None:
         return False
-    return abs(found.contrast.difference) > same.margin and motor_p_holm < alpha
+    return abs(assessment.contrast.difference) > same.margin and motor_p_holm < alpha
 
 
 def _outside(conformity: Conformity) -> str:
@@ -196,12 +198,12 @@ def _outside(conformity: Conformity) -> str:
     return f"{number} of {total} motors outside the limits, {conformity.worst_motor} is a {kind}"
 
 
-def _moved(found: Assessment, unit: str) -> str:
+def _moved(assessment: Assessment, unit: str) -> str:
     """The change in words: relative where it can be, and where that share says something."""
-    if found.contrast is None:
+    if assessment.contrast is None:
         return "not compared with the baseline"
-    before = sum(found.base_means) / len(found.base_means)
-    change = found.contrast.difference
+    before = sum(assessment.base_means) / len(assessment.base_means)
+    change = assessment.contrast.difference
     if before and abs(change) <= MOST_RELATIVE * abs(before):
         return f"{100.0 * change / abs(before):+.3g} %"
     return f"{'+' if change > 0.0 else ''}{quantity(change, unit, 3)}"

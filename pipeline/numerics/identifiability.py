@@ -229,13 +229,13 @@ class Combination:
 
 
 def known_combinations(
-    found: Identified, values: Array, places: Sequence[int], positive: Sequence[int]
+    identified: Identified, values: Array, places: Sequence[int], positive: Sequence[int]
 ) -> tuple[Combination, ...]:
     """The simplest functions of parameters that are known although the parameters are not.
 
     Parameters
     ----------
-    found
+    identified
         What the data say of all parameters.
     values
         The parameters [p].
@@ -257,8 +257,14 @@ def known_combinations(
 
     """
     kept: list[Combination] = []
-    for one in (*_products(found, values, places, positive), *_sums(found, values, places)):
-        gradients = [*(other.gradient * found.sizes for other in kept), one.gradient * found.sizes]
+    for one in (
+        *_products(identified, values, places, positive),
+        *_sums(identified, values, places),
+    ):
+        gradients = [
+            *(other.gradient * identified.sizes for other in kept),
+            one.gradient * identified.sizes,
+        ]
         if within(np.array(one.u), np.array(one.size)) and _new(gradients):
             kept.append(one)
     return tuple(kept)
@@ -272,44 +278,46 @@ def _new(gradients: Sequence[Array]) -> bool:
 
 
 def _products(
-    found: Identified, values: Array, places: Sequence[int], positive: Sequence[int]
+    identified: Identified, values: Array, places: Sequence[int], positive: Sequence[int]
 ) -> Iterator[Combination]:
     """Ratios, products of two, and what three parameters make, the simplest first."""
-    places = [n for n in places if np.isinf(found.u[n])]
+    places = [n for n in places if np.isinf(identified.u[n])]
     below = [n for n in positive if n in places]
     for j in below:
-        yield from (_product(found, values, {i: 1, j: -1}) for i in places if i != j)
+        yield from (_product(identified, values, {i: 1, j: -1}) for i in places if i != j)
     for pair in combinations(places, 2):
-        yield _product(found, values, dict.fromkeys(pair, 1))
+        yield _product(identified, values, dict.fromkeys(pair, 1))
     for j in below:
         others = [n for n in places if n != j]
         for one, two in combinations(others, 2):
-            yield _product(found, values, {one: 1, two: 1, j: -1})
+            yield _product(identified, values, {one: 1, two: 1, j: -1})
     for one, two in combinations(below, 2):
         for i in (n for n in places if n not in (one, two)):
-            yield _product(found, values, {i: 1, one: -1, two: -1})
+            yield _product(identified, values, {i: 1, one: -1, two: -1})
 
 
-def _product(found: Identified, values: Array, powers: dict[int, int]) -> Combination:
+def _product(identified: Identified, values: Array, powers: dict[int, int]) -> Combination:
     """Π x^w, its gradient also where a factor of the numerator is zero."""
     gradient = np.zeros(values.size)
     for place, power in powers.items():
         rest = [values[n] ** w for n, w in powers.items() if n != place]
         gradient[place] = power * values[place] ** (power - 1) * float(np.prod(rest))
     value = float(np.prod([values[n] ** w for n, w in powers.items()]))
-    size = float(np.prod([(found.sizes if w > 0 else values)[n] ** w for n, w in powers.items()]))
-    u = found.u_of_bent(gradient)
+    size = float(
+        np.prod([(identified.sizes if w > 0 else values)[n] ** w for n, w in powers.items()])
+    )
+    u = identified.u_of_bent(gradient)
     return Combination(True, tuple(powers.items()), value, gradient, abs(size), u)
 
 
-def _sums(found: Identified, values: Array, places: Sequence[int]) -> Iterator[Combination]:
+def _sums(identified: Identified, values: Array, places: Sequence[int]) -> Iterator[Combination]:
     """X + w y of every two parameters that one direction without information moves together, or
     that are known poorly, with the w that is known best.
     """
     for one, two in combinations(places, 2):
         pair = [one, two]
-        sizes = found.sizes[pair]
-        open_ = found.null if found.null[pair].any() else found.root
+        sizes = identified.sizes[pair]
+        open_ = identified.null if identified.null[pair].any() else identified.root
         axes, _, _ = np.linalg.svd(open_[pair] / sizes[:, None])
         weight = axes[:, -1] / sizes
         if not weight.all():
@@ -318,18 +326,18 @@ def _sums(found: Identified, values: Array, places: Sequence[int]) -> Iterator[C
         gradient[pair] = weight / weight[0]
         weights = ((one, 1.0), (two, float(gradient[two])))
         size = float(np.max(np.abs(gradient[pair]) * sizes))
-        u = found.u_of(gradient)
+        u = identified.u_of(gradient)
         yield Combination(False, weights, float(gradient @ values), gradient, size, u)
 
 
 def walked(
-    found: Identified, values: Array, combinations_: Sequence[Combination], far: float
+    identified: Identified, values: Array, combinations_: Sequence[Combination], far: float
 ) -> Iterator[tuple[NDArray[np.bool_], Array]]:
     """Values at either end of every direction without information, the combinations being kept.
 
     Parameters
     ----------
-    found
+    identified
         What the data say of all parameters.
     values
         The parameters [p].
@@ -357,7 +365,7 @@ def walked(
             factors = np.column_stack([factors, powers])
     inside &= values != 0.0
     axes, _ = np.linalg.qr(factors)
-    for direction in found.null.T:
+    for direction in identified.null.T:
         logs = np.where(inside, direction / np.where(inside, values, 1.0), 0.0)
         logs -= axes @ (axes.T @ logs)
         logs /= max(float(np.abs(logs).max()), 1.0)

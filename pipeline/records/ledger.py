@@ -200,11 +200,11 @@ def histories(
             tagged.setdefault(event.key, set()).discard(event.why or "")
         else:
             decided.setdefault(event.key, []).append(event)
-    found: dict[str, list[Version]] = {}
+    histories: dict[str, list[Version]] = {}
     for key, event in published.items():
         decisions, tags = tuple(decided.get(key, ())), frozenset(tagged.get(key, ()))
-        found.setdefault(event.motor_id, []).append(Version(event, decisions, tags))
-    return {motor_id: tuple(found[motor_id]) for motor_id in sorted(found)}
+        histories.setdefault(event.motor_id, []).append(Version(event, decisions, tags))
+    return {motor_id: tuple(histories[motor_id]) for motor_id in sorted(histories)}
 
 
 def in_force(history: Sequence[Version]) -> Version | None:

@@ -136,7 +136,7 @@ def _computed(
     settings: RunSettings,
     registry: Registry | None,
     means: tuple[WorkerPool, RunCache, Stopwatch],
-    found: Survey,
+    survey: Survey,
     plain: Sequence[MotorJob],
 ) -> Outcome:
     """Motors worked on, registered and published; `plain` are the jobs without revocations."""
@@ -149,7 +149,7 @@ def _computed(
     with watch.stage("registry"):
         registered = _register(registry, output, results)
         # before the statuses are read: a later decision is not in them
-        batch = _batch_key(settings, plain, found, registry)
+        batch = _batch_key(settings, plain, survey, registry)
         histories = histories_of(registry)
         results, statuses = with_current_statuses(output, results, histories)
     with watch.stage("fleet"):
@@ -157,12 +157,12 @@ def _computed(
         datasheets = fleet.datasheets
         there = {one.motor_id: status_now(output, one, histories) for one in fleet.others}
         findings = sorted(
-            {f for r in results for f in r.finished.findings}.union(found.findings), key=_order
+            {f for r in results for f in r.finished.findings}.union(survey.findings), key=_order
         )
         files, removed = publish(
             settings, results, fleet, tuple(findings), {**there, **statuses}, others
         )
-        outcome = outcome_of(datasheets, findings, found, statuses, report=settings.report)
+        outcome = outcome_of(datasheets, findings, survey, statuses, report=settings.report)
     lasting = not died and all(result.lasting for result in results)
     if lasting and registered.code == 0 and _revocations(registry) == revoked:
         contents = _contents(datasheets, results)
@@ -273,9 +273,9 @@ def _answers(
     return all_answers
 
 
-def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
+def _jobs(settings: RunSettings, survey: Survey, limits: Path) -> list[MotorJob]:
     motors: dict[str, list[Entry]] = {}
-    for entry in found.entries:
+    for entry in survey.entries:
         motors.setdefault(entry.stated["motor_id"], []).append(entry)
     required, model_gates = release_conditions(limits)
     changes = policy_changes(settings.policy)
@@ -301,7 +301,7 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
             diagnose=settings.diagnose,
             model_gates=model_gates,
             operate=asdict(settings.operate),
-            findings=tuple(f for f in found.findings if f.file in {e.path for e in entries}),
+            findings=tuple(f for f in survey.findings if f.file in {e.path for e in entries}),
             limits=ReadLimits(settings.read_seconds, settings.read_memory_mb),
         )
         for motor_id, entries in sorted(motors.items())
@@ -314,12 +314,12 @@ def _keyed(job: MotorJob) -> MotorJob:
 
 
 def _batch_key(
-    settings: RunSettings, jobs: Sequence[MotorJob], found: Survey, registry: Registry | None
+    settings: RunSettings, jobs: Sequence[MotorJob], survey: Survey, registry: Registry | None
 ) -> str:
     """Digest of everything that the outcome of a batch depends on, except folders."""
     commit = None if registry is None else registry.last_commit()
     keys = [job.key for job in jobs]
-    return key_of(batch_parts(tools(RUN), settings, keys, found, commit))
+    return key_of(batch_parts(tools(RUN), settings, keys, survey, commit))
 
 
 def _revocations(registry: Registry | None) -> Revocations:

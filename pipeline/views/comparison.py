@@ -159,15 +159,15 @@ def _pooled_ratio(errors: Sequence[SignalError]) -> float:
     return pooled(errors, "rmse") / max(pooled(errors, "noise_floor"), 1e-300)
 
 
-def _capture(one: SignalError) -> CaptureRow:
+def _capture(error: SignalError) -> CaptureRow:
     return CaptureRow(
-        one.capture,
-        one.signal,
-        KINDS[one.kind],
-        "held out" if one.split == "held_out" else "in the fit",
-        quantity(one.rmse, one.unit, 3),
-        quantity(one.noise_floor, one.unit, 3),
-        significant(ratio_of(one), 3),
+        error.capture,
+        error.signal,
+        KINDS[error.kind],
+        "held out" if error.split == "held_out" else "in the fit",
+        quantity(error.rmse, error.unit, 3),
+        quantity(error.noise_floor, error.unit, 3),
+        significant(ratio_of(error), 3),
     )
 
 
@@ -192,24 +192,24 @@ def _surely(dependence: Dependence) -> bool:
     return p_value is not None and p_value < SURE and dependence.explained >= SHARE
 
 
-def _worst(one: ErrorMap) -> str:
+def _worst(error_map: ErrorMap) -> str:
     """The cell whose mean is farthest from zero among those that chance does not make."""
-    if one.y is None:
+    if error_map.y is None:
         return ""
-    cells = one.mean.size
+    cells = error_map.mean.size
     sure = [
-        (abs(one.mean[row, column]), row, column)
-        for row in range(one.mean.shape[0])
-        for column in range(one.mean.shape[1])
-        if one.p_value[row, column] * cells < SURE
+        (abs(error_map.mean[row, column]), row, column)
+        for row in range(error_map.mean.shape[0])
+        for column in range(error_map.mean.shape[1])
+        if error_map.p_value[row, column] * cells < SURE
     ]
     if not sure:
         return ""
     _, row, column = max(sure)
-    speed, current = one.x.edges[column : column + 2], one.y.edges[row : row + 2]
+    speed, current = error_map.x.edges[column : column + 2], error_map.y.edges[row : row + 2]
     return (
         f"; worst at {speed[0]:.3g} to {speed[1]:.3g} rad/s, {current[0]:.3g} to "
-        f"{current[1]:.3g} A: {quantity(float(one.mean[row, column]), one.unit, 2)}"
+        f"{current[1]:.3g} A: {quantity(float(error_map.mean[row, column]), error_map.unit, 2)}"
     )
 
 

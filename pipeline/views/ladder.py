@@ -130,13 +130,15 @@ def _fall(result: Diagnosis) -> str:
     return f"{all_of}, the error falls from {first} to {last} noise floors."
 
 
-def _doubt(one: RankedEffect) -> Doubt:
+def _doubt(ranked: RankedEffect) -> Doubt:
     tests = [
         f"against {apart.against}: {apart.experiment}, predicted power {apart.power:.0%}"
-        for apart in one.separation
+        for apart in ranked.separation
         if apart.power is not None
     ]
-    return Doubt(one.effect, ", ".join(one.confused_with), tuple(tests) or (one.experiment,))
+    return Doubt(
+        ranked.effect, ", ".join(ranked.confused_with), tuple(tests) or (ranked.experiment,)
+    )
 
 
 def shown_signals(result: Diagnosis) -> tuple[str, ...]:

@@ -54,39 +54,39 @@ class LotView:
     absent: tuple[str, ...]
 
 
-def lot_view(found: LotRegression) -> LotView:
+def lot_view(regression: LotRegression) -> LotView:
     """The view of one comparison of lots."""
-    present = tuple(sorted((one for one in found.constants if one.motors), key=_weight))
+    present = tuple(sorted((one for one in regression.constants if one.motors), key=_weight))
     reasons = shared_reasons((one.name, one.why) for one in present if one.why)
     numbers = {reason.text: number for number, reason in enumerate(reasons, 1)}
     return LotView(
         tuple(_row(one, numbers.get(one.why, 0)) for one in present),
         present,
         reasons,
-        tuple(one.name for one in found.constants if not one.motors),
+        tuple(one.name for one in regression.constants if not one.motors),
     )
 
 
-def compared(found: LotRegression) -> tuple[ConstantResult, ...]:
+def compared(regression: LotRegression) -> tuple[ConstantResult, ...]:
     """Constants that both sides have, what matters first."""
-    both = [one for one in found.constants if one.of("baseline") and one.of("candidate")]
+    both = [one for one in regression.constants if one.of("baseline") and one.of("candidate")]
     return tuple(sorted(both, key=_weight))
 
 
-def mean_of(one: ConstantResult, side: Side) -> float | None:
+def mean_of(constant: ConstantResult, side: Side) -> float | None:
     """The mean of lot means of a side, or of its motors where there are no lots."""
-    means = [lot.mean for lot in one.lots if lot.side == side]
-    means = means or [motor.value for motor in one.of(side)]
+    means = [lot.mean for lot in constant.lots if lot.side == side]
+    means = means or [motor.value for motor in constant.of(side)]
     return sum(means) / len(means) if means else None
 
 
-def change_text(one: ConstantResult) -> str:
+def change_text(constant: ConstantResult) -> str:
     """The difference of the sides ± U, with its sign; empty where there is none.
 
     In percent of the baseline, but where U or the change is beyond it: a share of nearly nothing
     says nothing.
     """
-    effect, before = one.effect, mean_of(one, "baseline")
+    effect, before = constant.effect, mean_of(constant, "baseline")
     difference, spread = effect.difference, effect.expanded_u or 0.0
     if difference is None:
         if effect.relative is not None:
@@ -95,7 +95,7 @@ def change_text(one: ConstantResult) -> str:
     size = abs(before or 0.0)
     if size > spread and abs(difference) <= MOST_RELATIVE * size:
         return _signed(100.0 * difference / size, 100.0 * spread / size, "%")
-    return _signed(difference, spread, one.unit)
+    return _signed(difference, spread, constant.unit)
 
 
 def p_text(value: float | None) -> str:
@@ -108,31 +108,33 @@ def _signed(value: float, expanded: float, unit: str) -> str:
     return f"+{text}" if value > 0.0 else text
 
 
-def _weight(one: ConstantResult) -> tuple[int, float, str]:
+def _weight(constant: ConstantResult) -> tuple[int, float, str]:
     """The worst verdicts first, then the largest change in motors' standard deviations."""
-    rank = RANKS.index(one.verdict) if one.verdict in RANKS else len(RANKS)
-    return rank, -abs(one.effect.in_sd or 0.0), one.name
+    rank = RANKS.index(constant.verdict) if constant.verdict in RANKS else len(RANKS)
+    return rank, -abs(constant.effect.in_sd or 0.0), constant.name
 
 
-def _row(one: ConstantResult, shared: int) -> ConstantRow:
-    before, after = mean_of(one, "baseline"), mean_of(one, "candidate")
-    tested = one.test.status == "evaluated"
+def _row(constant: ConstantResult, shared: int) -> ConstantRow:
+    before, after = mean_of(constant, "baseline"), mean_of(constant, "candidate")
+    tested = constant.test.status == "evaluated"
     return ConstantRow(
-        name=one.name,
-        symbol=symbol(one.name),
-        words=constant_words(one.name) if one.words == one.name else one.words,
-        verdict=one.verdict.replace("_", " "),
-        tone=TONES.get(one.verdict, "none"),
-        mark=MARKS.get(one.verdict, NONE),
-        why=one.why,
+        name=constant.name,
+        symbol=symbol(constant.name),
+        words=constant_words(constant.name) if constant.words == constant.name else constant.words,
+        verdict=constant.verdict.replace("_", " "),
+        tone=TONES.get(constant.verdict, "none"),
+        mark=MARKS.get(constant.verdict, NONE),
+        why=constant.why,
         shared=shared,
-        decides=one.decides,
-        before=NONE if before is None else quantity(before, one.unit),
-        after=NONE if after is None else quantity(after, one.unit),
-        change=change_text(one) or NONE,
-        change_sort=repr(one.effect.relative or 0.0),
-        p_value=p_text(one.test.p_holm) if tested else one.test.status.replace("_", " ").lower(),
-        same=one.equivalence.status.replace("_", " "),
-        power=NONE if one.power.power is None else f"{100 * one.power.power:.0f} %",
-        cpk=NONE if one.capability.cpk is None else f"{one.capability.cpk:.2f}",
+        decides=constant.decides,
+        before=NONE if before is None else quantity(before, constant.unit),
+        after=NONE if after is None else quantity(after, constant.unit),
+        change=change_text(constant) or NONE,
+        change_sort=repr(constant.effect.relative or 0.0),
+        p_value=p_text(constant.test.p_holm)
+        if tested
+        else constant.test.status.replace("_", " ").lower(),
+        same=constant.equivalence.status.replace("_", " "),
+        power=NONE if constant.power.power is None else f"{100 * constant.power.power:.0f} %",
+        cpk=NONE if constant.capability.cpk is None else f"{constant.capability.cpk:.2f}",
     )

@@ -51,14 +51,14 @@ class PerformanceView:
     notes: tuple[str, ...]
 
 
-def performance_view(found: Performance) -> PerformanceView:
+def performance_view(performance: Performance) -> PerformanceView:
     """The view of a motor's performance."""
     return PerformanceView(
-        tuple(_row(one) for one in found.numbers),
-        () if found.operation is None else _conditions(found.operation),
-        tuple(_loss(cell) for cell in _spread(found.cells)),
-        found.blanks,
-        found.notes,
+        tuple(_row(one) for one in performance.numbers),
+        () if performance.operation is None else _conditions(performance.operation),
+        tuple(_loss(cell) for cell in _spread(performance.cells)),
+        performance.blanks,
+        performance.notes,
     )
 
 

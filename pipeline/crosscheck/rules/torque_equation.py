@@ -63,19 +63,19 @@ def _strongest_d_current_a(campaign: Campaign) -> float:
     return max(levels, key=abs, default=0.0)
 
 
-def _ratio(found: Mapping[str, Estimate], pairs: int, id_a: float) -> Ratio:
+def _ratio(estimates: Mapping[str, Estimate], pairs: int, id_a: float) -> Ratio:
     """The ratio of torques per q ampere."""
     reluctance = 1.5 * pairs * id_a
-    measured = found["kt_peak_nm_a"].number + found["kt_reluctance_nm_a2"].number * id_a
-    saliency_h = found["ld_h"].number - found["lq_h"].number
-    predicted = found["kt_from_ke_nm_a"].number + reluctance * saliency_h
+    measured = estimates["kt_peak_nm_a"].number + estimates["kt_reluctance_nm_a2"].number * id_a
+    saliency_h = estimates["ld_h"].number - estimates["lq_h"].number
+    predicted = estimates["kt_from_ke_nm_a"].number + reluctance * saliency_h
     ratio = measured / predicted
     terms = [
-        (1.0 / predicted, found["kt_peak_nm_a"].budget),
-        (id_a / predicted, found["kt_reluctance_nm_a2"].budget),
-        (-ratio / predicted, found["kt_from_ke_nm_a"].budget),
-        (-ratio * reluctance / predicted, found["ld_h"].budget),
-        (ratio * reluctance / predicted, found["lq_h"].budget),
+        (1.0 / predicted, estimates["kt_peak_nm_a"].budget),
+        (id_a / predicted, estimates["kt_reluctance_nm_a2"].budget),
+        (-ratio / predicted, estimates["kt_from_ke_nm_a"].budget),
+        (-ratio * reluctance / predicted, estimates["ld_h"].budget),
+        (ratio * reluctance / predicted, estimates["lq_h"].budget),
     ]
     return Ratio.of(ratio, propagate(terms))
 

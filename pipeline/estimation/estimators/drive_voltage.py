@@ -338,7 +338,7 @@ def _unlogged_flux(rows: VoltageRows, residuals: Array) -> float:
 
 def _estimates(
     rows: VoltageRows,
-    found: LinearFit,
+    fit: LinearFit,
     scatter: tuple[Array, int],
     coefficient: tuple[float, Budget],
     chosen: Sequence[str],
@@ -356,14 +356,14 @@ def _estimates(
     type_b = contributions(values, gains)
     per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
     paths = sorted(c.path for c in rows.captures)
-    words = [f"{rows.voltage_v.size} windows, {np.std(found.residuals):.2g} V left"]
+    words = [f"{rows.voltage_v.size} windows, {np.std(fit.residuals):.2g} V left"]
     if chosen:
         words.append(allowed_for(chosen))
     unstated = unstated_note(rows.captures, ("voltage", "current"))
     words += [unstated] if unstated else []
     estimates = []
     for i, name in enumerate(GIVES):
-        value, u = float(found.coefficients[i]), float(deviation[i])
+        value, u = float(fit.coefficients[i]), float(deviation[i])
         if value <= 2.0 * u:
             note = f"{value:.3g} ± {u:.2g} {METHOD.unit(name)} from this log; {EXPERIMENT}"
             estimates.append(METHOD.missing(name, note))
@@ -374,7 +374,7 @@ def _estimates(
         doubt = doubts[i]
         parts += [] if doubt is None else [doubt.part(f"{METHOD.name}:{name}", value)]
         remarks = [] if doubt is None else [doubt.words("the value")]
-        assumed, assumptions = _unlogged(rows, found, name, value, magnet)
+        assumed, assumptions = _unlogged(rows, fit, name, value, magnet)
         note = "; ".join([*remarks, *words, *assumptions])
         at = {PLACE[name]: 25.0, "omega_mech_rad_s": float(np.max(np.abs(rows.speed_rad_s)))}
         estimates.append(METHOD.measured(name, value, [*parts, *assumed], paths, at, note))
@@ -382,7 +382,7 @@ def _estimates(
 
 
 def _unlogged(
-    rows: VoltageRows, found: LinearFit, name: str, value: float, magnet: float
+    rows: VoltageRows, fit: LinearFit, name: str, value: float, magnet: float
 ) -> tuple[list[Contribution], list[str]]:
     """What is assumed for the temperatures and the d current that are not logged, and in words."""
     parts, words, kelvin = [], [], policy().magnet.unlogged_k
@@ -392,7 +392,7 @@ def _unlogged(
         words.append(f"{PLACE[name]} not logged, taken as 25 ± {kelvin:g} K")
     if name == GIVES[0]:
         parts.append(Contribution(HOLD, value * rows.hold_doubt, "B"))
-        if flux := _unlogged_flux(rows, found.residuals):
+        if flux := _unlogged_flux(rows, fit.residuals):
             parts.append(Contribution("assumed:id_a:flux", flux, "B"))
             words.append("id_a not logged, taken as 0 but for what varies")
     return parts, words
@@ -419,9 +419,9 @@ def _moved(
     return moved
 
 
-def _evidence(rows: VoltageRows, found: LinearFit) -> tuple[Evidence, ...]:
+def _evidence(rows: VoltageRows, fit: LinearFit) -> tuple[Evidence, ...]:
     titles = ["Drive voltage and its parts"] * len(rows.captures)
-    columns = rows.capture, rows.time_s, rows.voltage_v, rows.voltage_v - found.residuals
+    columns = rows.capture, rows.time_s, rows.voltage_v, rows.voltage_v - fit.residuals
     return tuple(METHOD.traces(rows.captures, titles, "vq_v", columns, "window means"))
 
 

@@ -274,7 +274,7 @@ def _partitions(rows: Rows, paths: Sequence[str], weights: Array) -> list[Partit
     ]
 
 
-def _scatter(rows: Rows, found: LinearFit, regression: Regression) -> tuple[Array, Array]:
+def _scatter(rows: Rows, fit: LinearFit, regression: Regression) -> tuple[Array, Array]:
     """Standard deviations [4] of the coefficients, and their degrees of freedom [4].
 
     By clusters, and by how many windows count as one; the larger counts. A delay rests on the few
@@ -282,15 +282,15 @@ def _scatter(rows: Rows, found: LinearFit, regression: Regression) -> tuple[Arra
     Reference: Carter, Schnepel and Steigerwald, Rev. Econ. Stat. 99(4), 2017, 698 (effective
     number of clusters).
     """
-    tau = autocorrelation_time(found.residuals / regression.sigma, policy().evidence.memory_rows)
+    tau = autocorrelation_time(fit.residuals / regression.sigma, policy().evidence.memory_rows)
     tau = max(tau, 1.0 / (1.0 - policy().shaft_rows.overlap))
-    scatter = np.sqrt(np.diag(found.covariance) * found.chi2_dof * tau)
+    scatter = np.sqrt(np.diag(fit.covariance) * fit.chi2_dof * tau)
     _, cluster = np.unique(rows.cluster, return_inverse=True)
     shares = [np.bincount(cluster, information(regression, k)) for k in range(scatter.size)]
     groups = np.maximum([1.0 / float(share @ share) for share in shares], 2.0)
-    covariance, _ = cluster_covariance(rows.design, found.residuals, regression.sigma, rows.cluster)
+    covariance, _ = cluster_covariance(rows.design, fit.residuals, regression.sigma, rows.cluster)
     robust = np.sqrt(np.diag(covariance) * groups / (groups - 1.0))
-    return np.maximum(scatter, robust), np.minimum(max(found.dof / tau, 1.0), groups - 1.0)
+    return np.maximum(scatter, robust), np.minimum(max(fit.dof / tau, 1.0), groups - 1.0)
 
 
 def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Estimate]:

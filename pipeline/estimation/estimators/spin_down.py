@@ -258,15 +258,15 @@ def _widths(motion: Motion, coasts: Sequence[Coast], start: Array) -> Array:
     return np.array(shared + own * len(coasts))
 
 
-def _wider(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit, level: float) -> Motion:
+def _wider(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit, level: float) -> Motion:
     """The motion with the additions that the residuals demand."""
     extras = tuple(n for n in EXTRAS if n not in motion.extras)
     of_angle = all(c.of_angle for c in coasts)
     ripples = tuple(n for n in RIPPLES if n not in motion.ripples) if of_angle else ()
-    sigma = np.ones(found.residuals.size)
-    tau = autocorrelation_time(found.residuals)
+    sigma = np.ones(fit.residuals.size)
+    tau = autocorrelation_time(fit.residuals)
     trial = Motion(motion.extras + extras, motion.ripples, motion.fastest_rad_s)
-    start = _transferred(motion, trial, found.parameters, len(coasts))
+    start = _transferred(motion, trial, fit.parameters, len(coasts))
     weights = _weights(coasts)
 
     def predict(parameters: Array) -> Array:
@@ -278,9 +278,9 @@ def _wider(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit, level: 
     theta = np.concatenate([c.theta_rad for c in coasts])
     candidates |= {name: _ripple(name, theta) * weights for name in ripples}
     chosen = needed_columns(
-        found.jacobian,
+        fit.jacobian,
         candidates,
-        -found.residuals,
+        -fit.residuals,
         sigma,
         level,
         policy().coast_down.most_additions,
@@ -303,13 +303,11 @@ def _transferred(old: Motion, new: Motion, parameters: Array, coasts: int) -> Ar
     return np.concatenate(parts)
 
 
-def _estimates(
-    motion: Motion, coasts: Sequence[Coast], found: NonlinearFit
-) -> tuple[Estimate, ...]:
-    free = found.residuals.size - found.parameters.size
-    spread = float(found.residuals @ found.residuals) / free
-    tau = autocorrelation_time(found.residuals)
-    joint = found.covariance[:2, :2] * spread * tau
+def _estimates(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> tuple[Estimate, ...]:
+    free = fit.residuals.size - fit.parameters.size
+    spread = float(fit.residuals @ fit.residuals) / free
+    tau = autocorrelation_time(fit.residuals)
+    joint = fit.covariance[:2, :2] * spread * tau
     scale = np.sqrt(np.diag(joint))
     lower = np.linalg.cholesky(joint / np.outer(scale, scale) + 1e-12 * np.eye(2)) * scale[:, None]
     paths = sorted({c.path for c in coasts})
@@ -318,19 +316,19 @@ def _estimates(
     note += f"; {allowed_for(added)}" if added else ""
     form = np.zeros(2)
     if np.sqrt(spread) > policy().coast_down.unexplained:
-        form = _form(motion, coasts, found)
+        form = _form(motion, coasts, fit)
         note += "; drag has another form: allowance from the fast and the slow half apart"
     dof = max(free / tau, 1.0)
     estimates = []
     for i, name in enumerate(GIVES):
         parts = [METHOD.scatter(f"{k}", float(lower[i, k]), dof) for k in (0, 1)]
         parts.append(Contribution("assumed:drag_form", float(form[i]), "B"))
-        value, at = float(found.parameters[i]), {"omega_mech_rad_s": motion.fastest_rad_s}
+        value, at = float(fit.parameters[i]), {"omega_mech_rad_s": motion.fastest_rad_s}
         estimates.append(METHOD.measured(name, value, parts, paths, at, note))
     return tuple(estimates)
 
 
-def _form(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit) -> Array:
+def _form(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> Array:
     """How far the halves of the coasts disagree on the two ratios, each fitted by itself."""
     values = []
     plain = Motion((), motion.ripples, motion.fastest_rad_s)
@@ -339,7 +337,7 @@ def _form(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit) -> Array
         for i, coast in enumerate(coasts):
             half = coast.t_s.size // 2
             rows = slice(half, None) if late else slice(0, half)
-            speed = np.gradient(motion.predict(i, coast, found.parameters), coast.t_s)
+            speed = np.gradient(motion.predict(i, coast, fit.parameters), coast.t_s)
             offset = coast.measured[rows][0] if coast.of_angle else 0.0
             halves.append(
                 Coast(
@@ -353,15 +351,15 @@ def _form(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit) -> Array
         start = _transferred(Motion((), (), plain.fastest_rad_s), plain, first, len(halves))
         values.append(_solve(plain, halves, start).parameters[:2])
     apart = np.abs(values[1] - values[0])
-    beside = np.abs(0.5 * (values[0] + values[1]) - found.parameters[:2])
+    beside = np.abs(0.5 * (values[0] + values[1]) - fit.parameters[:2])
     allowance: Array = np.maximum(apart, beside)
     return allowance
 
 
-def _evidence(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit) -> tuple[Evidence, ...]:
+def _evidence(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> tuple[Evidence, ...]:
     plots = []
     for i, coast in enumerate(coasts):
-        fitted = motion.predict(i, coast, found.parameters)
+        fitted = motion.predict(i, coast, fit.parameters)
         keep = slice(None, None, -(-coast.t_s.size // 2000))
         t = coast.t_s[keep] + coast.start_s
         word = "forward" if coast.sense > 0 else "backward"

@@ -335,9 +335,7 @@ def torque_is_separable(design: Array, sigma: Array) -> bool:
     return ranks[0] > ranks[1]
 
 
-def _covariance(
-    rows: ShaftRows, design: Array, found: LinearFit, sigma: Array
-) -> tuple[Array, int]:
+def _covariance(rows: ShaftRows, design: Array, fit: LinearFit, sigma: Array) -> tuple[Array, int]:
     """Covariance of the coefficients and its degrees of freedom.
 
     Under any correlation inside clusters where the drives fill enough of them; with few, the
@@ -346,12 +344,12 @@ def _covariance(
     Reference: Cameron and Miller, J. Human Resources 50(2), 2015, VI.
     """
     if np.unique(rows.cluster[rows.kind == DRIVE]).size >= policy().evidence.clusters:
-        return cluster_covariance(design, found.residuals, sigma, rows.cluster)
+        return cluster_covariance(design, fit.residuals, sigma, rows.cluster)
     tau = max(
-        autocorrelation_time(found.residuals / sigma, policy().evidence.memory_rows),
+        autocorrelation_time(fit.residuals / sigma, policy().evidence.memory_rows),
         1.0 / (1.0 - policy().shaft_rows.overlap),
     )
-    return found.covariance * found.chi2_dof * tau, max(freedom(rows), 1)
+    return fit.covariance * fit.chi2_dof * tau, max(freedom(rows), 1)
 
 
 def _balanced(rows: ShaftRows, design: Array, y: Array) -> Array:
@@ -453,10 +451,10 @@ def _implausible(
     return any(found.coefficients[k] < -policy().evidence.sigmas * u[k] for k in parts)
 
 
-def _drag_part(design: Array, found: LinearFit, names: Sequence[str]) -> Array:
+def _drag_part(design: Array, fit: LinearFit, names: Sequence[str]) -> Array:
     """Drag [w] in torque that a fit gives each row: its drag columns over g."""
     mine = [k for k, name in enumerate(names) if name in _DRAG_NAMES]
-    part: Array = design[:, mine] @ found.coefficients[mine] / found.coefficients[0]
+    part: Array = design[:, mine] @ fit.coefficients[mine] / fit.coefficients[0]
     return part
 
 

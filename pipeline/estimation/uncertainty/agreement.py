@@ -67,9 +67,9 @@ def judges(constants: Constants, estimate: Estimate) -> list[Estimate]:
     return [e for e in others if e.u <= limit]
 
 
-def _alike(one: Estimate, other: Estimate) -> bool:
+def _alike(estimate: Estimate, other: Estimate) -> bool:
     """Whether two estimates hold for speeds of one order of magnitude, as far as they say."""
-    speeds = [e.at.get("omega_mech_rad_s") for e in (one, other)]
+    speeds = [e.at.get("omega_mech_rad_s") for e in (estimate, other)]
     known = [abs(float(s)) for s in speeds if isinstance(s, int | float) and s != 0]
     return len(known) < 2 or max(known) <= policy().agreement.speed_ratio * min(known)
 

@@ -73,7 +73,7 @@ def batch_parts(
     tools: str,
     settings: RunSettings,
     motors: Sequence[str | None],
-    found: Survey,
+    survey: Survey,
     commit: int | None,
 ) -> Parts:
     """What the pages and the outcome of a batch depend on.
@@ -82,7 +82,7 @@ def batch_parts(
     one, as a version may be revoked later.
     """
     every = {f.name: getattr(settings, f.name) for f in fields(settings)}
-    surveyed = {f.name: getattr(found, f.name) for f in fields(found)}
+    surveyed = {f.name: getattr(survey, f.name) for f in fields(survey)}
     return {
         "tools": tools,
         "settings": {name: value for name, value in every.items() if name not in NOT_OF_A_BATCH},

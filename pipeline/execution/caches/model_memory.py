@@ -45,6 +45,6 @@ class ModelMemory:
             return None
         return ModelVerdict.of(entry["model"])
 
-    def keep(self, key: str, found: ModelVerdict) -> None:
+    def keep(self, key: str, verdict: ModelVerdict) -> None:
         """Stores a verdict; a place that cannot be written is no failure."""
-        keep_checksummed(self._path, {"key": key, "model": found.document()})
+        keep_checksummed(self._path, {"key": key, "model": verdict.document()})

@@ -213,7 +213,7 @@ def _alive(process: int | None) -> bool:
 def outcome_of(
     datasheets: Sequence[Datasheet],
     findings: Sequence[Finding],
-    found: Survey,
+    survey: Survey,
     statuses: Statuses,
     *,
     report: bool,
@@ -229,8 +229,8 @@ def outcome_of(
     lines = tuple(lines_of(findings))
     if not datasheets:
         lines = (*lines, nothing_usable(INPUT, refused=refused))
-    if found.note:
-        lines = (*lines, f"note: {found.note}")
+    if survey.note:
+        lines = (*lines, f"note: {survey.note}")
     text = summary(datasheets, findings, OUTPUT, report=report, statuses=statuses)
     return Outcome(code, text, lines, next=next_command(datasheets, INPUT, OUTPUT, statuses))
 

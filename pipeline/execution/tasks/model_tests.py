@@ -34,7 +34,7 @@ class Verdicts(Protocol):
     def recall(self, key: str) -> ModelVerdict | None:
         """The verdict of a key, or None."""
 
-    def keep(self, key: str, found: ModelVerdict) -> None:
+    def keep(self, key: str, verdict: ModelVerdict) -> None:
         """Stores a verdict."""
 
 

@@ -118,17 +118,17 @@ def disagreements_between_captures(
     return apart
 
 
-def assemble(job: MotorJob, campaign: Campaign, found: Judged, stamp: Stamp) -> Datasheet:
+def assemble(job: MotorJob, campaign: Campaign, judged: Judged, stamp: Stamp) -> Datasheet:
     """The datasheet of one motor."""
     references = references_of(campaign, stamp.readings)
-    chosen = _with_notes(found.constants.chosen(), found.model)
+    chosen = _with_notes(judged.constants.chosen(), judged.model)
     status, why = verdict(
         chosen,
-        found.checks,
+        judged.checks,
         references,
         job.required,
         job.release,
-        found.model.reason(campaign.motor_id) if job.model_gates else None,
+        judged.model.reason(campaign.motor_id) if job.model_gates else None,
     )
     return Datasheet(
         motor_id=campaign.motor_id,
@@ -141,10 +141,10 @@ def assemble(job: MotorJob, campaign: Campaign, found: Judged, stamp: Stamp) -> 
         config_sha256=stamp.config_sha256,
         code_version=stamp.code_version,
         constants=chosen,
-        alternatives=found.constants.rest(),
-        checks=found.checks,
+        alternatives=judged.constants.rest(),
+        checks=judged.checks,
         libraries=stamp.libraries,
-        model=found.model,
+        model=judged.model,
     )
 
 

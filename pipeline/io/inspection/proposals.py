@@ -113,13 +113,13 @@ def _label(table: RawTable, name: str) -> Label:
 
 
 def _columns(
-    labels: Mapping[str, Label], found: Evidence, answers: Mapping[str, str], *, logged: bool
+    labels: Mapping[str, Label], evidence: Evidence, answers: Mapping[str, str], *, logged: bool
 ) -> dict[str, tuple[str, ...]]:
     """Columns that each field may be, after the answers and the evidence.
 
     `logged`: the file has a clock beside its fields, so that none of them has to be one.
     """
-    clocks = {clock.field: clock for clock in found.clocks}
+    clocks = {clock.field: clock for clock in evidence.clocks}
     columns: dict[str, tuple[str, ...]] = {}
     for name, label in labels.items():
         answer = answers.get(f"column.{answer_key(name)}")
@@ -133,12 +133,12 @@ def _columns(
         else:
             columns[name] = label.columns
     if not logged and not any(one[:1] == ("t_s",) for one in columns.values()):
-        clear = [c for c in found.clocks if c.jitter < _MOST_CLOCK_JITTER]
+        clear = [c for c in evidence.clocks if c.jitter < _MOST_CLOCK_JITTER]
         free = [c for c in clear if not columns[c.field] and not _is_answered(c.field, answers)]
         if free:
             columns[min(free, key=lambda clock: clock.jitter).field] = ("t_s",)
     answered = frozenset(name for name in columns if _is_answered(name, answers))
-    return _from_relations(columns, found, answered)
+    return _from_relations(columns, evidence, answered)
 
 
 def _is_answered(name: str, answers: Mapping[str, str]) -> bool:
@@ -146,12 +146,12 @@ def _is_answered(name: str, answers: Mapping[str, str]) -> bool:
 
 
 def _from_relations(
-    columns: dict[str, tuple[str, ...]], found: Evidence, answered: frozenset[str]
+    columns: dict[str, tuple[str, ...]], evidence: Evidence, answered: frozenset[str]
 ) -> dict[str, tuple[str, ...]]:
     """Fields of no known name that integrate to an angle, or that a speed integrates to."""
     angle, speed = ("theta_mech_rad",), ("omega_mech_rad_s",)
     taken = {one[0] for one in columns.values() if len(one) == 1}
-    for relation in found.relations:
+    for relation in evidence.relations:
         if not relation.integral:
             continue
         one, other = columns[relation.field], columns[relation.other]
@@ -171,20 +171,20 @@ def _seen(
     numeric: Mapping[str, np.ndarray],
     labels: Mapping[str, Label],
     columns: Mapping[str, tuple[str, ...]],
-    found: Evidence,
+    evidence: Evidence,
     answers: Mapping[str, str],
 ) -> FieldSeen:
     """A field before its unit is settled."""
     label, options, values = labels[name], columns[name], numeric[name]
     first = float(values[0]) if values.size else None
-    seen = FieldSeen(name, first, why=_why(name, found, options))
+    seen = FieldSeen(name, first, why=_why(name, evidence, options))
     if not options:
         return seen
     if len(options) > 1:
         text = f"which column {name!r} is: {', '.join(options)}, or {NONE}"
         return replace(seen, question=(f"column.{answer_key(name)}", text))
     electrical = bool(_ELECTRICAL & set(words_of(name))) and options[0] == "omega_mech_rad_s"
-    wraps = dict(found.wraps).get(name) if options[0] in ("t_s", *_ANGLES) else None
+    wraps = dict(evidence.wraps).get(name) if options[0] in ("t_s", *_ANGLES) else None
     answered = _is_answered(name, answers)
     return replace(
         seen,
@@ -198,12 +198,12 @@ def _seen(
 _ANGLES = ("theta_mech_rad", "theta_elec_rad", "theta_elec_deg")
 
 
-def _why(name: str, found: Evidence, options: Sequence[str]) -> str:
+def _why(name: str, evidence: Evidence, options: Sequence[str]) -> str:
     """What the numbers of a field show, in words; only a clock or an angle starts again."""
     may_wrap = not options or options[0] in ("t_s", *_ANGLES)
-    wraps = found.wraps if may_wrap else ()
+    wraps = evidence.wraps if may_wrap else ()
     reasons = [f"starts again after {span:g}" for field, span in wraps if field == name]
-    for relation in found.relations:
+    for relation in evidence.relations:
         if relation.field == name:
             kind = "the integral of " if relation.integral else ""
             reasons.append(f"is {relation.factor:.6g} times {kind}{relation.other!r}")
@@ -213,7 +213,7 @@ def _why(name: str, found: Evidence, options: Sequence[str]) -> str:
 def _with_units(
     seen: list[FieldSeen],
     labels: Mapping[str, Label],
-    found: Evidence,
+    evidence: Evidence,
     answers: Mapping[str, str],
 ) -> list[FieldSeen]:
     """The fields with their units: answered, written, or seen in the numbers; else a question."""
@@ -231,7 +231,7 @@ def _with_units(
         one = done[field.name]
         if one.column is None or one.unit is not None or labels[one.name].exact:
             continue
-        factor = _factor_seen(one, done, found, labels)
+        factor = _factor_seen(one, done, evidence, labels)
         unit = None if factor is None else _unit_of(factor, one.column)
         if unit is None and one.column == "t_s":
             unit = _since_1970(one.first)
@@ -283,12 +283,12 @@ def _size(field: FieldSeen | None, labels: Mapping[str, Label]) -> float | None:
 def _factor_seen(
     field: FieldSeen,
     done: Mapping[str, FieldSeen],
-    found: Evidence,
+    evidence: Evidence,
     labels: Mapping[str, Label],
 ) -> float | None:
     """What 1 of a field is by its relation to fields whose unit is known, or None."""
     clock = _size(next((f for f in done.values() if f.column == "t_s"), None), labels)
-    for relation in found.relations:
+    for relation in evidence.relations:
         angle, speed = done[relation.field], done[relation.other]
         columns = (angle.column, speed.column)
         if not relation.integral or columns != ("theta_mech_rad", "omega_mech_rad_s"):

@@ -84,7 +84,7 @@ def contract_fields(names: Sequence[str], joint_state: bool) -> list[FieldMap]:
         A column has a foreign unit, or two fields claim it.
 
     """
-    found: dict[str, FieldMap] = {}
+    fields: dict[str, FieldMap] = {}
     for name in names:
         column = last_part(name)
         if joint_state:
@@ -98,14 +98,14 @@ def contract_fields(names: Sequence[str], joint_state: bool) -> list[FieldMap]:
                     f"write {meant} [{COLUMNS[meant].unit}], or add a source map that converts it",
                 )
             continue
-        if column in found:
+        if column in fields:
             raise CaptureError(
                 "duplicate_column",
-                f"the fields {found[column].field!r} and {name!r} are both {column}",
+                f"the fields {fields[column].field!r} and {name!r} are both {column}",
                 "choose one of them with a source map",
             )
-        found[column] = FieldMap(name, column)
-    return list(found.values())
+        fields[column] = FieldMap(name, column)
+    return list(fields.values())
 
 
 def mapped_fields(names: Sequence[str], source: SourceMap) -> list[FieldMap]:
@@ -133,7 +133,7 @@ def mapped_fields(names: Sequence[str], source: SourceMap) -> list[FieldMap]:
     by_last: dict[str, list[str]] = {}
     for name in names:
         by_last.setdefault(last_part(name), []).append(name)
-    found: list[FieldMap] = []
+    fields: list[FieldMap] = []
     for part in source.fields:
         matches = [part.field] if part.field in names else by_last.get(part.field, [])
         if not matches and "*" in part.field:
@@ -144,16 +144,16 @@ def mapped_fields(names: Sequence[str], source: SourceMap) -> list[FieldMap]:
                 f"{part.field!r} could be {' or '.join(matches)}",
                 "write the full name into the source map",
             )
-        found += [replace(part, field=name) for name in matches]
-    columns = [part.column for part in found]
-    twice = next((part for part in found if columns.count(part.column) > 1), None)
+        fields += [replace(part, field=name) for name in matches]
+    columns = [part.column for part in fields]
+    twice = next((part for part in fields if columns.count(part.column) > 1), None)
     if twice is not None:
         raise CaptureError(
             "duplicate_column",
             f"two fields of the file become {twice.column}",
             "keep one of them in the source map",
         )
-    return found
+    return fields
 
 
 def is_field(field: str, name: str) -> bool:

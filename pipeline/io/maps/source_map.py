@@ -271,10 +271,10 @@ def load_source_maps(folder: Path) -> dict[str, SourceMap]:
     """
     if not folder.is_dir():
         raise UsageError(f"there is no folder of source maps {folder}", "check the configuration")
-    found: dict[str, SourceMap] = {}
+    maps: dict[str, SourceMap] = {}
     for path in sorted(folder.glob("*.yaml")):
-        found |= load_source_file(path)
-    return found
+        maps |= load_source_file(path)
+    return maps
 
 
 def load_source_file(path: Path) -> dict[str, SourceMap]:
@@ -453,7 +453,7 @@ def _whole(section: Section, key: str, default: int) -> int:
 
 
 def _fields(section: Section) -> tuple[FieldMap, ...]:
-    found: list[FieldMap] = []
+    fields: list[FieldMap] = []
     for name in list(section.remaining):
         plain = section.take(name)
         plain = {"column": plain} if isinstance(plain, str) else plain
@@ -473,9 +473,11 @@ def _fields(section: Section) -> tuple[FieldMap, ...]:
         if unit and normal_unit(unit) == COUNTS and scale == 1.0:
             raise part.fault("unit", "counts have no size", "write what one is into `scale`")
         wraps = _positive(part, "wraps")
-        found.append(FieldMap(name, column, unit, sign, scale, offset or 0.0, per_pole_pair, wraps))
+        fields.append(
+            FieldMap(name, column, unit, sign, scale, offset or 0.0, per_pole_pair, wraps)
+        )
         part.close()
-    return tuple(found)
+    return tuple(fields)
 
 
 def _time(section: Section) -> TimeMap:

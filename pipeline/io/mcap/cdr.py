@@ -108,14 +108,14 @@ class _Trail:
         for at, count in self.checks:
             if (batch.at(_ENCAPSULATION + at, self.order + "u4") != count).any():
                 return None
-        found: dict[str, Leaf] = {}
+        leaves: dict[str, Leaf] = {}
         for name, at, dtype, each in self.fields:
             if each is None:
-                found[name] = Leaf(batch.at(_ENCAPSULATION + at, dtype))
+                leaves[name] = Leaf(batch.at(_ENCAPSULATION + at, dtype))
             else:
                 counts = np.full(batch.start.size, each, np.int64)
-                found[name] = Leaf(batch.table(_ENCAPSULATION + at, dtype, each), counts)
-        return found
+                leaves[name] = Leaf(batch.table(_ENCAPSULATION + at, dtype, each), counts)
+        return leaves
 
 
 class _Pass:

@@ -163,13 +163,13 @@ def _leaves(table: Any, wanted: Wanted) -> tuple[dict[str, Leaf], int]:
     return found, sum(_collect(series, series.name, wanted, found) for series in columns)
 
 
-def _collect(series: Any, name: str, wanted: Wanted, found: dict[str, Leaf]) -> int:
+def _collect(series: Any, name: str, wanted: Wanted, leaves: dict[str, Leaf]) -> int:
     """Add the leaves of a column, and return how many nulls it holds."""
     import polars as pl
 
     nulls = int(series.null_count())
     if isinstance(series.dtype, pl.Struct):
-        parts = (_collect(part, f"{name}.{part.name}", wanted, found) for part in series.struct)
+        parts = (_collect(part, f"{name}.{part.name}", wanted, leaves) for part in series.struct)
         return sum(parts)
     counts = None
     if isinstance(series.dtype, pl.List):
@@ -178,7 +178,7 @@ def _collect(series: Any, name: str, wanted: Wanted, found: dict[str, Leaf]) -> 
         nulls += int(series.null_count())
     if series.dtype in (pl.Float64, pl.Int64) and wanted(name):
         values = series.to_numpy()
-        found[name] = Leaf(values, counts)
+        leaves[name] = Leaf(values, counts)
     return nulls
 
 

@@ -92,23 +92,25 @@ class ProtobufDecoder:
         values = dict(shape.values)
         packed = {number: place for number, *place in shape.packed}
         rows = batch.start.size
-        found: dict[str, Leaf] = {}
+        leaves: dict[str, Leaf] = {}
         for number, part in self.plan.fields.items():
             if not any(map(wanted, _names(part, ""))):
                 continue
             if isinstance(part, Message):
                 return None
             if number in values:
-                found[part.name] = Leaf(batch.at(values[number], part.dtype))
+                leaves[part.name] = Leaf(batch.at(values[number], part.dtype))
             elif number in packed:
                 at, count = packed[number]
                 table = batch.table(at, part.dtype, count)
-                found[part.name] = Leaf(table, np.full(rows, count, np.int64))
+                leaves[part.name] = Leaf(table, np.full(rows, count, np.int64))
             elif part.repeated:
-                found[part.name] = Leaf(np.empty(0, _storage(part.dtype)), np.zeros(rows, np.int64))
+                leaves[part.name] = Leaf(
+                    np.empty(0, _storage(part.dtype)), np.zeros(rows, np.int64)
+                )
             else:
-                found[part.name] = Leaf(_absent(part, rows))
-        return found
+                leaves[part.name] = Leaf(_absent(part, rows))
+        return leaves
 
 
 class _Pass:

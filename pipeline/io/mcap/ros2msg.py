@@ -125,7 +125,7 @@ class _Parser:
     def fields(self, text: str, package: str, depth: int) -> tuple[Field, ...]:
         if depth > MAX_DEPTH:
             raise _bad(self.schema, f"nests deeper than {MAX_DEPTH}")
-        found: list[Field] = []
+        fields: list[Field] = []
         for line in text.splitlines():
             bare = line.split("#", 1)[0].strip()
             if not bare or _CONSTANT.match(bare):
@@ -137,10 +137,10 @@ class _Parser:
             if self.count > MAX_FIELDS:
                 raise _bad(self.schema, f"has more than {MAX_FIELDS} fields")
             array = self.array(match[3], match[4])
-            found.append(self.field(match[1], match[5], array, package, depth))
-        if len({part.name for part in found}) != len(found):
+            fields.append(self.field(match[1], match[5], array, package, depth))
+        if len({part.name for part in fields}) != len(fields):
             raise _bad(self.schema, "has a field twice")
-        return tuple(found)
+        return tuple(fields)
 
     def array(self, brackets: str | None, bound: str | None) -> int | None:
         """The `array` of a field from `[...]` and the digits in it."""

@@ -192,17 +192,17 @@ def _send_lane(
     )
 
 
-def _finding(one: Finding) -> str:
-    rows = "" if one.rows is None else f"rows {one.rows[0]}–{one.rows[1]}: "
-    return f"{rows}{one.message}; {one.remedy} [{one.code}]"
+def _finding(finding: Finding) -> str:
+    rows = "" if finding.rows is None else f"rows {finding.rows[0]}–{finding.rows[1]}: "
+    return f"{rows}{finding.message}; {finding.remedy} [{finding.code}]"
 
 
-def _residual(capture: Capture, one: Evidence) -> list[Line]:
+def _residual(capture: Capture, evidence: Evidence) -> list[Line]:
     from pipeline.views.names import quantity_words, unit_words
 
     lines: list[Line] = []
-    unit = unit_words(one.y_name)
-    for series in one.series:
+    unit = unit_words(evidence.y_name)
+    for series in evidence.series:
         left = series.measured - series.fitted if series.fitted.size else np.zeros(0)
         finite = np.isfinite(left)
         if not finite.any():
@@ -210,7 +210,8 @@ def _residual(capture: Capture, one: Evidence) -> list[Line]:
         worst = int(np.nanargmax(np.abs(left)))
         rms = float(np.sqrt(np.mean(left[finite] ** 2)))
         words = (
-            f"{one.title}: {quantity_words(one.y_name)} residual rms {quantity(rms, unit, 3)}, "
+            f"{evidence.title}: {quantity_words(evidence.y_name)} "
+            f"residual rms {quantity(rms, unit, 3)}, "
             f"largest {quantity(float(abs(left[worst])), unit, 3)} at {series.x[worst]:.4g} s"
         )
         lines.append(("INFO", words, _row_at(capture, float(series.x[worst]))))

@@ -61,12 +61,12 @@ def diverging(share: NDArray[np.float64]) -> Image:
     return colours
 
 
-def map_picture(one: ErrorMap, reach: float) -> Image:
+def map_picture(error_map: ErrorMap, reach: float) -> Image:
     """The picture of a map of two variables.
 
     Parameters
     ----------
-    one
+    error_map
         The map.
     reach
         Mean error of full colour [unit].
@@ -77,10 +77,10 @@ def map_picture(one: ErrorMap, reach: float) -> Image:
         RGB; empty cells are hatched.
 
     """
-    rows, columns = one.mean.shape
+    rows, columns = error_map.mean.shape
     height, width = CELL * rows, CELL * columns
-    known = np.isfinite(one.mean)[::-1]
-    share = np.where(known, one.mean[::-1], 0.0) / (reach or 1.0)
+    known = np.isfinite(error_map.mean)[::-1]
+    share = np.where(known, error_map.mean[::-1], 0.0) / (reach or 1.0)
     cells = np.kron(diverging(share), np.ones((CELL, CELL, 1), dtype=np.uint8))
     down, across = np.indices((height, width)) // (CELL // 2)
     hatch = np.array(_HATCH, dtype=np.uint8)[(down + across) % 2]
@@ -107,12 +107,12 @@ def bar_picture(rows: int) -> Image:
     return diverging(ramp)
 
 
-def map_labels(one: ErrorMap, reach: float, words: tuple[str, str]) -> Labels:
+def map_labels(error_map: ErrorMap, reach: float, words: tuple[str, str]) -> Labels:
     """Ticks of both axes and of the colour bar of a map.
 
     Parameters
     ----------
-    one
+    error_map
         The map.
     reach
         Mean error of full colour [unit].
@@ -130,15 +130,15 @@ def map_labels(one: ErrorMap, reach: float, words: tuple[str, str]) -> Labels:
         The map is of one variable.
 
     """
-    if one.y is None:
+    if error_map.y is None:
         raise ValueError("a picture needs a map of two variables")
-    width, height = CELL * one.x.count, CELL * one.y.count
+    width, height = CELL * error_map.x.count, CELL * error_map.y.count
     bar = width + BAR_GAP + BAR_WIDTH / 2
-    scale = scale_for(reach, one.unit)
-    places = [(CELL * place, height + 0.7 * CELL) for place, _ in _ticks(one.x)]
-    texts = [text for _, text in _ticks(one.x)]
-    places += [(-1.1 * CELL, height - CELL * place) for place, _ in _ticks(one.y)]
-    texts += [text for _, text in _ticks(one.y)]
+    scale = scale_for(reach, error_map.unit)
+    places = [(CELL * place, height + 0.7 * CELL) for place, _ in _ticks(error_map.x)]
+    texts = [text for _, text in _ticks(error_map.x)]
+    places += [(-1.1 * CELL, height - CELL * place) for place, _ in _ticks(error_map.y)]
+    texts += [text for _, text in _ticks(error_map.y)]
     places += [(width / 2, height + 1.9 * CELL), (0.0, -0.75 * CELL), (bar, -0.75 * CELL)]
     texts += [words[0], words[1], scale.unit or "1"]
     full = f"{scale.shown(reach):.3g}"
@@ -162,7 +162,7 @@ def _ticks(bins: Bins) -> list[tuple[float, str]]:
 def send_map(
     stream: RecordingStream,
     entity: str,
-    one: ErrorMap,
+    error_map: ErrorMap,
     reach: float,
     at: tuple[str, int] | None = None,
 ) -> None:
@@ -174,7 +174,7 @@ def send_map(
         The recording.
     entity
         Where it lies.
-    one
+    error_map
         The map.
     reach
         Mean error of full colour [unit].
@@ -184,10 +184,10 @@ def send_map(
     """
     import rerun as rr
 
-    picture = map_picture(one, reach)
+    picture = map_picture(error_map, reach)
     if at is None:
         stream.log(f"{entity}/picture", rr.Image(picture), static=True)
-        stream.log(f"{entity}/values", rr.Tensor(one.mean), static=True)
+        stream.log(f"{entity}/values", rr.Tensor(error_map.mean), static=True)
         return
     index = [rr.TimeColumn(at[0], sequence=[at[1]])]
     shape = rr.encodings.ImageFormat(
@@ -195,12 +195,12 @@ def send_map(
     )
     columns = rr.Image.columns(buffer=[picture.tobytes()], format=[shape])
     rr.send_columns(f"{entity}/picture", indexes=index, columns=columns, recording=stream)
-    values = rr.Tensor.columns(data=tensor(one.mean))
+    values = rr.Tensor.columns(data=tensor(error_map.mean))
     rr.send_columns(f"{entity}/values", indexes=index, columns=values, recording=stream)
 
 
 def send_frame(
-    stream: RecordingStream, entity: str, one: ErrorMap, reach: float, words: tuple[str, str]
+    stream: RecordingStream, entity: str, error_map: ErrorMap, reach: float, words: tuple[str, str]
 ) -> None:
     """Sends ticks, names, colour bar and border of a map, for all times.
 
@@ -210,7 +210,7 @@ def send_frame(
         The recording.
     entity
         Where the map lies.
-    one
+    error_map
         The map.
     reach
         Mean error of full colour [unit].
@@ -220,7 +220,7 @@ def send_frame(
     """
     import rerun as rr
 
-    labels = map_labels(one, reach, words)
+    labels = map_labels(error_map, reach, words)
     points = rr.Points2D(
         labels.places,
         labels=[drawable(text) for text in labels.texts],
@@ -229,21 +229,21 @@ def send_frame(
         colors=_GREY,
     )
     stream.log(f"{entity}/axes", points, static=True)
-    rows, columns = one.mean.shape
+    rows, columns = error_map.mean.shape
     border = np.array([[0, 0], [columns, 0], [columns, rows], [0, rows], [0, 0]]) * CELL
     stream.log(f"{entity}/frame", rr.LineStrips2D([border], colors=_GREY, radii=0.17), static=True)
     place = rr.Transform3D(translation=[columns * CELL + BAR_GAP, 0.0, 0.0])
     stream.log(f"{entity}/bar", place, rr.Image(bar_picture(rows)), static=True)
 
 
-def map_view(entity: str, one: ErrorMap, name: str) -> Spatial2DView:
+def map_view(entity: str, error_map: ErrorMap, name: str) -> Spatial2DView:
     """The view of a map, with room for its labels.
 
     Parameters
     ----------
     entity
         Where the map lies.
-    one
+    error_map
         The map.
     name
         Of the view.
@@ -251,7 +251,7 @@ def map_view(entity: str, one: ErrorMap, name: str) -> Spatial2DView:
     """
     import rerun.blueprint as rrb
 
-    rows, columns = one.mean.shape
+    rows, columns = error_map.mean.shape
     bounds: Any = rrb.VisualBounds2D(
         x_range=(-3.0 * CELL, CELL * columns + BAR_GAP + BAR_WIDTH + 3.8 * CELL),
         y_range=(-1.9 * CELL, CELL * rows + 2.9 * CELL),

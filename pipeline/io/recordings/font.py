@@ -51,8 +51,8 @@ def in_headings(unit: str) -> str:
 
     """
 
-    def plain(found: re.Match[str]) -> str:
-        return ("1e-" if found[1] else "^-") + found[2].translate(_DIGITS)
+    def plain(match: re.Match[str]) -> str:
+        return ("1e-" if match[1] else "^-") + match[2].translate(_DIGITS)
 
     return _NEGATIVE_POWER.sub(plain, unit)
 

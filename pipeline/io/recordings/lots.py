@@ -121,19 +121,19 @@ def lots_bytes(result: LotRegression) -> bytes:
     return made.content
 
 
-def _send_histograms(stream: RecordingStream, one: ConstantResult) -> None:
-    edges, counts = histogram(one)
+def _send_histograms(stream: RecordingStream, constant: ConstantResult) -> None:
+    edges, counts = histogram(constant)
     width = float(edges[1] - edges[0])
     for side in SIDES:
-        entity = f"/hist/{one.name}/{side}"
+        entity = f"/hist/{constant.name}/{side}"
         send_bars(stream, entity, counts[side], edges[:-1], width, COLOURS[side])
 
 
-def _send_drift(stream: RecordingStream, one: ConstantResult) -> None:
-    moving = drift(one)
+def _send_drift(stream: RecordingStream, constant: ConstantResult) -> None:
+    moving = drift(constant)
     if moving is not None:
         index = pl.Series(PLACE, np.arange(moving.height, dtype=np.int64))
-        send_trace(stream, Trace(f"/drift/{one.name}", PLACE, moving.insert_column(0, index)))
+        send_trace(stream, Trace(f"/drift/{constant.name}", PLACE, moving.insert_column(0, index)))
 
 
 def _send_orders(stream: RecordingStream, result: LotRegression) -> None:

@@ -24,24 +24,24 @@ COVERAGE = 2.0
 FILL = 8
 
 
-def constant_scale(one: ConstantResult) -> Scale:
+def constant_scale(constant: ConstantResult) -> Scale:
     """The unit in which a constant is shown.
 
     Parameters
     ----------
-    one
+    constant
         Its result.
 
     """
-    return scale_for(max(abs(motor.value) for motor in one.motors), one.unit)
+    return scale_for(max(abs(motor.value) for motor in constant.motors), constant.unit)
 
 
-def histogram(one: ConstantResult) -> tuple[Array, dict[Side, Array]]:
+def histogram(constant: ConstantResult) -> tuple[Array, dict[Side, Array]]:
     """Motors by value of a constant, of both sides in common bins.
 
     Parameters
     ----------
-    one
+    constant
         Its result.
 
     Returns
@@ -50,8 +50,8 @@ def histogram(one: ConstantResult) -> tuple[Array, dict[Side, Array]]:
         Edges in the shown unit [B + 1], and motors a bin of each side [B].
 
     """
-    scale = constant_scale(one)
-    shown = {s: np.array([scale.shown(m.value) for m in one.of(s)]) for s in SIDES}
+    scale = constant_scale(constant)
+    shown = {s: np.array([scale.shown(m.value) for m in constant.of(s)]) for s in SIDES}
     every = np.concatenate(list(shown.values()))
     low, high = float(every.min()), float(every.max())
     if high <= low:
@@ -61,12 +61,12 @@ def histogram(one: ConstantResult) -> tuple[Array, dict[Side, Array]]:
     return edges, counts
 
 
-def drift(one: ConstantResult) -> pl.DataFrame | None:
+def drift(constant: ConstantResult) -> pl.DataFrame | None:
     """Lot by lot: mean, its ±U, EWMA and its control limits as change from the baseline [%].
 
     Parameters
     ----------
-    one
+    constant
         Its result.
 
     Attributes
@@ -79,7 +79,7 @@ def drift(one: ConstantResult) -> pl.DataFrame | None:
         Mean, its ±U, EWMA and its control limits [%]; None without a baseline.
 
     """
-    before = [lot.mean for lot in one.lots if lot.side == "baseline"]
+    before = [lot.mean for lot in constant.lots if lot.side == "baseline"]
     centre = float(np.mean(before)) if before else 0.0
     if not before or centre == 0.0:
         return None
@@ -98,7 +98,7 @@ def drift(one: ConstantResult) -> pl.DataFrame | None:
             # from the last lot before on, so that even a single one is a line
             "candidate": change(lot.mean) if place >= len(before) - 1 else np.nan,
         }
-        for place, lot in enumerate(one.lots)
+        for place, lot in enumerate(constant.lots)
     ]
     return pl.DataFrame(rows, schema=dict.fromkeys(rows[0], pl.Float64))
 

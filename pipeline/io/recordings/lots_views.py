@@ -64,30 +64,30 @@ def lots_layout(result: LotRegression) -> Blueprint:
     return workspace(*tabs, timeline=PLACE)
 
 
-def histogram_view(one: ConstantResult) -> Any:
+def histogram_view(constant: ConstantResult) -> Any:
     """Motors a bin of one constant, both sides over each other.
 
     Parameters
     ----------
-    one
+    constant
         Its result.
 
     """
-    unit = constant_scale(one).unit or "1"
-    name = f"{quantity_words(one.name)} [{unit}], motors per bin: {one.verdict}"
-    return bar_view(name, *(f"/hist/{one.name}/{side}" for side in SIDES), legend=True)
+    unit = constant_scale(constant).unit or "1"
+    name = f"{quantity_words(constant.name)} [{unit}], motors per bin: {constant.verdict}"
+    return bar_view(name, *(f"/hist/{constant.name}/{side}" for side in SIDES), legend=True)
 
 
-def drift_plan(one: ConstantResult) -> ViewPlan:
+def drift_plan(constant: ConstantResult) -> ViewPlan:
     """Lot means with ±U, the candidate in its own colour, and the control limits of the chart.
 
     Parameters
     ----------
-    one
+    constant
         Its result.
 
     """
-    entity = f"/drift/{one.name}"
+    entity = f"/drift/{constant.name}"
     lines = (
         Line(entity, "low", "mean ± U", (*BASELINE, 110)),
         Line(entity, "high", "mean ± U", (*BASELINE, 110)),
@@ -97,8 +97,8 @@ def drift_plan(one: ConstantResult) -> ViewPlan:
         Line(entity, "ewma_low", "limit", (*RESIDUAL, 160)),
         Line(entity, "ewma_high", "limit", (*RESIDUAL, 160)),
     )
-    words = f"{quantity_words(one.name)}: change from the baseline [%] by lot number"
-    return ViewPlan(words, lines, 1.0, rows=len(one.lots))
+    words = f"{quantity_words(constant.name)}: change from the baseline [%] by lot number"
+    return ViewPlan(words, lines, 1.0, rows=len(constant.lots))
 
 
 def cogging_plan(result: LotRegression) -> ViewPlan | None:

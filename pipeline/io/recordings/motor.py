@@ -255,17 +255,17 @@ def _send_cogging(stream: RecordingStream, evidence: Sequence[Evidence]) -> None
             send_bars(stream, "/preview/cogging", wave[:few], left[:few], width, RESIDUAL)
 
 
-def _wave(one: Evidence) -> tuple[Array, Array]:
+def _wave(evidence: Evidence) -> tuple[Array, Array]:
     """Means over cells of one turn [mN·m] of all directions, each less its own mean."""
     turn = 2.0 * np.pi
     total = np.zeros(WAVE_CELLS)
-    for series in one.series:
+    for series in evidence.series:
         fine = np.isfinite(series.measured)
         place = (np.mod(series.x[fine], turn) / turn * WAVE_CELLS).astype(int) % WAVE_CELLS
         values = series.measured[fine] - series.measured[fine].mean()
         count = np.bincount(place, minlength=WAVE_CELLS)
         total += np.bincount(place, values, WAVE_CELLS) / np.maximum(count, 1)
-    mean = 1e3 * total / len(one.series)
+    mean = 1e3 * total / len(evidence.series)
     return mean, np.arange(WAVE_CELLS) * 360.0 / WAVE_CELLS
 
 

@@ -186,12 +186,12 @@ class Registry:
             is missing.
 
         """
-        found: list[Version] = []
+        versions: list[Version] = []
 
         def append(events: Sequence[Event]) -> list[Row]:
             version = one_of(select(events, wanted), wanted, self.place)
             _allowed(kind, version)
-            found[:] = [version]
+            versions[:] = [version]
             last = version.decisions[-1] if version.decisions else None
             if last is not None and (last.kind, last.by, last.why) == (kind, by, why):
                 return []
@@ -203,7 +203,7 @@ class Registry:
         if self._table.events() is None:
             raise self._missing()
         _, added = self._table.append(append)
-        decided = found[0]
+        decided = versions[0]
         return replace(decided, decisions=(*decided.decisions, *added)), bool(added)
 
     def tag(

@@ -34,12 +34,12 @@ def read_diagnoses(folders: Iterable[Path]) -> dict[str, DiagnosisSummary]:
         A file is no diagnosis.
 
     """
-    found: dict[str, DiagnosisSummary] = {}
+    summaries: dict[str, DiagnosisSummary] = {}
     for folder in folders:
         for path in sorted(folder.glob("*.json")):
             one = _read(path)
-            found[one.motor_id] = one
-    return found
+            summaries[one.motor_id] = one
+    return summaries
 
 
 def _read(path: Path) -> DiagnosisSummary:

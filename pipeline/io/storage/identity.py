@@ -90,22 +90,22 @@ class Identities:
         known = self._known.get(file)
         return known[1] if known is not None and known[0] == identity(self.folder / file) else None
 
-    def note(self, file: str, found: Identity | None, sha256: str) -> None:
+    def note(self, file: str, identity: Identity | None, sha256: str) -> None:
         """Notes the digest of a file.
 
         Parameters
         ----------
         file
             Relative path.
-        found
+        identity
             Its identity before and after it was read; None notes nothing.
         sha256
             Its digest.
 
         """
-        if found is None or self._known.get(file) == (found, sha256):
+        if identity is None or self._known.get(file) == (identity, sha256):
             return
-        self._known[file] = (found, sha256)
+        self._known[file] = (identity, sha256)
         self._changed = True
 
     def holds(self, file: str, sha256: str) -> bool:

@@ -162,12 +162,12 @@ def _residual_marks(evidence: Evidence, panel: Panel, scale: ResidualScale) -> I
     )
 
 
-def _drawn(css: str, evidence: Evidence, panel: Panel, one: Series, y: Array, index: int) -> str:
+def _drawn(css: str, evidence: Evidence, panel: Panel, series: Series, y: Array, index: int) -> str:
     """The marks of one series; a dense trace is the band between its extremes."""
-    if evidence.kind == "line" and (band := filled(*panel.place(one.x, y))):
-        return _path(f"{css} trace", band, one.label)
-    marks = _MARKS[evidence.kind](panel, one.x, y, index, len(evidence.series))
-    return _path(f"{css} {_shape(evidence)}", marks, one.label)
+    if evidence.kind == "line" and (band := filled(*panel.place(series.x, y))):
+        return _path(f"{css} trace", band, series.label)
+    marks = _MARKS[evidence.kind](panel, series.x, y, index, len(evidence.series))
+    return _path(f"{css} {_shape(evidence)}", marks, series.label)
 
 
 def _fit_line(panel: Panel, x: Array, y: Array, index: int, count: int) -> str:

@@ -29,38 +29,41 @@ def colour(share: float) -> str:
     return "#" + "".join(f"{round(_NEUTRAL + (c - _NEUTRAL) * strength):02x}" for c in end)
 
 
-def heatmap(one: ErrorMap, reach: float) -> str:
+def heatmap(error_map: ErrorMap, reach: float) -> str:
     """SVG of a map of x and y; `reach` [unit] is full colour. Cells show their numbers on hover.
 
     A dot marks a cell whose mean chance does not make: p below 0.05 over the number of cells.
     Raises ValueError for a map of one variable.
     """
-    if one.y is None:
+    if error_map.y is None:
         raise ValueError("a heat map needs two variables")
     right = WIDTH - BAR_GAP - BAR - BAR_LABELS
     panel = Panel(
-        axis_for(one.x.variable, one.x.edges[0], one.x.edges[-1], LEFT, right, 5),
-        axis_for(one.y.variable, one.y.edges[0], one.y.edges[-1], TOP + HEIGHT, TOP, 5),
+        axis_for(error_map.x.variable, error_map.x.edges[0], error_map.x.edges[-1], LEFT, right, 5),
+        axis_for(
+            error_map.y.variable, error_map.y.edges[0], error_map.y.edges[-1], TOP + HEIGHT, TOP, 5
+        ),
     )
     frame = f'x="{LEFT:g}" y="{TOP:g}" width="{right - LEFT:g}" height="{HEIGHT:g}"'
-    words = f"{one.signal} over speed and current, largest {quantity(one.reach, one.unit, 3)}"
+    largest = quantity(error_map.reach, error_map.unit, 3)
+    words = f"{error_map.signal} over speed and current, largest {largest}"
     return (
         f'<svg class="heat" viewBox="0 0 {WIDTH:g} {TOP + HEIGHT + BOTTOM:g}" role="img" '
         f'aria-label="{escape(words)}"><rect class="gap" {frame}/>'
-        f"{''.join(_cells(one, reach, panel))}"
-        f'<rect class="frame" {frame}/>{_ticks(panel)}{_scale_bar(one, reach, right)}</svg>'
+        f"{''.join(_cells(error_map, reach, panel))}"
+        f'<rect class="frame" {frame}/>{_ticks(panel)}{_scale_bar(error_map, reach, right)}</svg>'
     )
 
 
-def _cells(one: ErrorMap, reach: float, panel: Panel) -> Iterator[str]:
-    y = one.y or one.x
-    across, down = panel.place(np.array(one.x.edges), np.array(y.edges))
-    for row, column in zip(*np.nonzero(np.isfinite(one.mean)), strict=True):
+def _cells(error_map: ErrorMap, reach: float, panel: Panel) -> Iterator[str]:
+    y = error_map.y or error_map.x
+    across, down = panel.place(np.array(error_map.x.edges), np.array(y.edges))
+    for row, column in zip(*np.nonzero(np.isfinite(error_map.mean)), strict=True):
         left, right, low, high = *across[column : column + 2], *down[row : row + 2]
-        mean, p_value = float(one.mean[row, column]), float(one.p_value[row, column])
-        hover = f"{quantity(mean, one.unit, 3)}, n {one.count[row, column]}"
+        mean, p_value = float(error_map.mean[row, column]), float(error_map.p_value[row, column])
+        hover = f"{quantity(mean, error_map.unit, 3)}, n {error_map.count[row, column]}"
         hover += "" if math.isnan(p_value) else f", p {p_value:.2g}"
-        sure = p_value * int(np.isfinite(one.mean).sum()) < SURE
+        sure = p_value * int(np.isfinite(error_map.mean).sum()) < SURE
         mark = f'<path class="sure" d="M{(left + right) / 2:.1f} {(low + high) / 2:.1f}h0"/>'
         yield (
             f'<g><title>{escape(hover)}</title><rect fill="{colour(mean / reach if reach else 0)}" '
@@ -81,7 +84,7 @@ def _ticks(panel: Panel) -> str:
     )
 
 
-def _scale_bar(one: ErrorMap, reach: float, right: float) -> str:
+def _scale_bar(error_map: ErrorMap, reach: float, right: float) -> str:
     """The colours of −reach to reach, with both ends and zero named."""
     left, step = right + BAR_GAP, HEIGHT / (2 * STEPS + 1)
     parts = [
@@ -90,28 +93,32 @@ def _scale_bar(one: ErrorMap, reach: float, right: float) -> str:
         for n in range(-STEPS, STEPS + 1)
     ]
     for value, place in ((reach, TOP + 8), (0.0, TOP + HEIGHT / 2 + 4), (-reach, TOP + HEIGHT)):
-        text = quantity(value, one.unit, 2) if value else "0"
+        text = quantity(value, error_map.unit, 2) if value else "0"
         parts.append(
             f'<text class="tick" x="{left + BAR + 4:.1f}" y="{place:.1f}">{escape(text)}</text>'
         )
     return "".join(parts)
 
 
-def angle_bars(one: ErrorMap, reach: float) -> str:
+def angle_bars(error_map: ErrorMap, reach: float) -> str:
     """SVG of a signal's mean error over one turn, on an axis from −reach to reach [unit]."""
     x = axis_for("theta_deg", 0.0, 360.0, LEFT, WIDTH - 14.0, 4)
-    y = symmetric_axis(one.signal, 1.05 * reach, TOP + ANGLE_HEIGHT, TOP)
-    edges = x.pixels(np.degrees(np.array(one.x.edges)))
+    y = symmetric_axis(error_map.signal, 1.05 * reach, TOP + ANGLE_HEIGHT, TOP)
+    edges = x.pixels(np.degrees(np.array(error_map.x.edges)))
     base = y.pixel(0.0)
     marks = "".join(
         f"M{left:.1f} {base:.1f}V{top:.1f}H{right:.1f}V{base:.1f}Z"
         for left, right, top, mean in zip(
-            edges[:-1], edges[1:], y.pixels(np.nan_to_num(one.mean)), one.mean, strict=True
+            edges[:-1],
+            edges[1:],
+            y.pixels(np.nan_to_num(error_map.mean)),
+            error_map.mean,
+            strict=True,
         )
         if not math.isnan(mean)
     )
-    turn = "electrical" if one.x.variable == "theta_elec_rad" else "mechanical"
-    words = f"{quantity_words(one.signal)} over the {turn} angle [°]"
+    turn = "electrical" if error_map.x.variable == "theta_elec_rad" else "mechanical"
+    words = f"{quantity_words(error_map.signal)} over the {turn} angle [°]"
     return (
         f'<svg class="heat" viewBox="0 0 {WIDTH:g} {TOP + ANGLE_HEIGHT + BOTTOM:g}" role="img" '
         f'aria-label="{escape(words)}">{_angle_frame(x, y)}'

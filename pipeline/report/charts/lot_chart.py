@@ -19,29 +19,29 @@ MOST_DOTS, MOST_NAMES = 60, 14
 NAME_CHARS = 11
 
 
-def lot_chart(one: ConstantResult) -> str:
+def lot_chart(constant: ConstantResult) -> str:
     """SVG of a constant's lots; an empty text where it has none."""
-    if not one.lots:
+    if not constant.lots:
         return ""
-    y = _range(one)
-    pitch = (WIDTH - LEFT - RIGHT) / len(one.lots)
-    body = [_grid(y), _margin(one, y), _limits(one, y)]
-    for index, lot in enumerate(one.lots):
+    y = _range(constant)
+    pitch = (WIDTH - LEFT - RIGHT) / len(constant.lots)
+    body = [_grid(y), _margin(constant, y), _limits(constant, y)]
+    for index, lot in enumerate(constant.lots):
         middle = LEFT + pitch * (index + 0.5)
-        own = [m for m in one.motors if m.lot == lot.lot and m.side == lot.side]
-        body.append(_column(lot, own, one.unit, middle, min(pitch, 60.0), y))
-    body += [_average(one, y, pitch), _names(one.lots, pitch)]
-    label = escape(f"{one.name} by lot")
+        own = [m for m in constant.motors if m.lot == lot.lot and m.side == lot.side]
+        body.append(_column(lot, own, constant.unit, middle, min(pitch, 60.0), y))
+    body += [_average(constant, y, pitch), _names(constant.lots, pitch)]
+    label = escape(f"{constant.name} by lot")
     return (
         f'<svg class="chart lots" viewBox="0 0 {WIDTH:g} {TOP + HEIGHT + BOTTOM:g}" role="img" '
         f'aria-label="{label}">{"".join(body)}</svg>'
     )
 
 
-def _range(one: ConstantResult) -> Axis:
-    values = [motor.value for motor in one.motors]
+def _range(constant: ConstantResult) -> Axis:
+    values = [motor.value for motor in constant.motors]
     low, high = min(values), max(values)
-    bounds = one.bounds
+    bounds = constant.bounds
     centre = bounds.nominal if bounds is not None else None
     if bounds is not None and bounds.margin is not None and centre is not None:
         low, high = min(low, centre - bounds.margin), max(high, centre + bounds.margin)
@@ -50,7 +50,7 @@ def _range(one: ConstantResult) -> Axis:
         # A limit far away would flatten everything; it is then given in words alone.
         if limit is not None and low - reach <= limit <= high + reach:
             low, high = min(low, limit), max(high, limit)
-    return axis_for(one.name, *padded(low, high, 0.06), TOP + HEIGHT, TOP, 4)
+    return axis_for(constant.name, *padded(low, high, 0.06), TOP + HEIGHT, TOP, 4)
 
 
 def _grid(y: Axis) -> str:
@@ -58,9 +58,9 @@ def _grid(y: Axis) -> str:
     return y_ticks(y, LEFT, WIDTH - RIGHT) + title
 
 
-def _margin(one: ConstantResult, y: Axis) -> str:
-    bounds = one.bounds
-    means = [lot.mean for lot in one.lots if lot.side == "baseline"]
+def _margin(constant: ConstantResult, y: Axis) -> str:
+    bounds = constant.bounds
+    means = [lot.mean for lot in constant.lots if lot.side == "baseline"]
     if bounds is None or bounds.margin is None or not means:
         return ""
     centre = sum(means) / len(means)
@@ -72,15 +72,15 @@ def _margin(one: ConstantResult, y: Axis) -> str:
     )
 
 
-def _limits(one: ConstantResult, y: Axis) -> str:
-    if one.bounds is None:
+def _limits(constant: ConstantResult, y: Axis) -> str:
+    if constant.bounds is None:
         return ""
     marks = []
     for css, words, value in (
-        ("residual", "lower limit", one.bounds.lower),
-        ("residual", "upper limit", one.bounds.upper),
-        ("noise", "lower acceptance limit", one.bounds.accept_lower),
-        ("noise", "upper acceptance limit", one.bounds.accept_upper),
+        ("residual", "lower limit", constant.bounds.lower),
+        ("residual", "upper limit", constant.bounds.upper),
+        ("noise", "lower acceptance limit", constant.bounds.accept_lower),
+        ("noise", "upper acceptance limit", constant.bounds.accept_upper),
     ):
         if value is not None and y.low <= value <= y.high:
             marks.append(
@@ -118,14 +118,14 @@ def _column(
     )
 
 
-def _average(one: ConstantResult, y: Axis, pitch: float) -> str:
+def _average(constant: ConstantResult, y: Axis, pitch: float) -> str:
     """The moving average with its limits, where it is charted."""
-    places = [LEFT + pitch * (k + 0.5) for k in range(len(one.lots))]
+    places = [LEFT + pitch * (k + 0.5) for k in range(len(constant.lots))]
     paths = []
     for css, values in (
-        ("fitted", [lot.ewma for lot in one.lots]),
-        ("noise", [lot.ewma_low for lot in one.lots]),
-        ("noise", [lot.ewma_high for lot in one.lots]),
+        ("fitted", [lot.ewma for lot in constant.lots]),
+        ("noise", [lot.ewma_low for lot in constant.lots]),
+        ("noise", [lot.ewma_high for lot in constant.lots]),
     ):
         points = [
             f"{x:.1f} {y.pixel(min(max(v, y.low), y.high)):.1f}"

@@ -65,8 +65,12 @@ def _maps(result: Comparison) -> list[Figure]:
     return found
 
 
-def _axes(one: ErrorMap) -> tuple[str, ...]:
-    return (one.x.variable,) if one.y is None else (one.x.variable, one.y.variable)
+def _axes(error_map: ErrorMap) -> tuple[str, ...]:
+    return (
+        (error_map.x.variable,)
+        if error_map.y is None
+        else (error_map.x.variable, error_map.y.variable)
+    )
 
 
 def _worst_traces(result: Comparison) -> list[Trace]:
@@ -81,13 +85,15 @@ def _worst_traces(result: Comparison) -> list[Trace]:
     return list(worst.values())
 
 
-def _ratio(one: Trace, ratios: Mapping[Any, float]) -> float:
-    return ratios.get((one.signal, one.kind, one.capture), 0.0)
+def _ratio(trace: Trace, ratios: Mapping[Any, float]) -> float:
+    return ratios.get((trace.signal, trace.kind, trace.capture), 0.0)
 
 
-def _trace(one: Trace) -> Figure:
-    series = (Series("", one.t_s, one.measured, one.model),)
-    drawn = Evidence("", quantity_words(one.signal), "t_s", one.signal, "line", series, one.capture)
-    how = "held out" if one.split == "held_out" else "in the fit"
-    caption = f"model {KINDS[one.kind]}, {how}"
-    return Figure(quantity_words(one.signal), caption, one.capture, chart(drawn))
+def _trace(trace: Trace) -> Figure:
+    series = (Series("", trace.t_s, trace.measured, trace.model),)
+    drawn = Evidence(
+        "", quantity_words(trace.signal), "t_s", trace.signal, "line", series, trace.capture
+    )
+    how = "held out" if trace.split == "held_out" else "in the fit"
+    caption = f"model {KINDS[trace.kind]}, {how}"
+    return Figure(quantity_words(trace.signal), caption, trace.capture, chart(drawn))

@@ -129,16 +129,16 @@ def _short(view: StepView) -> str:
     return f"{view.number}: {view.title}" if len(view.title) < 26 else f"step {view.number}"
 
 
-def _ranked(one: RankedEffect) -> dict[str, str]:
+def _ranked(ranked: RankedEffect) -> dict[str, str]:
     return {
-        "effect": one.effect,
-        "score": f"{one.score:.4g}".replace("-", MINUS),
-        "drop": f"{100.0 * one.held_out_drop:.0f} %" if one.held_out_drop else "–",
-        "p_value": f"{one.p_value:.2g}",
-        "confused_with": ", ".join(one.confused_with),
-        "explanation": one.explanation,
-        "experiment": one.experiment,
-        "shortfall": one.shortfall,
+        "effect": ranked.effect,
+        "score": f"{ranked.score:.4g}".replace("-", MINUS),
+        "drop": f"{100.0 * ranked.held_out_drop:.0f} %" if ranked.held_out_drop else "–",
+        "p_value": f"{ranked.p_value:.2g}",
+        "confused_with": ", ".join(ranked.confused_with),
+        "explanation": ranked.explanation,
+        "experiment": ranked.experiment,
+        "shortfall": ranked.shortfall,
     }
 
 

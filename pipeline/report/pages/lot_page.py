@@ -30,101 +30,102 @@ class Detail:
     missing: tuple[str, ...]
 
 
-def render_regression(found: LotRegression, links: Sequence[Link] = ()) -> str:
+def render_regression(regression: LotRegression, links: Sequence[Link] = ()) -> str:
     """The self-contained HTML page; equal input, equal text. `links` lead to other pages."""
-    view = lot_view(found)
+    view = lot_view(regression)
     return render(
         "lot.html.jinja",
-        found=found,
+        found=regression,
         links=link_block(links),
-        tone=TONES.get(found.verdict, "none"),
-        short=found.verdict.replace("_", " "),
-        reasons=found.reasons,
+        tone=TONES.get(regression.verdict, "none"),
+        short=regression.verdict.replace("_", " "),
+        reasons=regression.reasons,
         view=view,
-        changed=[e for e in found.effects if e.verdict != "pass"],
-        effects=[_effect(one) for one in found.effects],
-        orders=_orders(found.orders),
-        cogging=cogging_chart(found.cogging, found.orders),
-        outliers=[(o, quantity(o.value, o.unit)) for o in found.outliers],
+        changed=[e for e in regression.effects if e.verdict != "pass"],
+        effects=[_effect(one) for one in regression.effects],
+        orders=_orders(regression.orders),
+        cogging=cogging_chart(regression.cogging, regression.orders),
+        outliers=[(o, quantity(o.value, o.unit)) for o in regression.outliers],
         details=[_detail(*one) for one in zip(view.present, view.rows, strict=True)],
         tones=TONES,
     )
 
 
-def _detail(one: ConstantResult, row: ConstantRow) -> Detail:
-    shown = one.motors[:MOST_MOTORS]
+def _detail(constant: ConstantResult, row: ConstantRow) -> Detail:
+    shown = constant.motors[:MOST_MOTORS]
     return Detail(
         row=row,
-        chart=lot_chart(one),
-        facts=tuple((name, text) for name, text in _facts(one) if text),
-        parts=tuple(_part(part, one.unit) for part in one.variance),
+        chart=lot_chart(constant),
+        facts=tuple((name, text) for name, text in _facts(constant) if text),
+        parts=tuple(_part(part, constant.unit) for part in constant.variance),
         stations=tuple(
             (
                 station.station,
                 NONE
                 if station.bias is None
-                else reading(station.bias, station.u or 0.0, one.unit).text(),
+                else reading(station.bias, station.u or 0.0, constant.unit).text(),
                 f"{station.by.replace('_', ' ')}"
                 + (f", {station.golden_motors} motors" if station.golden_motors else ""),
             )
-            for station in one.stations
+            for station in constant.stations
         ),
         motors=tuple(
             (
                 motor.motor_id,
                 motor.lot,
-                reading(motor.value, motor.u, one.unit).text(),
+                reading(motor.value, motor.u, constant.unit).text(),
                 motor.decision.replace("_", " "),
                 NONE if motor.z is None else f"{motor.z:+.1f}",
                 motor.capture or NONE,
             )
             for motor in shown
         ),
-        left_out=len(one.motors) - len(shown),
-        missing=one.missing,
+        left_out=len(constant.motors) - len(shown),
+        missing=constant.missing,
     )
 
 
-def _facts(one: ConstantResult) -> Sequence[tuple[str, str]]:
+def _facts(constant: ConstantResult) -> Sequence[tuple[str, str]]:
     """What was found, each with the numbers it rests on."""
     return (
-        ("limits", _limits(one)),
-        ("motors within limits", _counts(one)),
-        ("risks of the decision rule", _risks(one)),
-        ("lot-level test", _test(one)),
-        ("sameness", _same(one)),
-        ("power", _power(one)),
-        ("capability", _capability(one)),
-        ("gauge R&R", _gauge(one.gauge, one.unit)),
+        ("limits", _limits(constant)),
+        ("motors within limits", _counts(constant)),
+        ("risks of the decision rule", _risks(constant)),
+        ("lot-level test", _test(constant)),
+        ("sameness", _same(constant)),
+        ("power", _power(constant)),
+        ("capability", _capability(constant)),
+        ("gauge R&R", _gauge(constant.gauge, constant.unit)),
     )
 
 
-def _limits(one: ConstantResult) -> str:
-    bounds = one.bounds
+def _limits(constant: ConstantResult) -> str:
+    bounds = constant.bounds
     if bounds is None or (bounds.lower is None and bounds.upper is None):
         return ""
     sides = [
-        NONE if side is None else quantity(side, one.unit) for side in (bounds.lower, bounds.upper)
+        NONE if side is None else quantity(side, constant.unit)
+        for side in (bounds.lower, bounds.upper)
     ]
-    band = quantity(bounds.guard_band, one.unit, 2)
+    band = quantity(bounds.guard_band, constant.unit, 2)
     return f"{sides[0]} to {sides[1]}, guard band {band}: {bounds.rule}"
 
 
-def _counts(one: ConstantResult) -> str:
-    counts = [f"{c.motors} {c.decision.replace('_', ' ')}" for c in one.conformity.counts]
-    worst = one.conformity.worst_motor
+def _counts(constant: ConstantResult) -> str:
+    counts = [f"{c.motors} {c.decision.replace('_', ' ')}" for c in constant.conformity.counts]
+    worst = constant.conformity.worst_motor
     return ", ".join(counts) + (f"; worst {worst}" if worst else "")
 
 
-def _risks(one: ConstantResult) -> str:
-    accept, reject = one.conformity.risk_false_accept, one.conformity.risk_false_reject
+def _risks(constant: ConstantResult) -> str:
+    accept, reject = constant.conformity.risk_false_accept, constant.conformity.risk_false_reject
     if accept is None or reject is None:
         return ""
     return f"false acceptance {100 * accept:.2g} %, false rejection {100 * reject:.2g} % of motors"
 
 
-def _test(one: ConstantResult) -> str:
-    test = one.test
+def _test(constant: ConstantResult) -> str:
+    test = constant.test
     if test.status != "evaluated":
         return f"{test.status.replace('_', ' ')}: {test.lots} of {test.needed} baseline lots"
     t = NONE if test.t is None else f"{test.t:.3g}"
@@ -134,25 +135,28 @@ def _test(one: ConstantResult) -> str:
     )
 
 
-def _same(one: ConstantResult) -> str:
-    same = one.equivalence
+def _same(constant: ConstantResult) -> str:
+    same = constant.equivalence
     if same.low is None or same.high is None or same.margin is None:
         return ""
-    low, high, margin = (quantity(x, one.unit, 3) for x in (same.low, same.high, same.margin))
+    low, high, margin = (quantity(x, constant.unit, 3) for x in (same.low, same.high, same.margin))
     return f"{same.status}: difference {low} to {high} against ± {margin}, p {p_text(same.p_value)}"
 
 
-def _power(one: ConstantResult) -> str:
-    power = one.power
+def _power(constant: ConstantResult) -> str:
+    power = constant.power
     if power.power is None or power.shift is None or power.detectable is None:
         return ""
-    shift, seen = quantity(power.shift, one.unit, 3), quantity(power.detectable, one.unit, 3)
+    shift, seen = (
+        quantity(power.shift, constant.unit, 3),
+        quantity(power.detectable, constant.unit, 3),
+    )
     by = "scatter of lots" if power.by == "lots" else "scatter of motors"
     return f"{100 * power.power:.0f} % for {shift} (1.5 sd); 95 % from {seen} on, by the {by}"
 
 
-def _capability(one: ConstantResult) -> str:
-    found = one.capability
+def _capability(constant: ConstantResult) -> str:
+    found = constant.capability
     if found.cpk is None or found.cpk_low is None or found.cpk_high is None:
         return ""
     cp = "" if found.cp is None else f"Cp {found.cp:.2f}, "

@@ -77,17 +77,17 @@ def render_motor(
     )
 
 
-def _charts(found: Performance) -> list[tuple[str, str]]:
+def _charts(performance: Performance) -> list[tuple[str, str]]:
     """Titles and drawings of the performance."""
-    peak, steady = found.curve("torque_peak"), found.curve("torque_continuous")
+    peak, steady = performance.curve("torque_peak"), performance.curve("torque_continuous")
     torque, power, kt = ("torque_shaft_nm", "power_w", "kt_peak_nm_a")
-    of_one = [found.curve(name) for name in ("power_peak", "kt_peak")]
+    of_one = [performance.curve(name) for name in ("power_peak", "kt_peak")]
     drawn = [
         (
             "Torque against speed",
-            band_chart([c for c in (peak, steady) if c], torque, found.regimes),
+            band_chart([c for c in (peak, steady) if c], torque, performance.regimes),
         ),
-        ("Efficiency, with losses on hover", efficiency_chart(found.cells, peak)),
+        ("Efficiency, with losses on hover", efficiency_chart(performance.cells, peak)),
         ("Shaft power at peak torque", band_chart([c for c in of_one[:1] if c], power)),
         ("Air-gap torque per ampere", band_chart([c for c in of_one[1:] if c], kt)),
     ]

@@ -33,19 +33,21 @@ SHOWN = (
 """Constants of the sheet, where they are known."""
 
 
-def render_sheet(sheet: Datasheet, found: Performance) -> str:
+def render_sheet(sheet: Datasheet, performance: Performance) -> str:
     """The self-contained HTML page of one motor's sheet; equal input gives equal text.
 
     The status is what the datasheet says of itself; an approval is in the registry.
     """
     rows = motor_rows(sheet)
-    curves = [c for c in (found.curve("torque_peak"), found.curve("torque_continuous")) if c]
+    curves = [
+        c for c in (performance.curve("torque_peak"), performance.curve("torque_continuous")) if c
+    ]
     return render(
         "sheet.html.jinja",
         sheet=sheet,
         file=quote(file_stem(sheet.motor_id), safe="~"),
         rows=[(constant_words(n), rows[n]) for n in SHOWN if n in rows and rows[n].reading],
-        view=performance_view(found),
-        torque=band_chart(curves, "torque_shaft_nm", found.regimes),
-        efficiency=efficiency_chart(found.cells, found.curve("torque_peak")),
+        view=performance_view(performance),
+        torque=band_chart(curves, "torque_shaft_nm", performance.regimes),
+        efficiency=efficiency_chart(performance.cells, performance.curve("torque_peak")),
     )

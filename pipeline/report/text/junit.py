@@ -20,13 +20,13 @@ MOST_LINES = 200
 PASSED = ("pass", "marginal")
 
 
-def junit_xml(found: LotRegression) -> bytes:
+def junit_xml(regression: LotRegression) -> bytes:
     """The document [UTF-8]: suites `verdict`, `constants`, `effects`; one test each."""
-    root = Xml.Element("testsuites", name=_fit(f"regress {found.candidate.selector}"))
-    _suite(root, "verdict", [_case("verdict", found.verdict, found.headline, True)])
-    _suite(root, "constants", [_constant(one) for one in found.constants])
-    if found.effects:
-        _suite(root, "effects", [_effect(one) for one in found.effects])
+    root = Xml.Element("testsuites", name=_fit(f"regress {regression.candidate.selector}"))
+    _suite(root, "verdict", [_case("verdict", regression.verdict, regression.headline, True)])
+    _suite(root, "constants", [_constant(one) for one in regression.constants])
+    if regression.effects:
+        _suite(root, "effects", [_effect(one) for one in regression.effects])
     totals = {
         name: str(sum(int(suite.get(name, "0")) for suite in root))
         for name in ("tests", "failures", "errors", "skipped")
@@ -36,14 +36,14 @@ def junit_xml(found: LotRegression) -> bytes:
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + Xml.tostring(root) + b"\n"
 
 
-def _constant(one: ConstantResult) -> Xml.Element:
-    must = one.decides and bool(one.motors)
-    case = _case(one.name, one.verdict, one.why, must)
-    if one.motors:
-        own = [f"{lot.side} {lot.lot}: mean {lot.mean!r} {one.unit}" for lot in one.lots]
+def _constant(constant: ConstantResult) -> Xml.Element:
+    must = constant.decides and bool(constant.motors)
+    case = _case(constant.name, constant.verdict, constant.why, must)
+    if constant.motors:
+        own = [f"{lot.side} {lot.lot}: mean {lot.mean!r} {constant.unit}" for lot in constant.lots]
         own += [
-            f"{m.side} {m.lot} {m.motor_id}: {m.value!r} {one.unit}, {m.decision}, {m.capture}"
-            for m in one.motors
+            f"{m.side} {m.lot} {m.motor_id}: {m.value!r} {constant.unit}, {m.decision}, {m.capture}"
+            for m in constant.motors
             if m.outlier or m.decision in ("fail", "conditional_fail", "conditional_pass")
         ]
         Xml.SubElement(case, "system-out").text = _fit("\n".join(own[:MOST_LINES]))

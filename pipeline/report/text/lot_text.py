@@ -10,14 +10,14 @@ from pipeline.views.lots import lot_view
 from pipeline.views.table_text import NONE, blocks, safe
 
 
-def regression_text(found: LotRegression, files: Sequence[str]) -> str:
+def regression_text(regression: LotRegression, files: Sequence[str]) -> str:
     """The text for a terminal."""
-    lines = [f"{found.verdict}: {safe(found.headline)}"]
-    lines += [f"  {safe(reason)}" for reason in found.reasons]
-    if found.mode == "lots" and found.history != "sufficient":
-        lots, needed = len(found.baseline.lots), found.limits.min_lots
-        lines.append(f"  lot-level test: {found.history}, {lots} of {needed} baseline lots")
-    view = lot_view(found)
+    lines = [f"{regression.verdict}: {safe(regression.headline)}"]
+    lines += [f"  {safe(reason)}" for reason in regression.reasons]
+    if regression.mode == "lots" and regression.history != "sufficient":
+        lots, needed = len(regression.baseline.lots), regression.limits.min_lots
+        lines.append(f"  lot-level test: {regression.history}, {lots} of {needed} baseline lots")
+    view = lot_view(regression)
     if view.rows:
         head = ("constant", "baseline", "candidate", "change ± U", "p", "same", "verdict")
         rows = [
@@ -30,15 +30,15 @@ def regression_text(found: LotRegression, files: Sequence[str]) -> str:
         lines += [f"{counted(len(r.members), 'constant')}: {safe(r.text)}" for r in view.reasons]
     if view.absent:
         lines += ["", f"not compared, since neither side has it: {', '.join(view.absent)}"]
-    changed = [one for one in found.effects if one.verdict != "pass"]
+    changed = [one for one in regression.effects if one.verdict != "pass"]
     if changed:
         lines.append("")
         lines += [f"{one.verdict}: {one.name}: {one.why}" for one in changed]
-    if found.outliers:
+    if regression.outliers:
         lines.append("")
         lines += [
             f"outlier: {safe(o.motor_id)}: {o.constant} {o.why} ({safe(o.capture or NONE)})"
-            for o in found.outliers[:10]
+            for o in regression.outliers[:10]
         ]
-    lines += [f"note: {safe(note)}" for note in found.notes]
+    lines += [f"note: {safe(note)}" for note in regression.notes]
     return "\n".join([*lines, "", *(f"wrote {name}" for name in files)])

@@ -68,17 +68,17 @@ def campaigns(
     return Gathered(tuple(made), tuple(findings), found.note)
 
 
-def _of_files(found: Survey, only: Collection[str] | None) -> Survey:
+def _of_files(survey: Survey, only: Collection[str] | None) -> Survey:
     if only is None:
-        return found
-    entries = tuple(entry for entry in found.entries if entry.path in only)
-    findings = tuple(finding for finding in found.findings if finding.file in only)
+        return survey
+    entries = tuple(entry for entry in survey.entries if entry.path in only)
+    findings = tuple(finding for finding in survey.findings if finding.file in only)
     return Survey(entries, findings, ())
 
 
-def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) -> list[ReadTask]:
+def _tasks(folder: str, survey: Survey, motor: str | None, limits: ReadLimits) -> list[ReadTask]:
     motors: dict[str, list[Entry]] = {}
-    for entry in found.entries:
+    for entry in survey.entries:
         motors.setdefault(entry.stated["motor_id"], []).append(entry)
     if motor is not None and motor not in motors:
         raise UsageError(f"no capture of motor {motor} in {folder}", meant(motor, sorted(motors)))
@@ -86,13 +86,15 @@ def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) ->
     return [ReadTask(name, folder, tuple(motors[name]), limits) for name in wanted]
 
 
-def outcome_of(folder: str, found: Gathered, texts: Sequence[str], *, undecided: bool) -> Outcome:
+def outcome_of(
+    folder: str, gathered: Gathered, texts: Sequence[str], *, undecided: bool
+) -> Outcome:
     """The text of each motor, the refusals, and the remedy where nothing is usable."""
-    refused = any(finding.severity == "refused" for finding in found.findings)
-    lines = lines_of(found.findings)
+    refused = any(finding.severity == "refused" for finding in gathered.findings)
+    lines = lines_of(gathered.findings)
     if not texts:
         lines.append(nothing_usable(folder, refused=refused))
-    if found.note:
-        lines.append(f"note: {found.note}")
+    if gathered.note:
+        lines.append(f"note: {gathered.note}")
     code = first_that_applies(3 if refused else 0, 4 if undecided else 0)
     return Outcome(code, "\n".join(texts), tuple(lines))

@@ -77,7 +77,7 @@ def _write(
     job: MotorJob,
     campaign: Campaign,
     datasheet: Datasheet,
-    found: work.Judged,
+    judged: work.Judged,
     findings: tuple[Finding, ...],
     watch: Stopwatch,
 ) -> Files:
@@ -96,8 +96,8 @@ def _write(
         with watch.stage("performance"):
             performance = performance_at(campaign, datasheet, job.operate)
         write(f"performance/{stem}.json", canonical_json(performance.document()))
-        if found.diagnosis is not None:
-            for name, content in _diagnosis_files(job, stem, found.diagnosis):
+        if judged.diagnosis is not None:
+            for name, content in _diagnosis_files(job, stem, judged.diagnosis):
                 write(name, content)
         if job.report:
             from pipeline.execution.outputs.page_links import links_of
@@ -107,16 +107,16 @@ def _write(
             with watch.stage("report"):
                 terms = {term.name: term for estimator in estimators() for term in estimator.terms}
                 coming = [f"recordings/motor-{stem}.rrd"] if job.recordings else []
-                coming += [] if found.diagnosis is None else [f"diagnosis/{stem}.html"]
+                coming += [] if judged.diagnosis is None else [f"diagnosis/{stem}.html"]
                 links = links_of(Path(job.output), "report/{}.html", job.motor_id, coming)
-                page = render_motor(datasheet, found.evidence, findings, terms, links, performance)
+                page = render_motor(datasheet, judged.evidence, findings, terms, links, performance)
                 write(f"report/{stem}.html", page.encode())
                 write(f"sheet/{stem}.html", render_sheet(datasheet, performance).encode())
         if job.recordings:
             from pipeline.io.recordings.seal import SEAL, seal_line
 
             with watch.stage("recordings"):
-                shown = _recordings(stem, campaign, datasheet, found.evidence, findings)
+                shown = _recordings(stem, campaign, datasheet, judged.evidence, findings)
                 for name, content in shown:
                     sha256 = write(name, content)
                     write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], sha256))
@@ -142,18 +142,18 @@ def performance_at(
         return Performance(sheet.motor_id, sheet.version, operation, blanks=(blank,))
 
 
-def _diagnosis_files(job: MotorJob, stem: str, found: Diagnosis) -> Iterator[tuple[str, bytes]]:
+def _diagnosis_files(job: MotorJob, stem: str, diagnosis: Diagnosis) -> Iterator[tuple[str, bytes]]:
     """Name and content of what `diagnose` writes, less the ladder's recording."""
-    yield f"diagnosis/{stem}.json", canonical_json(found.document())
-    if found.unknown is not None and found.unknown.sketch:
-        yield f"diagnosis/effects/{found.unknown.effect}.py", found.unknown.source.encode()
+    yield f"diagnosis/{stem}.json", canonical_json(diagnosis.document())
+    if diagnosis.unknown is not None and diagnosis.unknown.sketch:
+        yield f"diagnosis/effects/{diagnosis.unknown.effect}.py", diagnosis.unknown.source.encode()
     if job.report:
         from pipeline.execution.outputs.page_links import links_of
         from pipeline.report.pages.ladder_page import render_ladder
 
         coming = (f"report/{stem}.html", f"diagnosis/{stem}.json")
         links = links_of(Path(job.output), "diagnosis/{}.html", job.motor_id, coming)
-        yield f"diagnosis/{stem}.html", render_ladder(found, links=links).encode()
+        yield f"diagnosis/{stem}.html", render_ladder(diagnosis, links=links).encode()
 
 
 def _recordings(
