@@ -114,6 +114,30 @@ class Sensing:
 
 
 @dataclass(frozen=True, slots=True)
+class NamedCombination:
+    """A function of a model's parameters that an equation determines where it does not determine
+    the parameters one by one.
+
+    Attributes
+    ----------
+    expression
+        Its name and what it is of the parameters, as it is reported.
+    unit
+        Its unit.
+    of
+        The parameters in it; it is reported where one of them is not determined alone.
+    value
+        (segment, model, values) -> the number, as it was in the first segment of the equation.
+
+    """
+
+    expression: str
+    unit: str
+    of: tuple[str, ...]
+    value: Callable[[Segment, Model, Values], float]
+
+
+@dataclass(frozen=True, slots=True)
 class Use:
     """What segments of an equation serve for, beside the fit.
 
@@ -133,6 +157,8 @@ class Use:
         Whether errors are mapped over the turn.
     whole_beside
         Equations beside whose segments one of this is held out as a whole, and not in its blocks.
+    combinations
+        What it determines of parameters that it does not determine one by one.
 
     """
 
@@ -143,6 +169,7 @@ class Use:
     currents: tuple[str, ...] = ()
     angle_maps: bool = False
     whole_beside: tuple[str, ...] = ()
+    combinations: tuple[NamedCombination, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

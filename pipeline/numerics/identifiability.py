@@ -265,13 +265,20 @@ def known_combinations(
             *(other.gradient * identified.sizes for other in kept),
             one.gradient * identified.sizes,
         ]
-        if within(np.array(one.u), np.array(one.size)) and _new(gradients):
+        if within(np.array(one.u), np.array(one.size)) and new_direction(gradients):
             kept.append(one)
     return tuple(kept)
 
 
-def _new(gradients: Sequence[Array]) -> bool:
-    """Whether the last of some gradients is no combination of the others."""
+def new_direction(gradients: Sequence[Array]) -> bool:
+    """Whether the last of some gradients is no combination of the others.
+
+    Parameters
+    ----------
+    gradients
+        Derivatives [p each] by the parameters, in sizes of these.
+
+    """
     unit = np.column_stack([one / np.linalg.norm(one) for one in gradients])
     _, triangle = np.linalg.qr(unit)
     return abs(float(triangle[-1, -1])) > _OTHER

@@ -117,3 +117,12 @@ def test_from_the_first_look_to_a_datasheet(
         assert one["u"] < max(0.03 * true, 3e-3), name
     for name in ("r_phase_ohm", "psi_pm_wb", "j_rotor_kgm2"):
         assert constants[name]["status"] == "not_identifiable"
+    main(["compare", f"input={folder}", f"output={output}"])
+    document = json.loads((output / "comparison" / "neo.json").read_text())
+    together = {c["expression"].split(" ")[0]: c for c in document["model"]["combinations"]}
+    assert together.keys() == TRUE.keys() - {"voltage_delay_s"}
+    for name in together:
+        true = TRUE[name]
+        assert abs(together[name]["value"] - true) <= 2.5 * together[name]["u"], name
+    parameters = document["model"]["parameters"]
+    assert {one["status"] for one in parameters.values()} == {"not_identifiable"}

@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.criticism.data.holding_orders import holding_orders
 from pipeline.criticism.data.instruments import stated_u
 from pipeline.criticism.data.sensor_noise import rounding_step
+from pipeline.criticism.data.settling import settling_of
 from pipeline.criticism.data.stated import stated_parameters
 from pipeline.criticism.data.traces import LINES_V, with_values
 from pipeline.criticism.effect import Array, Machine
@@ -78,7 +79,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
     return Machine(
         pole_pairs,
         int(str(slots)) if slots else None,
-        _scales(campaign, start, known, pole_pairs),
+        _scales(campaign, start, known, pole_pairs) | _settling(campaign, policy),
         orders,
         stated,
         encoder_step(campaign, policy),
@@ -124,6 +125,12 @@ def _scales(
         "period_s": min((_period(c) for c in logs), default=1e-4),
         "flux_wb": psi,
     }
+
+
+def _settling(campaign: Campaign, policy: Policy) -> dict[str, float]:
+    """Time constant and delay [s] of logs without a current; nothing where there are none."""
+    found = settling_of(campaign.of("drive"), policy)
+    return {} if found is None else {"settling_s": found[0], "late_s": found[1]}
 
 
 def _stated_torque(stated: Mapping[str, tuple[float, float]], speed: float) -> float:
@@ -190,7 +197,7 @@ def base_scales(machine: Machine) -> dict[str, float]:
         "ld_h": s["flux_wb"] / s["current_a"],
         "lq_h": s["flux_wb"] / s["current_a"],
         "psi_wb": s["flux_wb"],
-        "j_kgm2": s["torque_nm"] / s["speed_rad_s"] * 0.1,
+        "j_kgm2": s["torque_nm"] / s["speed_rad_s"] * s.get("settling_s", 0.1),
         "b_nm_s_rad": 0.1 * s["torque_nm"] / s["speed_rad_s"],
     }
 

@@ -94,6 +94,7 @@ BASE: tuple[Constant, ...] = (
     Constant("unlogged_winding_k", "K", "unrecorded winding over ambient", hook="gain"),
     Constant("unlogged_magnet_k", "K", "unrecorded magnet over ambient", hook="gain"),
     Constant("late_speed_s", "s", "lateness of a speed that no angle is beside", hook="gain"),
+    Constant("late_voltage_s", "s", "by how much motion follows a voltage late", hook="gain"),
     Constant("unsampled_share", "1", "change of flux that samples of a voltage miss", hook="gain"),
     Constant("unlogged_rest_k", "K", "the same of a winding in tests at rest", hook="gain"),
 )
@@ -103,6 +104,8 @@ UNLOGGED_AT_REST = "unlogged_rest_k"
 """That of the winding in tests at rest: they warm it little, and show nothing of one that turns."""
 LATE_SPEED = "late_speed_s"
 """Nuisance of a log whose motion is known by an observer's or a tachometer's speed alone."""
+LATE_VOLTAGE = "late_voltage_s"
+"""Nuisance of a log of voltage and motion that two computers, or a filter, put on one clock."""
 UNSAMPLED = "unsampled_share"
 """Nuisance of a voltage that is logged at instants, of what happens within a row."""
 UNLOGGED_K = (*UNLOGGED.values(), UNLOGGED_AT_REST)

@@ -80,6 +80,10 @@ class Cutting:
         0.1, "rad", "travel of a shaft from which on it turns",
         why="a held shaft twists and its encoder is rounded by less",
     )  # fmt: skip
+    slowest_share: float = chosen(
+        0.01, "1", "of the highest speed, below which a shaft without a current on record may rest",
+        why="as `shaft_rows.slowest_share` of the estimators, for the same logs",
+    )  # fmt: skip
     driven_share: float = chosen(
         0.05, "1", "share of a coast from which on the time before it counts as driven",
         why="the moment of letting go is shorter",
@@ -307,6 +311,10 @@ class Priors:
     late_speed_s: float = chosen(
         5e-3, "s", "lateness of a speed that no angle is beside",
         why="observers and filters of drives are 1 to 10 ms late",
+    )  # fmt: skip
+    late_voltage_s: float = chosen(
+        0.05, "s", "by how much motion follows a voltage late, where no current is logged",
+        why="buses and filters of robots are up to 0.1 s late",
     )  # fmt: skip
     unsampled_share: float = derived(
         10.0, "1", "change of flux within a row, as a sampled voltage shows it, over the true one",

@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.effect import Array
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import BASE, PHYSICAL, Model, base_of
 from pipeline.criticism.policy.regression import GaussNewton
 from pipeline.criticism.regression.bounds import limits_of
@@ -23,6 +24,7 @@ from pipeline.numerics.identifiability import (
     Identified,
     identify,
     known_combinations,
+    new_direction,
     walked,
     within,
 )
@@ -34,6 +36,8 @@ _EDGE = 1e-9
 """Share of a bound by which a value that stands there may miss it."""
 
 
+_DIFFERENCE = 1e-4
+"""Step of a difference quotient, in sizes of the parameter: its own error is that squared."""
 OF_PAIRS = ("psi_wb", "ld_h", "lq_h")
 """Parameters that are seen in multiples of the pole pairs."""
 
@@ -360,7 +364,13 @@ def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCom
         deviance = linear_system(at, before=system, chord=True).deviance
         if not abs(deviance - system.deviance) < policy.walk_rise:
             moving |= moved
+    named = _named(system, sure_of)
     wide = [(one, sure_of.u_of(one.gradient, bent=one.product)) for one in made]
+    wide = [
+        (one, u)
+        for one, u in wide
+        if new_direction([*named.values(), one.gradient * identified.sizes])
+    ]
     combined = [
         _combined(one, u, names, fit.model)
         for one, u in wide
@@ -368,12 +378,56 @@ def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCom
         if within(np.array(u), np.array(one.size))
     ]
     if fit.model.machine.pairs_known:
-        return tuple(combined)
+        return (*named, *combined)
     place = names.index("psi_wb")
     if not open_[place] and observed[place] and REACH * sure_of.u[place] < values[place]:
         u = float(sure_of.u[place])
         combined.insert(0, KnownCombination("psi_wb", float(values[place]), u, "Wb", ("psi_wb",)))
-    return tuple(c for one in combined if (c := _of_pairs(one)))
+    return (*named, *(c for one in combined if (c := _of_pairs(one))))
+
+
+def _named(system: LinearSystem, sure_of: Known) -> dict[KnownCombination, Array]:
+    """Combinations that the equations of the segments name, where the captures determine them.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    sure_of
+        What it determines.
+
+    Returns
+    -------
+    dict of array [own]
+        Gradient in sizes of the parameters, by combination; without those of which every parameter
+        is determined alone.
+
+    """
+    fit, identified = system.fit, sure_of.found
+    names = [c.name for c in system.columns[: system.model_columns.size]]
+    steps = dict(zip(names, (_DIFFERENCE * identified.sizes).tolist(), strict=True))
+    open_ = dict(
+        zip(names, (np.isinf(identified.u) | ~identified.determined).tolist(), strict=True)
+    )
+    first = {segment.kind: segment for segment in reversed(system.segments)}
+    offered = [(s, one) for s in first.values() for one in equation_of(s).use.combinations]
+    made: dict[KnownCombination, Array] = {}
+    for segment, one in offered:
+        if not any(open_.get(name, True) for name in one.of):
+            continue
+        here = one.value(segment, fit.model, fit.values)
+        gradient = np.zeros(len(names))
+        for place, (name, step) in enumerate(steps.items()):
+            ahead, back = (
+                one.value(segment, fit.model, {**fit.values, name: fit.values[name] + way})
+                for way in (step, -step)
+            )
+            gradient[place] = (ahead - back) / (2.0 * step)
+        u = sure_of.u_of(gradient, bent=True)
+        sized = gradient * identified.sizes
+        if within(np.array(u), np.array(max(abs(here), float(np.abs(sized).max())))):
+            made[KnownCombination(one.expression, here, u, one.unit, one.of)] = sized
+    return made
 
 
 def _of_pairs(combination: KnownCombination) -> KnownCombination | None:

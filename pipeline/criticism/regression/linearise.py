@@ -17,6 +17,7 @@ from pipeline.criticism.effect import Array, Complex, Effect, Machine, Operating
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import (
     LATE_SPEED,
+    LATE_VOLTAGE,
     STATE,
     UNLOGGED_K,
     UNSAMPLED,
@@ -278,7 +279,7 @@ def _restore(rows: Array, unknown: Sequence[Array]) -> None:
 
 _FINE = 1e-3
 """Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
-_OF_SOME_LOGS = ("unlogged_d_share", LATE_SPEED, UNSAMPLED, *UNLOGGED_K)
+_OF_SOME_LOGS = ("unlogged_d_share", LATE_SPEED, LATE_VOLTAGE, UNSAMPLED, *UNLOGGED_K)
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 
@@ -395,6 +396,7 @@ class _Sampler:
             self.segment.instrument.ammeter,
             "offset_temp_k",
             LATE_SPEED,
+            LATE_VOLTAGE,
             *UNLOGGED_K,
         ):
             return (self._residual(self.model, moved) - self.here) / column.step

@@ -24,6 +24,7 @@ RECORDED: dict[str, tuple[str, tuple[str, ...]]] = {
     "dq": ("torque_map", (*DRIVE, "temp_winding_degc", "temp_magnet_degc")),
     "q": ("drive", ("t_s", "vq_v", "iq_a", "theta_mech_rad", "omega_mech_rad_s")),
     "motion": ("drive", ("t_s", "vq_v", "iq_a", "theta_mech_rad", "omega_mech_rad_s")),
+    "driven": ("drive", ("t_s", "vq_v", "theta_mech_rad", "omega_mech_rad_s")),
     "load": ("torque_map", ("t_s", "iq_a", "theta_mech_rad", "torque_shaft_nm")),
     "shaft": ("spin_down", ("t_s", "theta_mech_rad")),
     "open": ("open_circuit", ("t_s", "vab_v", "vbc_v", "vca_v", "theta_mech_rad")),

@@ -1,0 +1,86 @@
+"""How fast a shaft follows its voltage, from logs without a current: before any fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from pipeline.criticism.data.traces import with_values
+from pipeline.criticism.effect import Array
+from pipeline.criticism.policy.policy import Policy
+from pipeline.numerics.integrals import trapezoid
+from pipeline.numerics.weak_rows import smooth_speed, weak_rows
+from pipeline.records.capture import Capture
+
+DELAYS = 25
+"""Delays that are tried, so that neighbours are closer than windows are long."""
+
+
+def settling_of(captures: Iterable[Capture], policy: Policy) -> tuple[float, float] | None:
+    """Mechanical time constant and delay of the log without a current that shows them best.
+
+    Parameters
+    ----------
+    captures
+        Drive logs.
+    policy
+        Windows and delays.
+
+    Returns
+    -------
+    tuple of float or None
+        kA/kV and the delay of the motion behind the voltage, both in s; None where no log has
+        voltage and motion alone, or its voltage does not go with its speed.
+
+    Notes
+    -----
+    v(t − τ) = kS sign(ω) + kV ω + kA dω/dt over windows (weak form), for each τ of a grid; the one
+    that leaves least counts. It is where a fit begins, which from another order of magnitude takes
+    inertia for a delay.
+
+    """
+    found = [one for capture in captures if (one := _of_log(capture, policy)) is not None]
+    return min(found)[1:] if found else None
+
+
+def _of_log(recorded: Capture, policy: Policy) -> tuple[float, float, float] | None:
+    """Unexplained share of the voltage [1], time constant and delay [s] of one log."""
+    capture = with_values(recorded)
+    if capture is None or capture.has("iq_a") or not capture.has("t_s", "vq_v"):
+        return None
+    names = [n for n in ("theta_mech_rad", "omega_mech_rad_s") if capture.has("t_s", "vq_v", n)]
+    if not names:
+        return None
+    data = capture.arrays("t_s", "vq_v", names[0])
+    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    t_s, volts, theta = (data[name][fine] for name in ("t_s", "vq_v", names[0]))
+    theta = theta if names[0] == "theta_mech_rad" else trapezoid(t_s, theta)
+    width = max(policy.cutting.load_window_s, policy.cutting.load_samples * _period(t_s))
+    try:
+        weak = weak_rows(t_s, width)
+        speed = smooth_speed(t_s, theta, width / 8.0)
+    except ValueError:
+        return None
+    columns = [
+        weak.integral(np.sign(speed)), weak.integral(theta, order=1), weak.integral(theta, order=2)
+    ]  # fmt: skip
+    design = np.column_stack(columns)
+    best = (np.inf, 0.0, 0.0)
+    for late_s in np.linspace(0.0, policy.priors.late_voltage_s * 5.0, DELAYS).tolist():
+        target = weak.integral(np.interp(t_s - late_s, t_s, volts))
+        (_, k_speed, k_gain), left = _fitted(design, target)
+        if k_speed > 0.0 and k_gain > 0.0:
+            best = min(best, (left, float(k_gain / k_speed), late_s))
+    return best if np.isfinite(best[0]) else None
+
+
+def _fitted(design: Array, target: Array) -> tuple[Array, float]:
+    """Coefficients [3], and the share of the target [w] that they leave."""
+    found = np.asarray(np.linalg.lstsq(design, target, rcond=None)[0], dtype=np.float64)
+    left = target - design @ found
+    return found, float(left @ left) / max(float(target @ target), 1e-300)
+
+
+def _period(t_s: Array) -> float:
+    return float(np.median(np.diff(t_s))) if t_s.size > 1 else 0.0

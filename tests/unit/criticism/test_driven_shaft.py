@@ -1,0 +1,110 @@
+"""A shaft driven by a voltage without a current on record: what its log determines, no more."""
+
+from __future__ import annotations
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.criticism.comparison import compare
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.residuals.segments import segments
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+
+R_OHM, KE, J_KGM2, COULOMB_NM, VISCOUS = 0.11, 0.021, 2.2e-3, 0.03, 2e-4
+KT = KE  # of a brushed equivalent, whose power is v i and not 1.5 v i
+TRUE = {
+    "ks_v": R_OHM * COULOMB_NM / KT,
+    "kv_v_s_rad": KE + R_OHM * VISCOUS / KT,
+    "ka_v_s2_rad": R_OHM * J_KGM2 / KT,
+}
+STEP_S = 2e-4
+
+
+def turned(volts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Angle and speed of a shaft from rest."""
+    theta, omega = np.zeros(volts.size), np.zeros(volts.size)
+    for k in range(volts.size - 1):
+        torque = KT * (volts[k] - KE * omega[k]) / R_OHM
+        sense = np.sign(omega[k]) or np.sign(torque)
+        stands = omega[k] == 0.0 and abs(torque) <= COULOMB_NM
+        gain = 0.0 if stands else (torque - COULOMB_NM * sense - VISCOUS * omega[k]) / J_KGM2
+        omega[k + 1] = omega[k] + STEP_S * gain
+        theta[k + 1] = theta[k] + 0.5 * STEP_S * (omega[k] + omega[k + 1])
+    return theta, omega
+
+
+def log(
+    seed: int, late_s: float, *, period_s: float = 0.02, begins_s: float = 0.0, **more: float
+) -> Campaign:
+    """Ramps and steps of voltage in either sense, an encoder of 4096 steps read late."""
+    rng = np.random.default_rng(seed)
+    ramp = np.arange(0.0, 6.0, STEP_S)
+    volts = np.concatenate([s * part for s in (1, -1) for part in (ramp, np.full(12000, 5.0))])
+    theta, _ = turned(volts)
+    rows = np.arange(0, volts.size, round(period_s / STEP_S))
+    seen = np.maximum(rows - round(late_s / STEP_S), 0)
+    step = 2 * np.pi / 4096
+    recorded = {
+        "t_s": rows * STEP_S,
+        "vq_v": volts[rows] + 2e-3 * rng.normal(size=rows.size),
+        "theta_mech_rad": np.round(theta[seen] / step) * step,
+    }
+    table = pl.DataFrame({n: c[rows * STEP_S >= begins_s] for n, c in recorded.items()})
+    texts = {name: str(value) for name, value in more.items()}
+    meta = CaptureMeta("m", "drive", voltage_kind="commanded", extra=texts)
+    return Campaign("m", (Capture("log.csv", "0", "verified", meta, (table,)),))
+
+
+@pytest.mark.parametrize(("seed", "late_s"), [(1, 0.0), (2, 0.03), (3, 0.12)])
+def test_the_feedforward_constants_are_known_and_nothing_else(seed: int, late_s: float) -> None:
+    """R, ψ, J and friction are not known one by one, nor are their ratios named a second time."""
+    found = compare(log(seed, late_s), ModelSpec(), Constants({}))
+    known = {one.expression.split(" ")[0]: one for one in found.combinations}
+    for name, true in TRUE.items():
+        one = known.pop(name)
+        assert abs(one.value - true) < 2.5 * one.u, name
+        assert one.u < 0.06 * true, name
+    assert not known
+    assert not [name for name, one in found.parameters.items() if one.known]
+    assert found.held_out < 2.0
+
+
+def test_of_stated_resistance_and_back_emf_the_inertia_follows() -> None:
+    """The product is R J/ψ: with two of them stated, the third is measured."""
+    # v = R i + Ke ω and T = 1.5 Ke i of the q axis: 1.5 times a brushed motor's resistance
+    stated = {
+        "r_phase_ohm": 1.5 * R_OHM, "u_r_phase_ohm": 1e-4, "pole_pairs": 1,
+        "psi_pm_wb": KE, "u_psi_pm_wb": 1e-5,
+    }  # fmt: skip
+    found = compare(log(4, 0.02, **stated), ModelSpec(), Constants({}))
+    for name, true in (("j_kgm2", J_KGM2), ("coulomb_friction.torque_nm", COULOMB_NM)):
+        one = found.parameters[name]
+        assert one.value is not None, name
+        assert one.u is not None
+        assert abs(one.value - true) < 2.5 * one.u
+        # R stands for 25 °C, and nothing recorded the winding's temperature
+        assert one.u < 0.1 * true
+
+
+def test_nothing_is_missing_from_it() -> None:
+    """Of a motor that hides nothing no effect is named."""
+    found = diagnose(log(5, 0.04), ModelSpec(), Constants({}))
+    assert found.missing == ()
+    assert found.verdict in ("adequate", "insufficient")
+    assert {one.expression.split(" ")[0] for one in found.combinations} >= set(TRUE)
+
+
+def test_a_voltage_of_before_the_log_is_not_used() -> None:
+    """A log that begins with the shaft turning leaves out what is driven from before it."""
+    campaign = log(6, 0.12, begins_s=3.0)
+    size = machine_of(campaign, Constants({}))
+    assert size is not None
+    assert abs(size.scales["late_s"] - 0.12) < 0.02
+    (segment,) = segments(campaign, size)
+    assert segment.kind == "driven"
+    assert segment.weak is not None
+    assert int(segment.weak.starts[0]) * segment.ts_s >= size.scales["late_s"] - segment.ts_s
