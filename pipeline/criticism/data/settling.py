@@ -13,9 +13,6 @@ from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.weak_rows import smooth_speed, weak_rows
 from pipeline.records.capture import Capture
 
-DELAYS = 25
-"""Delays that are tried, so that neighbours are closer than windows are long."""
-
 
 def settling_of(captures: Iterable[Capture], policy: Policy) -> tuple[float, float] | None:
     """Mechanical time constant and delay of the log without a current that shows them best.
@@ -35,9 +32,9 @@ def settling_of(captures: Iterable[Capture], policy: Policy) -> tuple[float, flo
 
     Notes
     -----
-    v(t − τ) = kS sign(ω) + kV ω + kA dω/dt over windows (weak form), for each τ of a grid; the one
-    that leaves least counts. It is where a fit begins, which from another order of magnitude takes
-    inertia for a delay.
+    v(t − τ) = kS sign(ω) + kV ω + kA dω/dt over windows (weak form), for each τ of a grid whose
+    steps are a quarter of a window; the one that leaves least counts. It is where a fit begins,
+    which from another order of magnitude takes inertia for a delay.
 
     """
     found = [one for capture in captures if (one := _of_log(capture, policy)) is not None]
@@ -67,7 +64,8 @@ def _of_log(recorded: Capture, policy: Policy) -> tuple[float, float, float] | N
     ]  # fmt: skip
     design = np.column_stack(columns)
     best = (np.inf, 0.0, 0.0)
-    for late_s in np.linspace(0.0, policy.priors.late_voltage_s * 5.0, DELAYS).tolist():
+    longest = 5.0 * policy.priors.late_voltage_s
+    for late_s in np.linspace(0.0, longest, max(2, round(4.0 * longest / width) + 1)).tolist():
         target = weak.integral(np.interp(t_s - late_s, t_s, volts))
         (_, k_speed, k_gain), left = _fitted(design, target)
         if k_speed > 0.0 and k_gain > 0.0:

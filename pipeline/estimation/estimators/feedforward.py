@@ -22,12 +22,11 @@ from pipeline.estimation.uncertainty.regimes import (
     Regression,
     disagreement,
     halves,
-    information,
+    scatter,
     signs,
 )
-from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.integrals import trapezoid
-from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
+from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.physics.glossary import Term
@@ -274,30 +273,11 @@ def _partitions(rows: Rows, paths: Sequence[str], weights: Array) -> list[Partit
     ]
 
 
-def _scatter(rows: Rows, fit: LinearFit, regression: Regression) -> tuple[Array, Array]:
-    """Standard deviations [4] of the coefficients, and their degrees of freedom [4].
-
-    By clusters, and by how many windows count as one; the larger counts. A delay rests on the few
-    windows in which the voltage steps, so of clusters only as many count as hold the information.
-    Reference: Carter, Schnepel and Steigerwald, Rev. Econ. Stat. 99(4), 2017, 698 (effective
-    number of clusters).
-    """
-    tau = autocorrelation_time(fit.residuals / regression.sigma, policy().evidence.memory_rows)
-    tau = max(tau, 1.0 / (1.0 - policy().shaft_rows.overlap))
-    scatter = np.sqrt(np.diag(fit.covariance) * fit.chi2_dof * tau)
-    _, cluster = np.unique(rows.cluster, return_inverse=True)
-    shares = [np.bincount(cluster, information(regression, k)) for k in range(scatter.size)]
-    groups = np.maximum([1.0 / float(share @ share) for share in shares], 2.0)
-    covariance, _ = cluster_covariance(rows.design, fit.residuals, regression.sigma, rows.cluster)
-    robust = np.sqrt(np.diag(covariance) * groups / (groups - 1.0))
-    return np.maximum(scatter, robust), np.minimum(max(fit.dof / tau, 1.0), groups - 1.0)
-
-
 def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Estimate]:
     rows, found = solved.rows, solved.found
     used = [part.capture for part in parts]
     regression = Regression(rows.design, rows.voltage_v, solved.sigma, rows.cluster)
-    deviation, dof = _scatter(rows, found, regression)
+    deviation, dof = scatter(regression, found, policy().shaft_rows.overlap)
     values = [*(float(c) for c in found.coefficients[:3]), solved.delay_s]
     split = partial(_partitions, rows, [c.path for c in used])
     gains = instrument_uncertainties(used, ("voltage",))

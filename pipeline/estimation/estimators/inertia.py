@@ -105,13 +105,26 @@ class Doubts:
 
     def parts(self, index: int, value: float, logged: bool) -> list[Contribution]:
         """Contributions to J, T_c or B; T_c and B are scaled by J, and so by its doubts."""
-        share = f"{BETWEEN}{METHOD.name}:unexplained" if logged else "assumed:free_shaft"
-        parts = [Contribution(share, self.share * value, "B")]
+        if logged:
+            parts = [Contribution(f"{BETWEEN}{METHOD.name}:unexplained", self.share * value, "B")]
+        else:
+            half = 0.5 * self.share * value / self.middle(logged)
+            parts = [Contribution("assumed:free_shaft", half, "B")]
         for k in {0, index}:
             found = self.regimes[k]
             if found is not None:
                 parts.append(found.part(f"{METHOD.name}:{GIVES[k]}", value))
         return parts
+
+    def middle(self, logged: bool) -> float:
+        """Middle of where the inertia may lie, over the one by which acceleration follows torque.
+
+        With a load that nothing logged, J is that one where the current does not answer the load,
+        and less by the unexplained share, as current follows acceleration, where a speed loop has
+        the current hold against all of it. Between both it may be any. Reference: Frisch,
+        Statistical Confluence Analysis, 1934 (the two regressions are bounds).
+        """
+        return 1.0 if logged else 1.0 - 0.5 * self.share
 
     def words(self, logged: bool) -> list[str]:
         """What the regimes and the share say, where they say something."""
@@ -265,7 +278,8 @@ def _share_of_no_torque(rows: ShaftRows, found: DragFit) -> float:
     """Share of the drives' acceleration, squared, that follows the torque in no way.
 
     A torque that is not logged is an error of the driving torque, and where a speed loop fights it
-    the current goes with it: it makes g too small, and J too large, by this share at most.
+    the current goes with it: it makes g too small, and J too large, by this share
+    (`Doubts.middle`).
     Reference: Fuller, Measurement Error Models, 1987, 1.1 (attenuation).
     """
     drives = rows.kind == DRIVE
@@ -329,9 +343,10 @@ def _estimates(
     gains |= magnet_uncertainties(c for c in rows.captures if c.meta.test == "drive")
     type_b = contributions(values, gains)
     per_kt, per_rel, per_alpha = _slopes(values, torque)
-    constants, scatter = found.constants(found.coefficients), found.scatter()
-    paths = sorted(c.path for c in rows.captures)
     logged = _load_logged(rows)
+    constants = doubts.middle(logged) * found.constants(found.coefficients)
+    scatter = found.scatter()
+    paths = sorted(c.path for c in rows.captures)
     words = [*_words(rows, torque, found), *_load_words(rows, doubts.share, left_out)]
     note = "; ".join([*doubts.words(logged), *words])
     at = {"omega_mech_rad_s": rows.fastest_rad_s, "temp_magnet_degc": 25.0}

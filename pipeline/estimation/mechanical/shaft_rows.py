@@ -25,6 +25,8 @@ from pipeline.records.capture import Capture
 Array = NDArray[np.float64]
 
 DRIVE, COAST = 0, 1
+ACCELERATION_NOISE, CURRENT_NOISE = "acceleration noise", "current noise"
+"""Columns of a window's noise [rad/s², A], for fits that have these signals among their columns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,6 +278,7 @@ def _rows(
         "speed_rad_s": weak.integral(part.theta, 1),
         "sense": weak.integral(np.sign(part.speed)),
         **_nuisances(part),
+        **_noise(part),
         **_ripples(part, cogging_orders, ripple_orders),
     }
     for name, function in speed_functions.items():
@@ -306,6 +309,17 @@ def _nuisances(part: _Part) -> dict[str, Array]:
         "eccentric sin": weak.integral(turning.imag, 2),
         "unbalance cos": weak.integral(turning.real),
         "unbalance sin": weak.integral(turning.imag),
+    }
+
+
+def _noise(part: _Part) -> dict[str, Array]:
+    """Standard deviation [w] that the noise of angle and current makes in means of a window."""
+    clock, weak = part.capture.arrays("t_s")["t_s"], part.weak
+    even = clock if clock.size == part.theta.size else np.arange(part.theta.size, dtype=float)
+    angle, current = (noise_about_cubics(even, one) for one in (part.theta, part.current))
+    return {
+        ACCELERATION_NOISE: np.full(weak.count, angle * weak.noise_gain(2)),
+        CURRENT_NOISE: np.full(weak.count, current * weak.noise_gain(0)),
     }
 
 

@@ -32,6 +32,10 @@ class ShaftRows:
         by=TRIED,
         on="coasts, where half or twice of it moved nothing",
     )  # fmt: skip
+    attenuated_share: float = chosen(
+        0.05, "1", "of a constant, that noise of the columns may take before it counts as unknown",
+        why="beyond it the correction to first order is no measure of itself",
+    )  # fmt: skip
     slowest_share: float = calibrated(
         0.01, "1", "of the highest speed, below which the shaft may stand",
         by=TRIED,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.policy import policy
 from pipeline.numerics.clusters import cluster_covariance
-from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
+from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.random_effects import Between, between
 from pipeline.records.uncertainty import BETWEEN, Contribution
 
@@ -265,3 +265,44 @@ def _of_partition(
     own = covariance[-count:, -count:] / common**2
     shown = replace(partition, names=tuple(partition.names[k] for k in present))
     return Disagreement(shown, values, between(values, own, dof))
+
+
+def scatter(regression: Regression, found: LinearFit, overlap: float) -> tuple[Array, Array]:
+    """Standard deviations of the coefficients, and their degrees of freedom.
+
+    Parameters
+    ----------
+    regression
+        Rows with their noise and clusters.
+    found
+        Their fit [k coefficients].
+    overlap
+        Share that neighbouring windows have in common [1].
+
+    Returns
+    -------
+    tuple of array [k]
+        In the units of the coefficients, and degrees of freedom.
+
+    Notes
+    -----
+    By clusters, and by how many windows count as one; the larger counts. A coefficient may rest on
+    few windows, so of clusters only as many count as hold its information.
+
+    References
+    ----------
+    Carter, Schnepel and Steigerwald, Rev. Econ. Stat. 99(4), 2017, 698 (effective number of
+    clusters).
+
+    """
+    tau = autocorrelation_time(found.residuals / regression.sigma, policy().evidence.memory_rows)
+    tau = max(tau, 1.0 / (1.0 - overlap))
+    plain = np.sqrt(np.diag(found.covariance) * found.chi2_dof * tau)
+    _, cluster = np.unique(regression.cluster, return_inverse=True)
+    shares = [np.bincount(cluster, information(regression, k)) for k in range(plain.size)]
+    groups = np.maximum([1.0 / float(share @ share) for share in shares], 2.0)
+    covariance, _ = cluster_covariance(
+        regression.design, found.residuals, regression.sigma, regression.cluster
+    )
+    robust = np.sqrt(np.diag(covariance) * groups / (groups - 1.0))
+    return np.maximum(plain, robust), np.minimum(max(found.dof / tau, 1.0), groups - 1.0)

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from pipeline.estimation.estimators.inertia import ESTIMATOR as INERTIA
 from pipeline.estimation.estimators.inertia import GIVES
 from pipeline.estimation.estimators.torque_map import ESTIMATOR as TORQUE_MAP
 from pipeline.estimation.policy import DEFAULT
-from pipeline.records.capture import Campaign
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from tests.simulated import campaign_of, design
 from tests.unit.estimation.mechanical import EXACT_BENCH, chain, recorded
+from tests.unit.estimation.signals import capture, estimates, known_value
 
+KT_NM_A, J_KGM2, COULOMB_NM, VISCOUS, LOAD_SHARE = 0.08, 4e-4, 0.01, 1e-4, 0.2
 MOTOR = replace(design("gimbal-5208"), effects={})
 
 
@@ -89,3 +93,35 @@ def test_a_small_load_that_no_drive_logs_leaves_the_inertia_with_a_larger_u(load
     for name in GIVES[1:]:
         assert not estimates[name].known
         assert "no drive logs its load" in estimates[name].note
+
+
+def driven(seed: int, *, held_against: bool) -> Capture:
+    """A log whose load is not on record; a speed loop holds the current against it, or not."""
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(0.0, 12.0, 1e-3)
+    phases = rng.uniform(0.0, 2 * np.pi, (2, 12))
+    rates = rng.uniform(4.0, 30.0, (2, 12))
+    sums = [np.sin(np.outer(t_s, r) + p).sum(axis=1) for r, p in zip(rates, phases, strict=True)]
+    size_nm = KT_NM_A * 3.0
+    wanted, load = size_nm * sums[0], LOAD_SHARE * size_nm * sums[1]
+    gain = (wanted if held_against else wanted - load) / J_KGM2
+    omega = 150.0 + np.cumsum(gain) * 1e-3
+    theta = np.cumsum(omega) * 1e-3
+    drag = COULOMB_NM * np.sign(omega) + VISCOUS * omega
+    current = (wanted + (load if held_against else 0.0) + drag) / KT_NM_A
+    return capture("drive", f"d{seed}", t_s=t_s, iq_a=current, id_a=0 * t_s, theta_mech_rad=theta)
+
+
+@pytest.mark.parametrize("held_against", [True, False])
+def test_the_inertia_lies_between_both_ways_a_load_may_act(held_against: bool) -> None:
+    """In the middle of both regressions: neither case is off to one side by more than its u."""
+    known = Constants((known_value("kt_peak_nm_a", KT_NM_A, 1e-6, "N·m/A"),))
+    off = []
+    for seed in range(6):
+        one = estimates(INERTIA, driven(seed, held_against=held_against), known=known)[GIVES[0]]
+        doubt = {part.source: part.u for part in one.budget}["assumed:free_shaft"]
+        assert 0.003 * J_KGM2 < doubt < 0.1 * J_KGM2
+        assert abs(one.number - J_KGM2) < 2.0 * one.u
+        off.append((one.number - J_KGM2) / doubt)
+    # half of the way from one regression to the other is one half width of the doubt
+    assert 0.5 < np.mean(off) * (1.0 if held_against else -1.0) < 1.5
