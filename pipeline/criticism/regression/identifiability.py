@@ -36,8 +36,6 @@ _EDGE = 1e-9
 """Share of a bound by which a value that stands there may miss it."""
 
 
-_DIFFERENCE = 1e-4
-"""Step of a difference quotient, in sizes of the parameter: its own error is that squared."""
 OF_PAIRS = ("psi_wb", "ld_h", "lq_h")
 """Parameters that are seen in multiples of the pole pairs."""
 
@@ -405,7 +403,8 @@ def _named(system: LinearSystem, sure_of: Known) -> dict[KnownCombination, Array
     """
     fit, identified = system.fit, sure_of.found
     names = [c.name for c in system.columns[: system.model_columns.size]]
-    steps = dict(zip(names, (_DIFFERENCE * identified.sizes).tolist(), strict=True))
+    # central differences in sizes of the parameters: their own error is the square of that share
+    steps = dict(zip(names, (1e-4 * identified.sizes).tolist(), strict=True))
     open_ = dict(
         zip(names, (np.isinf(identified.u) | ~identified.determined).tolist(), strict=True)
     )

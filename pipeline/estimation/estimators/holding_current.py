@@ -19,7 +19,7 @@ from pipeline.estimation.uncertainty.instruments import (
 )
 from pipeline.numerics.bootstrap import block_bootstrap, block_length
 from pipeline.numerics.harmonics import harmonic_design
-from pipeline.numerics.least_squares import linear_fit
+from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.orders import (
     OrderLine,
     Spectrum,
@@ -51,9 +51,30 @@ RESIDUAL = Term(
     0.0,
     5e3,
 )
+AMPLITUDE = Term(
+    "cogging_amplitude_a", "A", "amplitude of the strongest cogging order, as q current",
+    "constant", 0.0, 5e3,
+)  # fmt: skip
+FRICTION = Term(
+    "holding_friction_a", "A",
+    "q current against friction of slow motion: half of what both senses of arrival differ by",
+    "constant", -5e3, 5e3,
+)  # fmt: skip
+FRICTION_NM = Term(
+    "holding_friction_nm", "N·m", "friction of slow motion, Kt times `holding_friction_a`",
+    "constant", -1e4, 1e4,
+)  # fmt: skip
+OFFSET = Term(
+    "holding_offset_a", "A",
+    "mean q current of both senses: a constant load over Kt, and the zero of the current sensor",
+    "constant", -5e3, 5e3,
+)  # fmt: skip
+TERMS = (RESIDUAL, AMPLITUDE, FRICTION, FRICTION_NM, OFFSET)
 TORQUES = ("cogging_amplitude_nm", "cogging_peak_nm")
-GIVES = ("cogging_order", *TORQUES, RESIDUAL.name)
-METHOD = Method("holding_current", (RESIDUAL,))
+COGGING = ("cogging_order", AMPLITUDE.name, *TORQUES)
+BY_SENSE = (FRICTION.name, FRICTION_NM.name, OFFSET.name)
+GIVES = (*COGGING, *BY_SENSE, RESIDUAL.name)
+METHOD = Method("holding_current", TERMS)
 EXPERIMENT = (
     "hold the rotor at many angles over a whole turn, once forward and once backward, "
     "logging theta_mech_rad and iq_a"
@@ -94,7 +115,63 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         parts = [METHOD.scatter(RESIDUAL.name, _u_rms(left)), *_gains(captures, rms_a)]
         notes = (note, unstated_note(captures, ("current",)))
         residual = METHOD.measured(RESIDUAL.name, rms_a, parts, captures, notes=notes)
-    return Fit((*estimates, residual), _evidence(turns, spec, lines))
+    friction = _friction(captures, turns, spec, [*lines, *slow], known)
+    return Fit((*estimates, *friction, residual), _evidence(turns, spec, lines))
+
+
+def _friction(
+    captures: Sequence[Capture],
+    turns: Sequence[Turn],
+    spec: Spectrum,
+    lines: Sequence[OrderLine],
+    known: Constants,
+) -> tuple[Estimate, ...]:
+    """What the mean current of whole turns is by sense: friction, and what does not turn with it.
+
+    i = ±T_f/Kt + T_0/Kt + i_0. Of friction that differs by sense and of a constant load both senses
+    show the same sum, so that half of the difference and the mean are all there is to know.
+    """
+    if len(set(spec.senses.tolist())) < 2:
+        note = f"turns of one sense alone; {EXPERIMENT}"
+        return tuple(METHOD.missing(name, note) for name in BY_SENSE)
+    sides = [_mean_of(turns, spec, lines, sense) for sense in (1, -1)]
+    (ahead, u_ahead), (back, u_back) = sides
+    u, dof = 0.5 * float(np.hypot(u_ahead, u_back)), float(max(len(turns) - 2, 1))
+    notes = (
+        f"{ahead:.3g} A forward, {back:.3g} A backward over {len(turns)} turns",
+        unstated_note(captures, ("current",)),
+    )
+    half, middle = 0.5 * (ahead - back), 0.5 * (ahead + back)
+    read = (METHOD.scatter(FRICTION.name, u, dof), *_gains(captures, half))
+    friction = METHOD.measured(FRICTION.name, half, read, captures, notes=notes)
+    both = (METHOD.scatter(OFFSET.name, u, dof), *_gains(captures, middle))
+    offset = METHOD.measured(OFFSET.name, middle, both, captures, notes=notes)
+    kt = torque_constant(known)
+    if kt is None:
+        why = f"{half:.3g} ± {u:.2g} A; a torque constant is missing"
+        return friction, METHOD.missing(FRICTION_NM.name, why), offset
+    parts = propagate([(half, kt.budget), (kt.number, read)])
+    torque = METHOD.measured(FRICTION_NM.name, half * kt.number, parts, captures, notes=notes)
+    return friction, torque, offset
+
+
+def _mean_of(
+    turns: Sequence[Turn], spec: Spectrum, lines: Sequence[OrderLine], sense: int
+) -> tuple[float, float]:
+    """Mean current of the turns of one sense and its standard uncertainty [A].
+
+    By what the orders leave in a turn, with its correlation; and by what turns scatter, where there
+    are several. The larger counts.
+    """
+    places = [n for n, turn in enumerate(turns) if turn.sense == sense]
+    means, within = spec.means[places], []
+    for n in places:
+        rest = turns[n].value - spec.means[n] - waveform(lines, turns[n].theta_rad)
+        within.append(float(np.var(rest)) * autocorrelation_time(rest) / rest.size)
+    u = float(np.sqrt(np.sum(within))) / len(places)
+    if len(places) > 1:
+        u = max(u, float(np.std(means, ddof=1)) / float(np.sqrt(len(places))))
+    return float(np.mean(means)), u
 
 
 def _gains(captures: Sequence[Capture], amps: float) -> tuple[Contribution, ...]:
@@ -161,7 +238,7 @@ def _cogging(
     known: Constants,
     campaign: Campaign,
 ) -> tuple[Estimate, ...]:
-    names = ("cogging_order", *TORQUES)
+    names = COGGING
     if not lines:
         limit = detection_limit(spec)
         note = f"no order found; an amplitude above {limit:.2g} A would have been"
@@ -173,10 +250,15 @@ def _cogging(
     note += alias
     bounds = (1.0, float(spec.orders[-1]))
     order = METHOD.measured(names[0], leading, captures=captures, notes=note, bounds=bounds)
+    read = (
+        METHOD.scatter(names[1], lines[0].u, lines[0].dof),
+        *_gains(captures, lines[0].amplitude),
+    )
+    amps_of = METHOD.measured(names[1], lines[0].amplitude, read, captures, notes=note)
     kt = torque_constant(known)
     if kt is None:
         why = f"{lines[0].amplitude:.4g} A of order {lines[0].order}; a torque constant is missing"
-        return (order, *(METHOD.missing(n, why) for n in TORQUES))
+        return (order, amps_of, *(METHOD.missing(n, why) for n in TORQUES))
     peak, u_peak = half_peak_to_peak(lines)
     sizes = {TORQUES[0]: (lines[0].amplitude, lines[0].u), TORQUES[1]: (peak, u_peak)}
     torques, notes = [], (note, unstated_note(captures, ("current",)))
@@ -184,7 +266,7 @@ def _cogging(
         read = (METHOD.scatter(name, u, lines[0].dof), *_gains(captures, amps))
         parts = propagate([(amps, kt.budget), (kt.number, read)])
         torques.append(METHOD.measured(name, amps * kt.number, parts, captures, notes=notes))
-    return (order, *torques)
+    return (order, amps_of, *torques)
 
 
 def _true_order(
@@ -236,6 +318,6 @@ ESTIMATOR = Estimator(
     either=USES,
     aids=("pole_pairs",),
     rank=20,
-    terms=(RESIDUAL,),
+    terms=TERMS,
     options={"highest_order": 1000.0, "level": 0.01},
 )

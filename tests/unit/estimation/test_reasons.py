@@ -66,6 +66,31 @@ def test_a_held_rotor_without_cogging_says_what_it_would_have_seen() -> None:
     assert found["holding_residual_a"].number == pytest.approx(0.01, rel=0.1)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_friction_by_sense_and_what_both_senses_share(seed: int) -> None:
+    """0.05 A against motion, 0.02 A of a load or a zero; in N·m with a torque constant."""
+    rng, turns = np.random.default_rng(seed), []
+    for number, sense in enumerate((1.0, -1.0, 1.0, -1.0)):
+        theta = sense * np.linspace(0.0, 1.02 * TURN, 1500)
+        # friction that varies from place to place by itself
+        rough = np.repeat(0.02 * rng.standard_normal(75), 20)
+        amps = 0.05 * sense + 0.02 + 0.2 * np.cos(12 * theta + 0.3) + rough
+        turns.append(capture("holding_current", f"w{number}", theta_mech_rad=theta, iq_a=amps))
+    known = Constants((known_value("kt_peak_nm_a", 0.1, 1e-3, "N·m/A"),))
+    found = estimates(holding_current.ESTIMATOR, *turns, known=known)
+    true = {
+        "holding_friction_a": 0.05, "holding_offset_a": 0.02, "holding_friction_nm": 0.005,
+        "cogging_amplitude_a": 0.2,
+    }  # fmt: skip
+    for name, value in true.items():
+        low, high = found[name].interval()
+        assert low < value < high, name
+        assert found[name].u < 0.15 * value, name
+    one_way = estimates(holding_current.ESTIMATOR, turns[0], turns[2])
+    assert not one_way["holding_friction_a"].known
+    assert "one sense alone" in one_way["holding_friction_a"].note
+
+
 def test_a_turn_of_few_angles_holds_no_sectors_out() -> None:
     """An offset a direction and four readings a column at least: below it there is no figure."""
     many, few = (

@@ -27,7 +27,7 @@ PAIRS = {"ab": "ca", "bc": "bc", "ca": "ab"}
 NAMES = {"r_b_ohm": "r_c_ohm", "r_ab_ohm": "r_ca_ohm"} | {
     "r_c_ohm": "r_b_ohm", "r_ca_ohm": "r_ab_ohm"
 }  # fmt: skip
-ODD = {"angle_offset_elec_rad", "lcr_angle_offset_deg"}
+ODD = {"angle_offset_elec_rad", "lcr_angle_offset_deg", "holding_offset_a"}
 
 
 def mirrored(capture: Capture) -> Capture:
