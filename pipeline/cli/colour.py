@@ -29,6 +29,11 @@ _HEADS = {"error:": RED, "mismatch:": RED, "note:": DIM}
 def wanted(stream: TextIO) -> bool:
     """Whether a stream is a terminal that shows colours and whose user has not refused them.
 
+    Parameters
+    ----------
+    stream
+        The stream.
+
     References
     ----------
     https://no-color.org
@@ -41,6 +46,13 @@ def wanted(stream: TextIO) -> bool:
 def coloured(text: str) -> str:
     """The text with its status words in colour; what is data for a program stays as it is.
 
+    Parameters
+    ----------
+    text
+        Text of an outcome.
+
+    Examples
+    --------
     >>> coloured("1 refused, see refused/a.csv").count("refused")
     2
     >>> coloured('{"status": "refused"}')

@@ -199,7 +199,14 @@ def overview() -> str:
 
 
 def usage(command: Command) -> str:
-    """What `--help` prints: every key with its default and its meaning."""
+    """What `--help` prints: every key with its default and its meaning.
+
+    Parameters
+    ----------
+    command
+        The command.
+
+    """
     places = "".join(f" {name.upper()}" for name in command.positional)
     lines = [f"usage: {program()} {command.name}{places} key=value ...", ""]
     lines += [command.words, "", "examples"]

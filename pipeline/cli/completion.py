@@ -37,6 +37,12 @@ def completed(request: str) -> str:
     """What `--shell-completion` prints: `install=SHELL` the lines, `query=SHELL` the words.
 
     The line so far is in the environment's COMP_WORD, up to the cursor.
+
+    Parameters
+    ----------
+    request
+        `install=SHELL` or `query=SHELL`.
+
     """
     act, _, shell = request.partition("=")
     if act == "install":
@@ -49,6 +55,12 @@ def candidates(line: str) -> list[str]:
     """The words that may stand where a line ends, in their order.
 
     Of a key that takes a file or folder there is none: the shell completes its own.
+
+    Parameters
+    ----------
+    line
+        The command line up to the cursor.
+
     """
     words = line.split(" ")[1:]
     last = words[-1] if words else ""

@@ -35,8 +35,21 @@ def load_settings(
 
     Files of the folder `config_dir` come before those of the package.
 
-    Raises UsageError for an unknown key, a value of the wrong type or a word that is no override,
-    and for a `config_dir` that is no folder.
+    Parameters
+    ----------
+    command
+        The command.
+    words
+        The words of the command line after the command.
+    config_dir
+        Folder of configuration files that come before those of the package.
+
+    Raises
+    ------
+    UsageError
+        An unknown key, a value of the wrong type or a word that is no override, and for a
+        `config_dir` that is no folder.
+
     """
     kinds = typing.get_type_hints(command.settings)
     named = _with_names(command, words)
@@ -93,14 +106,30 @@ def _text(command: Command, key: str, text: str, kind: Any) -> str | None:
 
 
 def settings_text(settings: Settings) -> str:
-    """Settings as the YAML that `--cfg job` prints."""
+    """Settings as the YAML that `--cfg job` prints.
+
+    Parameters
+    ----------
+    settings
+        The keys of the command.
+
+    """
     from omegaconf import OmegaConf
 
     return OmegaConf.to_yaml(OmegaConf.structured(settings))
 
 
 def origin_text(command: Command, settings: Settings) -> str:
-    """Where settings come from, the nearest first, as `--info` prints it."""
+    """Where settings come from, the nearest first, as `--info` prints it.
+
+    Parameters
+    ----------
+    command
+        The command.
+    settings
+        The keys of the command.
+
+    """
     places = [settings.config_dir, str(configuration_folder())]
     files = [
         f"  {path}" + ("" if path.is_file() else "  (not there)")

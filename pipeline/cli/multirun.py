@@ -19,6 +19,15 @@ def sweep(command: Command, words: Sequence[str], run: Callable[[list[str]], Out
     to a folder of its own under `output`: `multirun/model=a/`. The exit code is the one that the
     contract puts first among those of the runs.
 
+    Parameters
+    ----------
+    command
+        The command.
+    words
+        The words of the command line after the command.
+    run
+        Performs the command with the words of one combination.
+
     Raises
     ------
     UsageError

@@ -14,7 +14,16 @@ def plain(value: Any) -> Any:
 
     A record becomes an object of its fields, a time ISO 8601 text, a set a sorted list.
 
-    Raises TypeError for anything else.
+    Parameters
+    ----------
+    value
+        The value.
+
+    Raises
+    ------
+    TypeError
+        Anything else.
+
     """
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: getattr(value, field.name) for field in fields(value)}

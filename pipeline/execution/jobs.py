@@ -64,7 +64,16 @@ class MotorJob:
         return f"motor {printable(self.motor_id)}"
 
     def without(self, path: str, reason: str) -> MotorJob:
-        """The job with a file refused for a reason."""
+        """The job with a file refused for a reason.
+
+        Parameters
+        ----------
+        path
+            The file, relative to the input folder.
+        reason
+            The reason, in words.
+
+        """
         return replace(self, refused=(*self.refused, (path, reason)))
 
 

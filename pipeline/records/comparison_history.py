@@ -24,7 +24,14 @@ class Earlier:
 
     @classmethod
     def of(cls, result: Comparison) -> Earlier:
-        """What is kept of a comparison."""
+        """What is kept of a comparison.
+
+        Parameters
+        ----------
+        result
+            The comparison.
+
+        """
         return cls(result.name, result.effects, result.held_out, result.bare)
 
 

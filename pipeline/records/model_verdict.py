@@ -284,7 +284,14 @@ class ModelVerdict(PlainRecord):
 
 
 def effects_key(effects: Sequence[str]) -> str:
-    """The key that gives a model its effects, quoted as every shell takes it; empty for none."""
+    """The key that gives a model its effects, quoted as every shell takes it; empty for none.
+
+    Parameters
+    ----------
+    effects
+        Names of effects.
+
+    """
     return " " + shlex.quote(f"model.effects=[{','.join(effects)}]") if effects else ""
 
 

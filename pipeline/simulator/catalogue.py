@@ -122,7 +122,14 @@ def _possible(name: str, full: Mapping[str, float]) -> None:
 
 
 def bench_from(document: Mapping[str, Any]) -> Bench:
-    """A bench from the `bench` of a design."""
+    """A bench from the `bench` of a design.
+
+    Parameters
+    ----------
+    document
+        The section of a configuration file.
+
+    """
     return Bench(**_fields(Bench, document, "a bench"))
 
 
@@ -227,7 +234,16 @@ def fleet_from(document: Mapping[str, Any], design: Mapping[str, Any]) -> Fleet:
 
 
 def seed_of(seed: int, motor_id: str) -> int:
-    """A seed of its own for each motor of a fleet."""
+    """A seed of its own for each motor of a fleet.
+
+    Parameters
+    ----------
+    seed
+        Seed of the fleet.
+    motor_id
+        The motor.
+
+    """
     digest = hashlib.sha256(f"{seed}/{motor_id}".encode()).digest()
     return int.from_bytes(digest[:8], "big")
 

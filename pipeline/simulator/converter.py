@@ -206,7 +206,22 @@ def net_torque(
     warm: Pair,
     p: Plant,
 ) -> float:
-    """Torque on the rotor, the coupling's and the load's not in, from what `windings` gave."""
+    """Torque on the rotor, the coupling's and the load's not in, from what `windings` gave.
+
+    Parameters
+    ----------
+    mechanics
+        Angle and speed of rotor and far mass [rad, rad/s].
+    bristle
+        Deflection of the friction's bristle [rad].
+    field
+        Currents and field energy of the state.
+    warm
+        Temperatures of winding and magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     theta, omega = mechanics[0], mechanics[1]
     net = field[2] + passive(theta, omega, bristle, field[2], field[8], p)
     if p.extras > 0:
@@ -303,13 +318,33 @@ def advance(
 
 @njit(cache=True)
 def rounded(value: float, lsb: float) -> float:
-    """Nearest multiple of lsb, or the value itself where lsb is 0."""
+    """Nearest multiple of lsb, or the value itself where lsb is 0.
+
+    Parameters
+    ----------
+    value
+        The value.
+    lsb
+        Resolution [unit of the value].
+
+    """
     return float(math.floor(value / lsb + 0.5) * lsb) if lsb > 0.0 else value
 
 
 @njit(cache=True)
 def stator_current(y: Array, t_m: float, p: Plant) -> Pair:
-    """Currents in alpha and beta that belong to a state [A]."""
+    """Currents in alpha and beta that belong to a state [A].
+
+    Parameters
+    ----------
+    y
+        State of the integration.
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     eps = p.pole_pairs * y[2]
     c, s = math.cos(eps), math.sin(eps)
     i_d, i_q, _ = current(c * y[0] + s * y[1], c * y[1] - s * y[0], eps, t_m, p)
@@ -318,7 +353,18 @@ def stator_current(y: Array, t_m: float, p: Plant) -> Pair:
 
 @njit(cache=True)
 def sensed_current(true: Pair, noise: Array, c: Control) -> Pair:
-    """What three phase-current sensors report, as alpha and beta [A]."""
+    """What three phase-current sensors report, as alpha and beta [A].
+
+    Parameters
+    ----------
+    true
+        True currents in alpha and beta [A].
+    noise
+        Noise of each sensor [A].
+    c
+        The drive and its sensors.
+
+    """
     i_a = c.gain_a * true[0] + c.offset_a + noise[0]
     i_b = c.gain_b * (-0.5 * true[0] + 0.5 * SQRT3 * true[1]) + c.offset_b + noise[1]
     i_c = c.gain_c * (-0.5 * true[0] - 0.5 * SQRT3 * true[1]) + c.offset_c + noise[2]
@@ -332,14 +378,36 @@ def sensed_current(true: Pair, noise: Array, c: Control) -> Pair:
 
 @njit(cache=True)
 def sensed_angle(theta: float, noise: float, c: Control) -> float:
-    """What the encoder reports: offset, eccentricity, noise, resolution [rad]."""
+    """What the encoder reports: offset, eccentricity, noise, resolution [rad].
+
+    Parameters
+    ----------
+    theta
+        Mechanical angle [rad].
+    noise
+        Noise of the encoder [rad].
+    c
+        The drive and its sensors.
+
+    """
     wobble = c.angle_wobble * math.sin(theta + c.angle_wobble_phase)
     return rounded(theta + c.angle_offset + wobble + noise, c.lsb_angle)
 
 
 @njit(cache=True)
 def remembered(history: Array, newest: int, back: float) -> Pair:
-    """Currents `back` integration steps ago, linear between steps, from a ring buffer."""
+    """Currents `back` integration steps ago, linear between steps, from a ring buffer.
+
+    Parameters
+    ----------
+    history
+        Ring buffer of currents in alpha and beta [k, 2, A].
+    newest
+        Place of the newest currents in `history`.
+    back
+        Integration steps back.
+
+    """
     whole = int(back)
     part = back - whole
     one, two = (newest - whole) % HISTORY, (newest - whole - 1) % HISTORY
@@ -405,7 +473,16 @@ def command(loop: Array, seen: Pair, eps: float, omega: float, want: Array, c: C
 
 @njit(cache=True)
 def beginning(c: Control, p: Plant) -> Array:
-    """State at the start: no current, the magnet's flux, friction already bent."""
+    """State at the start: no current, the magnet's flux, friction already bent.
+
+    Parameters
+    ----------
+    c
+        The drive and its sensors.
+    p
+        The motor in numbers.
+
+    """
     y = np.zeros(8)
     y[2], y[3], y[4], y[5] = c.theta, c.omega, c.theta, c.omega
     y[6] = math.copysign(p.bristle, c.omega) if c.omega != 0.0 else 0.0
@@ -418,7 +495,21 @@ def beginning(c: Control, p: Plant) -> Array:
 
 @njit(cache=True)
 def load_torque(y: Array, want: Array, c: Control, p: Plant) -> float:
-    """Torque of the load [N·m]: the one wanted, or that of a dynamometer's speed loop."""
+    """Torque of the load [N·m]: the one wanted, or that of a dynamometer's speed loop.
+
+    Parameters
+    ----------
+    y
+        State of the integration.
+    want
+        d current [A], q current [A] or speed [rad/s], load torque [N·m], dynamometer's speed
+        [rad/s].
+    c
+        The drive and its sensors.
+    p
+        The motor in numbers.
+
+    """
     if c.dyno_nms == 0.0:
         return float(want[2])
     ahead = y[5 if p.two_mass else 3] - want[3]
@@ -431,6 +522,23 @@ def shaft_torque(y: Array, want: Array, volt: Pair, warm: Pair, c: Control, p: P
 
     A dynamometer that holds the far end has it in the coupling; one whose speed gives way shows the
     reaction torque of its stator, which the inertia of its rotor is in.
+
+    Parameters
+    ----------
+    y
+        State of the integration.
+    want
+        d current [A], q current [A] or speed [rad/s], load torque [N·m], dynamometer's speed
+        [rad/s].
+    volt
+        Voltages in alpha and beta [V].
+    warm
+        Temperatures of winding and magnets [degC].
+    c
+        The drive and its sensors.
+    p
+        The motor in numbers.
+
     """
     mechanics = (y[2], y[3], y[4], y[5])
     field = windings((y[0], y[1]), mechanics, volt, warm, p)
@@ -454,7 +562,38 @@ def run_on(
     c: Control,
     p: Plant,
 ) -> int:
-    """Integrate some steps with one voltage vector; returns the newest place in the history."""
+    """Integrate some steps with one voltage vector.
+
+    Parameters
+    ----------
+    y
+        State of the integration.
+    work
+        Energy in, in copper and in switches so far [3, J]; changed in place.
+    volt
+        Voltages in alpha and beta [V].
+    want
+        d current [A], q current [A] or speed [rad/s], load torque [N·m], dynamometer's speed
+        [rad/s].
+    warm
+        Temperatures of winding and magnets [degC].
+    steps
+        Number of integration steps.
+    history
+        Ring buffer of currents in alpha and beta [k, 2, A].
+    newest
+        Place of the newest currents in `history`.
+    c
+        The drive and its sensors.
+    p
+        The motor in numbers.
+
+    Returns
+    -------
+    int
+        The newest place in the history.
+
+    """
     h = c.period_s / c.substeps
     far = 5 if p.two_mass else 3
     held = c.held_speed and c.dyno_nms == 0.0

@@ -107,7 +107,14 @@ class Motor:
             raise ValueError(f"{self.motor_type}: winding is wye or delta, not {self.winding}")
 
     def having(self, **effects: Size) -> Motor:
-        """This motor with further effects; `name=size` or `name={parameter: value}`."""
+        """This motor with further effects; `name=size` or `name={parameter: value}`.
+
+        Parameters
+        ----------
+        **effects
+            Size of each effect, 1 for a typical one, or its parameters.
+
+        """
         return replace(self, effects=MappingProxyType({**self.effects, **effects}))
 
     @property
@@ -217,7 +224,14 @@ class Bench:
     instruments: Instruments | None = None
 
     def drawn(self, rng: np.random.Generator) -> Instruments:
-        """The instruments of this station, drawn once from the stated uncertainties."""
+        """The instruments of this station, drawn once from the stated uncertainties.
+
+        Parameters
+        ----------
+        rng
+            Source of random numbers.
+
+        """
         if self.instruments is not None:
             return self.instruments
         draw = rng.standard_normal(6)

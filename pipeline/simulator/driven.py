@@ -55,7 +55,18 @@ def usable_speed_rad_s(session: Session) -> float:
 
 
 def substeps(session: Session, period_s: float, omega: float) -> int:
-    """Even number of integration steps a period that resolves the fastest thing in the motor."""
+    """Even number of integration steps a period that resolves the fastest thing in the motor.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    period_s
+        Control period [s].
+    omega
+        Mechanical speed [rad/s].
+
+    """
     p = session.plant
     j_least = min(p.j_rotor, p.j_load)
     electrical = 2.0 * (p.r_a_ohm + p.dead_v / p.dead_knee_a) / min(p.ld_h, p.lq_h)
@@ -77,7 +88,24 @@ def control(
     warm: tuple[float, float],
     **change: float | bool,
 ) -> Control:
-    """Controller tuned on the motor's nameplate, with the sensors that sit in its loop."""
+    """Controller tuned on the motor's nameplate, with the sensors that sit in its loop.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    period_s
+        Control period [s].
+    timing
+        When the drive samples and switches.
+    omega
+        Mechanical speed [rad/s].
+    warm
+        Temperatures of winding and magnets [degC].
+    **change
+        Fields of `Control` that differ from those of the nameplate.
+
+    """
     from pipeline.simulator.converter import Control
 
     m = session.motor
@@ -132,7 +160,18 @@ def _in_the_loop(session: Session) -> dict[str, float]:
 
 
 def loop_noise(session: Session, n: int, period_s: float) -> Array:
-    """Noise [n, 4] of three phase-current sensors [A] and of the encoder [rad]."""
+    """Noise [n, 4] of three phase-current sensors [A] and of the encoder [rad].
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    n
+        Number of periods of the capture.
+    period_s
+        Control period [s].
+
+    """
     t_s: Array = np.arange(n, dtype=np.float64) * period_s
     out = np.zeros((n, 4))
     for k in range(3):
@@ -145,8 +184,18 @@ def loop_noise(session: Session, n: int, period_s: float) -> Array:
 def log(session: Session, rows: Array, period_s: float) -> dict[str, Array]:
     """Columns of a drive's own log from the rows of `converter.drive`.
 
-    The voltage of a row is the vector that the inverter holds over the row's period, in the
-    rotor frame at the sampling instant.
+    The voltage of a row is the vector that the inverter holds over the row's period, in the rotor
+    frame at the sampling instant.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    rows
+        Rows of `converter.drive` [n, columns].
+    period_s
+        Control period [s].
+
     """
     m = session.motor
     n = rows.shape[0]
@@ -189,7 +238,16 @@ def _meta(session: Session, test: str, timing: str, pwm_hz: float) -> Mapping[st
 
 
 def torque_map(session: Session, how: protocols.TorqueMap) -> Recording:
-    """Steps of d and q current while a dynamometer holds the speed."""
+    """Steps of d and q current while a dynamometer holds the speed.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The levels and their times.
+
+    """
     from pipeline.simulator.converter import drive
 
     m = session.motor
@@ -239,7 +297,16 @@ def _drive_reference(session: Session, how: protocols.Drive, segment: int, dt: f
 
 
 def drive(session: Session, how: protocols.Drive) -> Recording:
-    """Speed control with reversals, load steps and d-current steps, from rest."""
+    """Speed control with reversals, load steps and d-current steps, from rest.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The programme of speeds and loads.
+
+    """
     from pipeline.simulator import converter
 
     m = session.motor

@@ -25,12 +25,26 @@ class Form:
 
 
 def cogging_order(motor: Motor) -> int:
-    """Fundamental order of the cogging torque a turn, LCM(slots, 2p)."""
+    """Fundamental order of the cogging torque a turn, LCM(slots, 2p).
+
+    Parameters
+    ----------
+    motor
+        The motor.
+
+    """
     return math.lcm(motor.slots, 2 * motor.pole_pairs)
 
 
 def speed_elec_rad_s(motor: Motor) -> float:
-    """Electrical angular speed at rated speed, p omega [rad/s]."""
+    """Electrical angular speed at rated speed, p omega [rad/s].
+
+    Parameters
+    ----------
+    motor
+        The motor.
+
+    """
     return motor.pole_pairs * motor.speed_rated_rad_s
 
 
@@ -260,7 +274,14 @@ def parameters(name: str, motor: Motor, size: Size | None = None) -> dict[str, f
 
 
 def active(motor: Motor) -> dict[str, dict[str, float]]:
-    """The effects of a motor with every parameter, those that every motor has included."""
+    """The effects of a motor with every parameter, those that every motor has included.
+
+    Parameters
+    ----------
+    motor
+        The motor.
+
+    """
     named: dict[str, Size | None] = dict.fromkeys(ALWAYS)
     named.update(motor.effects)
     return {name: parameters(name, motor, size) for name, size in named.items()}

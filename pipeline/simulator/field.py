@@ -88,7 +88,16 @@ def bend_q(y: float, p: Plant) -> float:
 
 @njit(cache=True)
 def slope_q(y: float, p: Plant) -> float:
-    """Derivative of `bend_q` by flux [A/Wb]."""
+    """Derivative of `bend_q` by flux [A/Wb].
+
+    Parameters
+    ----------
+    y
+        q flux less the magnet's [Wb].
+    p
+        The motor in numbers.
+
+    """
     if p.sat_q == 0.0:
         return 0.0
     if p.sat_form == 1.0:
@@ -331,7 +340,22 @@ def fluxes(
     degc: float,
     p: Plant,
 ) -> NDArray[np.float64]:
-    """Flux [n, 2] of currents [n] at electrical angles [n]."""
+    """Flux [n, 2] of currents [n] at electrical angles [n].
+
+    Parameters
+    ----------
+    i_d
+        Current along d [n, A].
+    i_q
+        Current along q [n, A].
+    eps
+        Electrical angle [n, rad].
+    degc
+        Temperature of the magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     out = np.empty((i_d.size, 2))
     for k in range(i_d.size):
         out[k, 0], out[k, 1] = flux(i_d[k], i_q[k], eps[k], degc, p)
@@ -346,7 +370,22 @@ def torques(
     degc: float,
     p: Plant,
 ) -> NDArray[np.float64]:
-    """Electromagnetic torque [n] of currents [n] at electrical angles [n], cogging not in."""
+    """Electromagnetic torque [n] of currents [n] at electrical angles [n], cogging not in.
+
+    Parameters
+    ----------
+    i_d
+        Current along d [n, A].
+    i_q
+        Current along q [n, A].
+    eps
+        Electrical angle [n, rad].
+    degc
+        Temperature of the magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     out = np.empty(i_d.size)
     for k in range(i_d.size):
         d, q = flux(i_d[k], i_q[k], eps[k], degc, p)
@@ -357,7 +396,18 @@ def torques(
 
 @njit(cache=True)
 def inductances(eps: NDArray[np.float64], degc: float, p: Plant) -> NDArray[np.float64]:
-    """Incremental Ld, Lq, Ldq [n, 3] at zero current, at electrical angles [n]."""
+    """Incremental Ld, Lq, Ldq [n, 3] at zero current, at electrical angles [n].
+
+    Parameters
+    ----------
+    eps
+        Electrical angle [n, rad].
+    degc
+        Temperature of the magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     out = np.empty((eps.size, 3))
     for k in range(eps.size):
         md, mq, _, _ = magnet(eps[k], degc, p)
@@ -369,7 +419,18 @@ def inductances(eps: NDArray[np.float64], degc: float, p: Plant) -> NDArray[np.f
 
 @njit(cache=True)
 def open_flux(eps: NDArray[np.float64], degc: NDArray[np.float64], p: Plant) -> NDArray[np.float64]:
-    """Phase flux linkages a, b, c [n, 3] with the terminals open, at electrical angles [n]."""
+    """Phase flux linkages a, b, c [n, 3] with the terminals open, at electrical angles [n].
+
+    Parameters
+    ----------
+    eps
+        Electrical angle [n, rad].
+    degc
+        Temperature of the magnets [n, degC].
+    p
+        The motor in numbers.
+
+    """
     out = np.empty((eps.size, 3))
     for k in range(eps.size):
         d, q, _, _ = magnet(eps[k], degc[k], p)

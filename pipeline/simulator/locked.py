@@ -94,7 +94,28 @@ def advanced(
     t_m: float,
     p: Plant,
 ) -> Pair:
-    """Flux after `time` = (step, how many), by RK4 under the voltage `ramp` = (start, slope)."""
+    """Flux after `time` = (step, how many), by RK4 under the voltage `ramp` = (start, slope).
+
+    Parameters
+    ----------
+    flux
+        Flux linkages [Wb].
+    way
+        Direction of the terminal pair in the rotor frame.
+    ramp
+        Voltage at the start [V] and its slope [V/s].
+    time
+        Length [s] and number of the steps.
+    ohm
+        Resistance of the pair [ohm].
+    eps
+        Electrical angle [rad].
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     d, q = flux
     h, slope = time[0], ramp[1]
     for m in range(time[1]):

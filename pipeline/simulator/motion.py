@@ -219,7 +219,28 @@ def lookup(x: float, xs: Array, ys: Array, n: int) -> float:
 def variable(
     code: int, omega: float, theta: float, i_d: float, i_q: float, t_w: float, t_m: float, p: Plant
 ) -> float:
-    """The value of one of `design.EXTRA_VARIABLES`."""
+    """The value of one of `design.EXTRA_VARIABLES`.
+
+    Parameters
+    ----------
+    code
+        Number of the variable.
+    omega
+        Mechanical speed [rad/s].
+    theta
+        Mechanical angle [rad].
+    i_d
+        Current along d [A].
+    i_q
+        Current along q [A].
+    t_w
+        Temperature of the winding [degC].
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     values = (
         1.0,
         omega,
@@ -245,7 +266,28 @@ def extra(
     t_m: float,
     p: Plant,
 ) -> float:
-    """Sum of the extra terms that enter one signal."""
+    """Sum of the extra terms that enter one signal.
+
+    Parameters
+    ----------
+    signal
+        Number of the signal.
+    omega
+        Mechanical speed [rad/s].
+    theta
+        Mechanical angle [rad].
+    i_d
+        Current along d [A].
+    i_q
+        Current along q [A].
+    t_w
+        Temperature of the winding [degC].
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     total = 0.0
     for k in range(p.extras):
         if p.extra_signal[k] == signal:
@@ -291,7 +333,22 @@ def passive(
 
 @njit(cache=True)
 def free_torque(theta: float, omega: float, bristle: float, t_m: float, p: Plant) -> float:
-    """Torque on an open-circuit rotor [N·m]."""
+    """Torque on an open-circuit rotor [N·m].
+
+    Parameters
+    ----------
+    theta
+        Mechanical angle [rad].
+    omega
+        Mechanical speed [rad/s].
+    bristle
+        Deflection of the friction's bristle [rad].
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     ratio = 1.0 + p.alpha_magnet * (t_m - 25.0)
     total = passive(theta, omega, bristle, 0.0, ratio, p)
     if p.extras > 0:
@@ -303,7 +360,26 @@ def free_torque(theta: float, omega: float, bristle: float, t_m: float, p: Plant
 def free_rates(
     theta: float, omega: float, far: float, far_omega: float, bristle: float, t_m: float, p: Plant
 ) -> tuple[float, float]:
-    """Accelerations of rotor and far mass of an open-circuit motor [rad/s²]."""
+    """Accelerations of rotor and far mass of an open-circuit motor [rad/s²].
+
+    Parameters
+    ----------
+    theta
+        Mechanical angle [rad].
+    omega
+        Mechanical speed [rad/s].
+    far
+        Angle of the far mass [rad].
+    far_omega
+        Speed of the far mass [rad/s].
+    bristle
+        Deflection of the friction's bristle [rad].
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     torque = free_torque(theta, omega, bristle, t_m, p)
     if not p.two_mass:
         return torque / p.j_rotor, 0.0
@@ -495,7 +571,16 @@ def dragged(carried: float, theta: float, half_gap: float) -> float:
 
 @njit(cache=True)
 def played(x: Array, half_gap: float) -> Array:
-    """What a signal [n] drags along by a slot of `half_gap` to either side, from its middle on."""
+    """What a signal [n] drags along by a slot of `half_gap` to either side, from its middle on.
+
+    Parameters
+    ----------
+    x
+        The signal [n].
+    half_gap
+        Half of the slot [unit of x].
+
+    """
     out = np.empty(x.size)
     carried = x[0]
     for n in range(x.size):
@@ -506,7 +591,16 @@ def played(x: Array, half_gap: float) -> Array:
 
 @njit(cache=True)
 def lagged(x: Array, blend: float) -> Array:
-    """First-order lag [n] that starts settled: y += blend (x - y)."""
+    """First-order lag [n] that starts settled: y += blend (x - y).
+
+    Parameters
+    ----------
+    x
+        The signal [n].
+    blend
+        Share of the difference that one sample takes [1].
+
+    """
     out = np.empty(x.size)
     y = x[0] if x.size else 0.0
     for k in range(x.size):
@@ -517,7 +611,24 @@ def lagged(x: Array, blend: float) -> Array:
 
 @njit(cache=True)
 def passives(theta: Array, omega: Array, torque: Array, i_q: Array, t_m: float, p: Plant) -> Array:
-    """Torque [n] of everything but the windings in steady creep, bristle fully bent."""
+    """Torque [n] of everything but the windings in steady creep, bristle fully bent.
+
+    Parameters
+    ----------
+    theta
+        Mechanical angle [n, rad].
+    omega
+        Mechanical speed [n, rad/s].
+    torque
+        Electromagnetic torque [n, N·m].
+    i_q
+        Current along q [n, A].
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The motor in numbers.
+
+    """
     out = np.empty(theta.size)
     for k in range(theta.size):
         bristle = math.copysign(p.bristle, omega[k])
@@ -531,7 +642,26 @@ def passives(theta: Array, omega: Array, torque: Array, i_q: Array, t_m: float, 
 def extra_volts(
     theta: Array, omega: Array, i_d: Array, i_q: Array, t_w: Array, t_m: Array, p: Plant
 ) -> Array:
-    """Extra voltages along d and q [n, 2] that the terminals see on top."""
+    """Extra voltages along d and q [n, 2] that the terminals see on top.
+
+    Parameters
+    ----------
+    theta
+        Mechanical angle [n, rad].
+    omega
+        Mechanical speed [n, rad/s].
+    i_d
+        Current along d [n, A].
+    i_q
+        Current along q [n, A].
+    t_w
+        Temperature of the winding [n, degC].
+    t_m
+        Temperature of the magnets [n, degC].
+    p
+        The motor in numbers.
+
+    """
     out = np.empty((theta.size, 2))
     for k in range(theta.size):
         for axis in range(2):

@@ -96,7 +96,18 @@ OUTSIDE: dict[str, Builder] = {
 
 
 def with_unknown(motor: Motor, name: str, size: float = 1.0) -> Motor:
-    """The motor with an effect outside the library; size 1 is typical. ValueError if unknown."""
+    """The motor with an effect outside the library; size 1 is typical. ValueError if unknown.
+
+    Parameters
+    ----------
+    motor
+        The motor.
+    name
+        Name of the effect.
+    size
+        Size of the effect; 1 is typical.
+
+    """
     builder = OUTSIDE.get(name)
     if builder is None:
         raise ValueError(f"nothing outside the library is called {name}: {', '.join(OUTSIDE)}")

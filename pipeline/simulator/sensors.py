@@ -17,12 +17,30 @@ TEMPERATURE_STEP_DEGC = 2.0**-6
 
 
 def grid(span: float, bits: int) -> float:
-    """Resolution of a converter over a span: a power of two, so that values are exact."""
+    """Resolution of a converter over a span: a power of two, so that values are exact.
+
+    Parameters
+    ----------
+    span
+        Span of the converter [unit].
+    bits
+        Number of bits.
+
+    """
     return float(2.0 ** math.floor(math.log2(span / 2.0**bits)))
 
 
 def to_grid(values: Array, step: float) -> Array:
-    """Values rounded to a resolution."""
+    """Values rounded to a resolution.
+
+    Parameters
+    ----------
+    values
+        The values [n].
+    step
+        Resolution [unit of the values].
+
+    """
     rounded: Array = np.round(values / step) * step
     return rounded
 
@@ -81,7 +99,18 @@ def scope_range(largest: float) -> float:
 
 
 def late(signal: Array, t_s: Array, delay_s: float) -> Array:
-    """A signal [n] as it was `delay_s` before each instant [n, s], its first value before that."""
+    """A signal [n] as it was `delay_s` before each instant [n, s], its first value before that.
+
+    Parameters
+    ----------
+    signal
+        The signal [n].
+    t_s
+        Time of each sample [n, s].
+    delay_s
+        Delay [s].
+
+    """
     if delay_s == 0.0:
         return signal
     found: Array = np.interp(t_s - delay_s, t_s, signal)
@@ -104,11 +133,27 @@ class Session:
     since: float = 0.0
 
     def then(self, n: int) -> tuple[Plant, int]:
-        """The plant that the motor is later in a capture of `n` periods, and the period of that."""
+        """The plant that the motor is later in a capture of `n` periods, and the period of that.
+
+        Parameters
+        ----------
+        n
+            Number of periods of the capture.
+
+        """
         return (self.plant, 0) if self.later is None else (self.later, round(self.since * n))
 
     def fault(self, name: str, key: str = "size") -> float:
-        """Parameter of a sensor effect, 0 where the effect is absent."""
+        """Parameter of a sensor effect, 0 where the effect is absent.
+
+        Parameters
+        ----------
+        name
+            Name of the effect.
+        key
+            Name of its parameter.
+
+        """
         return active(self.motor).get(name, {}).get(key, 0.0)
 
     def noise(self, n: int, sigma: float, t_s: Array | None = None) -> Array:
@@ -156,14 +201,28 @@ class Session:
         return self.bench.current_noise_rel * self.motor.current_rated_a
 
     def phase_gain(self, phase: int) -> float:
-        """Gain of one phase's current sensor: station, common fault, its own fault."""
+        """Gain of one phase's current sensor: station, common fault, its own fault.
+
+        Parameters
+        ----------
+        phase
+            Number of the phase, 0 to 2.
+
+        """
         gain = self.instruments.current * (1.0 + self.fault("current_scale"))
         if int(self.fault("current_gain", "phase")) == phase:
             gain *= 1.0 + self.fault("current_gain")
         return gain
 
     def phase_offset_a(self, phase: int) -> float:
-        """Offset of one phase's current sensor [A]."""
+        """Offset of one phase's current sensor [A].
+
+        Parameters
+        ----------
+        phase
+            Number of the phase, 0 to 2.
+
+        """
         if int(self.fault("current_offset", "phase")) == phase:
             return self.fault("current_offset")
         return 0.0
@@ -194,24 +253,62 @@ class Session:
         return t_s, clock_s + np.clip(scatter, -limit, limit)
 
     def line_current(self, i_a: Array, phase: int, t_s: Array) -> Array:
-        """A line current [n] as measured."""
+        """A line current [n] as measured.
+
+        Parameters
+        ----------
+        i_a
+            True current [n, A].
+        phase
+            Number of the phase, 0 to 2.
+        t_s
+            Time of each sample [n, s].
+
+        """
         delay = self.fault("current_delay")
         late = np.interp(t_s - delay, t_s, i_a) if delay > 0.0 else i_a
         seen = self.phase_gain(phase) * late + self.phase_offset_a(phase)
         return to_grid(seen + self.noise(i_a.size, self.current_sigma_a, t_s), self.current_step_a)
 
     def voltage(self, v: Array, t_s: Array) -> Array:
-        """A measured voltage [n]."""
+        """A measured voltage [n].
+
+        Parameters
+        ----------
+        v
+            True voltage [n, V].
+        t_s
+            Time of each sample [n, s].
+
+        """
         gain = self.instruments.voltage * (1.0 + self.fault("voltage_scale"))
         sigma = self.bench.voltage_noise_rel * self.motor.vdc_v
         return to_grid(gain * v + self.noise(v.size, sigma, t_s), self.voltage_step_v)
 
     def probe(self, v: Array, scope: Scope) -> Array:
-        """A voltage [n] as the scope's probe shows it."""
+        """A voltage [n] as the scope's probe shows it.
+
+        Parameters
+        ----------
+        v
+            True voltage [n, V].
+        scope
+            The oscilloscope.
+
+        """
         return self._scoped(self.instruments.probe * v, self.instruments.probe_offset, scope)
 
     def clamp(self, i_a: Array, scope: Scope) -> Array:
-        """A current [n] as the scope's clamp shows it."""
+        """A current [n] as the scope's clamp shows it.
+
+        Parameters
+        ----------
+        i_a
+            True current [n, A].
+        scope
+            The oscilloscope.
+
+        """
         return self._scoped(self.instruments.clamp * i_a, self.instruments.clamp_offset, scope)
 
     def _scoped(self, seen: Array, offset: float, scope: Scope) -> Array:
@@ -222,7 +319,14 @@ class Session:
         return to_grid(seen + offset * half + noise, step)
 
     def angle(self, theta: Array) -> Array:
-        """Mechanical angle [n] by the encoder, with its faults."""
+        """Mechanical angle [n] by the encoder, with its faults.
+
+        Parameters
+        ----------
+        theta
+            Mechanical angle [n, rad].
+
+        """
         from pipeline.simulator.motion import played
 
         bench = self.bench
@@ -237,7 +341,16 @@ class Session:
         return to_grid(seen, 2.0 * math.pi / 2.0**bench.encoder_bits)
 
     def speed(self, omega: Array, rate_hz: float) -> Array:
-        """The bench's own speed estimate [n]: it lags and is noisy."""
+        """The bench's own speed estimate [n]: it lags and is noisy.
+
+        Parameters
+        ----------
+        omega
+            Mechanical speed [n, rad/s].
+        rate_hz
+            Rate of the samples [Hz].
+
+        """
         from pipeline.simulator.motion import lagged
 
         rated = self.motor.speed_rated_rad_s
@@ -248,7 +361,16 @@ class Session:
         return to_grid(seen, grid(rated, 17))
 
     def torque(self, torque: Array, t_s: Array) -> Array:
-        """Shaft torque [n] by the transducer, with lag, gain, offset."""
+        """Shaft torque [n] by the transducer, with lag, gain, offset.
+
+        Parameters
+        ----------
+        torque
+            Torque [n, N·m].
+        t_s
+            Time of each sample [n, s].
+
+        """
         torque = self._strained(torque)
         lag = self.fault("torque_lag")
         if lag > 0.0 and torque.size > 1:
@@ -276,18 +398,43 @@ class Session:
         return lost
 
     def temperature(self, degc: Array) -> Array:
-        """A thermometer [n] with its offset."""
+        """A thermometer [n] with its offset.
+
+        Parameters
+        ----------
+        degc
+            True temperature [n, degC].
+
+        """
         seen = degc + self.instruments.temperature_degc
         seen = seen + self.noise(degc.size, self.bench.temperature_noise_degc)
         return to_grid(seen, TEMPERATURE_STEP_DEGC)
 
     def winding(self, winding_degc: Array, magnet_degc: Array) -> Array:
-        """The winding's thermometer [n], which may sit between winding and iron."""
+        """The winding's thermometer [n], which may sit between winding and iron.
+
+        Parameters
+        ----------
+        winding_degc
+            True temperature of the winding [n, degC].
+        magnet_degc
+            True temperature of the magnets [n, degC].
+
+        """
         share = self.motor.thermometer_share
         return self.temperature(share * winding_degc + (1.0 - share) * magnet_degc)
 
     def meta(self, test: str, **further: str) -> dict[str, str]:
-        """Metadata of one capture, in the contract's words."""
+        """Metadata of one capture, in the contract's words.
+
+        Parameters
+        ----------
+        test
+            Name of the test.
+        **further
+            Further metadata, by key.
+
+        """
         motor, bench = self.motor, self.bench
         words = {
             "contract": "1",

@@ -24,7 +24,14 @@ PAIRS = {
 
 
 def nice_rate(wanted_hz: float) -> float:
-    """The next rate of the series 1, 2, 5, 10 at or above what is wanted [Hz]."""
+    """The next rate of the series 1, 2, 5, 10 at or above what is wanted [Hz].
+
+    Parameters
+    ----------
+    wanted_hz
+        Least rate [Hz].
+
+    """
     decade = 10.0 ** math.floor(math.log10(wanted_hz))
     for step in (1.0, 2.0, 5.0, 10.0):
         if step * decade >= wanted_hz * (1.0 - 1e-9):
@@ -33,7 +40,16 @@ def nice_rate(wanted_hz: float) -> float:
 
 
 def pair_ohm(session: Session, pair: str) -> float:
-    """Resistance of a terminal pair at 25 degC [ohm]."""
+    """Resistance of a terminal pair at 25 degC [ohm].
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    pair
+        Terminal pair, `ab`, `bc` or `ca`.
+
+    """
     p = session.plant
     phases = (p.r_a_ohm, p.r_b_ohm, p.r_c_ohm)
     return float(phases[PAIRS[pair][2]] + phases[PAIRS[pair][3]])
@@ -44,7 +60,16 @@ def _start_degc(session: Session, given: float | None) -> float:
 
 
 def resistance(session: Session, how: protocols.Resistance) -> Recording:
-    """DC plateaus: v = R(T) i + L di/dt, the winding warming as it must."""
+    """DC plateaus: v = R(T) i + L di/dt, the winding warming as it must.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The levels and their times.
+
+    """
     from pipeline.simulator.field import inductances
     from pipeline.simulator.motion import warmed
 
@@ -91,7 +116,16 @@ def _supply(volt: float, before: int, on: int, n: int, ramp: int) -> Array:
 
 
 def current_step(session: Session, how: protocols.CurrentStep) -> Recording:
-    """Voltage step on one pair with the rotor locked, the third terminal open."""
+    """Voltage step on one pair with the rotor locked, the third terminal open.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The step and its sampling.
+
+    """
     from pipeline.simulator.locked import pair_step
 
     motor, plant = session.motor, session.plant
@@ -145,7 +179,20 @@ def _measured(
 
 
 def pair_inductance(session: Session, pair: str, eps: Array, degc: float) -> Array:
-    """Incremental inductance [n, H] between two terminals at zero current, third open."""
+    """Incremental inductance [n, H] between two terminals at zero current, third open.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    pair
+        Terminal pair, `ab`, `bc` or `ca`.
+    eps
+        Electrical angle [n, rad].
+    degc
+        Temperature of the magnets [degC].
+
+    """
     from pipeline.simulator.field import inductances
 
     alpha, beta, _, _ = PAIRS[pair]
@@ -157,7 +204,16 @@ def pair_inductance(session: Session, pair: str, eps: Array, degc: float) -> Arr
 
 
 def lcr(session: Session, how: protocols.Lcr) -> Recording:
-    """LCR meter: incremental inductance of each pair, and the resistance of ab."""
+    """LCR meter: incremental inductance of each pair, and the resistance of ab.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The frequencies and angles.
+
+    """
     degc = _start_degc(session, how.temp_degc)
     angle_deg = np.arange(how.angles) * 360.0 / how.angles
     sigma = session.bench.lcr_noise_rel * session.bench.noise_scale
@@ -179,7 +235,16 @@ def lcr(session: Session, how: protocols.Lcr) -> Recording:
 
 
 def heat_level_a(session: Session, how: protocols.HeatRun) -> float:
-    """Current of a heat run [A]: what warms the winding by `rise_k`, rated at most."""
+    """Current of a heat run [A]: what warms the winding by `rise_k`, rated at most.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The level and its length.
+
+    """
     from pipeline.simulator.truth import rth_winding
 
     motor = session.motor
@@ -192,7 +257,16 @@ def heat_level_a(session: Session, how: protocols.HeatRun) -> float:
 
 
 def heat_run(session: Session, how: protocols.HeatRun) -> Recording:
-    """Current along d on a locked rotor; the drive logs what it commands, its own drop included."""
+    """Current along d on a locked rotor; the drive logs what it commands, its own drop included.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The level and its length.
+
+    """
     from pipeline.simulator.motion import warmed
 
     motor, plant = session.motor, session.plant
@@ -250,7 +324,16 @@ def _dq_log(
 
 
 def flux_map(session: Session, how: protocols.FluxMap) -> Recording:
-    """Flux over a grid of currents, averaged over the electrical angle."""
+    """Flux over a grid of currents, averaged over the electrical angle.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The grid of currents.
+
+    """
     from pipeline.simulator.field import fluxes
 
     motor = session.motor
@@ -279,7 +362,16 @@ def flux_map(session: Session, how: protocols.FluxMap) -> Recording:
 
 
 def torque_table(session: Session, how: protocols.TorqueTable) -> Recording:
-    """Torque of a clamped shaft against q current, row by row, without a clock."""
+    """Torque of a clamped shaft against q current, row by row, without a clock.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The levels of current.
+
+    """
     from pipeline.simulator.field import torques
 
     motor = session.motor
@@ -303,7 +395,16 @@ def torque_table(session: Session, how: protocols.TorqueTable) -> Recording:
 
 
 def holding_current(session: Session, how: protocols.HoldingCurrent) -> Recording:
-    """Current along q that holds the rotor at many angles, friction against the way it came."""
+    """Current along q that holds the rotor at many angles, friction against the way it came.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The angles.
+
+    """
     from pipeline.simulator.field import torques
     from pipeline.simulator.motion import passives
 

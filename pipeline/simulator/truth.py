@@ -18,13 +18,27 @@ D_SHARE = min(TorqueMap().id_levels)
 
 
 def rth_winding(p: Plant) -> float:
-    """Winding to ambient at steady state: the direct path beside the one through the magnet."""
+    """Winding to ambient at steady state: the direct path beside the one through the magnet.
+
+    Parameters
+    ----------
+    p
+        The motor in numbers.
+
+    """
     through = p.rth_wm + p.rth_ma
     return float(p.rth_wa * through / (p.rth_wa + through))
 
 
 def psi_fundamental_wb(p: Plant) -> float:
-    """Amplitude of the fundamental of phase a's open-circuit flux linkage at 25 degC [Wb]."""
+    """Amplitude of the fundamental of phase a's open-circuit flux linkage at 25 degC [Wb].
+
+    Parameters
+    ----------
+    p
+        The motor in numbers.
+
+    """
     from pipeline.simulator.field import open_flux
 
     phase_a = open_flux(ANGLES, np.full(ANGLES.size, AT_DEGC), p)[:, 0]
@@ -32,7 +46,18 @@ def psi_fundamental_wb(p: Plant) -> float:
 
 
 def mean_torque_nm(i_d: float, i_q: float, p: Plant) -> float:
-    """Electromagnetic torque averaged over a turn at 25 degC [N·m]."""
+    """Electromagnetic torque averaged over a turn at 25 degC [N·m].
+
+    Parameters
+    ----------
+    i_d
+        Current along d [A].
+    i_q
+        Current along q [A].
+    p
+        The motor in numbers.
+
+    """
     from pipeline.simulator.field import torques
 
     n = ANGLES.size
@@ -40,7 +65,18 @@ def mean_torque_nm(i_d: float, i_q: float, p: Plant) -> float:
 
 
 def mean_flux_wb(i_d: float, i_q: float, p: Plant) -> tuple[float, float]:
-    """Flux averaged over a turn at 25 degC [Wb]."""
+    """Flux averaged over a turn at 25 degC [Wb].
+
+    Parameters
+    ----------
+    i_d
+        Current along d [A].
+    i_q
+        Current along q [A].
+    p
+        The motor in numbers.
+
+    """
     from pipeline.simulator.field import fluxes
 
     n = ANGLES.size

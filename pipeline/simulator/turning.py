@@ -63,7 +63,16 @@ def _plateaus(levels: Array, each: int, ramp: int, rate_hz: float) -> tuple[Arra
 
 
 def open_circuit(session: Session, how: protocols.OpenCircuit) -> Recording:
-    """Back-EMF at several speeds; no current flows, so the voltages are exact."""
+    """Back-EMF at several speeds; no current flows, so the voltages are exact.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The speeds and their times.
+
+    """
     motor = session.motor
     levels = np.array(how.levels) * motor.speed_rated_rad_s
     fastest = motor.pole_pairs * float(np.max(np.abs(levels))) / (2.0 * math.pi)
@@ -88,7 +97,16 @@ def open_circuit(session: Session, how: protocols.OpenCircuit) -> Recording:
 
 
 def hand_turn(session: Session, how: protocols.HandTurn) -> Recording:
-    """One turn by hand: uneven speed, exactly one turn from rest to rest."""
+    """One turn by hand: uneven speed, exactly one turn from rest to rest.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The turn and its sampling.
+
+    """
     n = round(how.duration_s * how.rate_hz)
     t_s, stamps = session.clock(n, how.rate_hz)
     u = np.arange(n) / (n - 1)
@@ -110,7 +128,16 @@ def hand_turn(session: Session, how: protocols.HandTurn) -> Recording:
 
 
 def cogging(session: Session, how: protocols.Cogging) -> Recording:
-    """Slow steady turn at zero current: cogging, weight and friction on the transducer."""
+    """Slow steady turn at zero current: cogging, weight and friction on the transducer.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The speed and its sampling.
+
+    """
     from pipeline.simulator.motion import turned
 
     motor = session.motor
@@ -133,7 +160,16 @@ def cogging(session: Session, how: protocols.Cogging) -> Recording:
 
 
 def coast_time_s(session: Session, omega: float) -> float:
-    """About how long the motor coasts from a speed [s]."""
+    """About how long the motor coasts from a speed [s].
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    omega
+        Mechanical speed [rad/s].
+
+    """
     p = session.plant
     j = session.motor.j_rotor_kgm2
     brake = p.coulomb + p.hysteresis
@@ -146,7 +182,16 @@ def coast_time_s(session: Session, omega: float) -> float:
 
 
 def spin_down(session: Session, how: protocols.SpinDown) -> Recording:
-    """Coast to rest with open terminals: only friction, iron, cogging and inertia."""
+    """Coast to rest with open terminals: only friction, iron, cogging and inertia.
+
+    Parameters
+    ----------
+    session
+        Motor, bench and the state of both in this capture.
+    how
+        The speed at the start and the sampling.
+
+    """
     from pipeline.simulator.motion import coast
 
     motor, plant = session.motor, session.plant

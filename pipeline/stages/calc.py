@@ -24,7 +24,14 @@ KINDS: dict[str, Calculator] = {
 
 
 def main(settings: CalcSettings) -> Outcome:
-    """Prints one calculator's answer with its formula."""
+    """Prints one calculator's answer with its formula.
+
+    Parameters
+    ----------
+    settings
+        The keys of `calc`.
+
+    """
     text, answer = answered(settings.kind, settings.values)
     return Outcome(text=text, result=answer)
 
@@ -34,8 +41,19 @@ def answered(kind: str, mapping: Mapping[str, str]) -> tuple[str, Answer | None]
 
     Without a kind, the kinds; without keys, what the kind can be given.
 
-    Raises UsageError for an unknown kind or key, keys that do not suffice or contradict each
-    other, and values without sense or of another unit.
+    Parameters
+    ----------
+    kind
+        Name of the calculator; empty for a list of all.
+    mapping
+        The keys as typed.
+
+    Raises
+    ------
+    UsageError
+        An unknown kind or key, keys that do not suffice or contradict each other, and values
+        without sense or of another unit.
+
     """
     if not kind:
         return usage(KINDS), None

@@ -22,6 +22,12 @@ def main(settings: CompareSettings) -> Outcome:
     """Writes `comparison/MOTOR.json`, its page and a recording for every motor of `input`.
 
     What a motor was compared with before stays on its page.
+
+    Parameters
+    ----------
+    settings
+        The keys of `compare` or `diagnose`.
+
     """
     return each_motor(settings, _judge, "pipeline.criticism.comparison", "comparison")
 

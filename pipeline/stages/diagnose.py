@@ -19,6 +19,12 @@ def main(settings: DiagnoseSettings) -> Outcome:
 
     Where structure is left that no effect explains, an effect to start from is written as well:
     `diagnosis/effects/MOTOR_unknown.py`.
+
+    Parameters
+    ----------
+    settings
+        The keys of `diagnose`.
+
     """
     return each_motor(settings, _judge, "pipeline.criticism.diagnosis", "diagnosis")
 

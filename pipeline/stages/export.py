@@ -25,8 +25,17 @@ from pipeline.views.status_text import exported, not_exported
 def main(settings: ExportSettings) -> Outcome:
     """Prints the configuration and writes it to `export/` of output.
 
-    Raises UsageError for an unknown format or motor, a datasheet that is not released, and a
-    constant that is not measured or whose convention is unknown.
+    Parameters
+    ----------
+    settings
+        The keys of `export`.
+
+    Raises
+    ------
+    UsageError
+        An unknown format or motor, a datasheet that is not released, and a constant that is not
+        measured or whose convention is unknown.
+
     """
     exporter = _exporter(settings)
     options = {name: str(value) for name, value in settings.options.items()}

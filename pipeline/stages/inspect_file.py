@@ -23,6 +23,12 @@ def main(settings: InspectSettings) -> Outcome:
     """Prints what a file or folder holds; with a source map for what is not the contract's.
 
     Exit code 3 and one line a file where `run` would refuse it.
+
+    Parameters
+    ----------
+    settings
+        The keys of `inspect`.
+
     """
     place = Path(settings.file)
     if not settings.file or not place.exists():
@@ -53,7 +59,14 @@ def main(settings: InspectSettings) -> Outcome:
 
 
 def render(report: InspectReport) -> str:
-    """The report as text for people."""
+    """The report as text for people.
+
+    Parameters
+    ----------
+    report
+        What is known of the file.
+
+    """
     from pipeline.io.inspection.text import field_line
 
     lines = [

@@ -47,12 +47,28 @@ class PreviewTask:
         return f"file {printable(self.file)}"
 
     def without(self, path: str, reason: str) -> PreviewTask:  # noqa: ARG002 (it has one file)
-        """The task with its file refused for a reason."""
+        """The task with its file refused for a reason.
+
+        Parameters
+        ----------
+        path
+            The file, relative to the input folder.
+        reason
+            The reason, in words.
+
+        """
         return replace(self, refused=reason)
 
 
 def check_answers(settings: InspectSettings) -> None:
-    """Raises UsageError for an answer that nothing asks for, or a map that is there already."""
+    """Raises UsageError for an answer that nothing asks for, or a map that is there already.
+
+    Parameters
+    ----------
+    settings
+        The keys of `inspect`.
+
+    """
     from pipeline.records.stated import may_be_stated
 
     for key in settings.answers:
@@ -69,7 +85,14 @@ def check_answers(settings: InspectSettings) -> None:
 
 
 def folder(settings: InspectSettings) -> Outcome:
-    """What the files of a folder hold, by shape, and one map for those that need one."""
+    """What the files of a folder hold, by shape, and one map for those that need one.
+
+    Parameters
+    ----------
+    settings
+        The keys of `inspect`.
+
+    """
     paths = [path for path in list_files(Path(settings.file)).paths if _is_data(path)]
     if not paths:
         raise UsageError(f"{settings.file} holds no files", "name a folder of recordings")
@@ -129,6 +152,20 @@ def finish(
     """The map of all shapes, previewed, written and checked as far as the settings ask for it.
 
     Files that a map reads already, the `known`, get that map with the answers in its metadata.
+
+    Parameters
+    ----------
+    settings
+        The keys of `inspect`.
+    root
+        The folder or file that is inspected.
+    unmapped
+        Files that no map reads yet.
+    only
+        Files that the map must read; None for all.
+    known
+        Files that a map reads already.
+
     """
     from pipeline.io.inspection.file_names import name_patterns
     from pipeline.io.inspection.starter_map import map_text
@@ -229,7 +266,14 @@ def _questions(
 
 
 def preview_of(task: PreviewTask) -> list[str]:
-    """The first rows of a file through a map, as lines; in a worker, under its limits."""
+    """The first rows of a file through a map, as lines; in a worker, under its limits.
+
+    Parameters
+    ----------
+    task
+        The file and the map.
+
+    """
     from pipeline.io.inspection.preview import preview
 
     if task.refused is not None:

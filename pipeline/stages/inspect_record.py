@@ -15,7 +15,16 @@ if TYPE_CHECKING:
 
 
 def file_record(path: str, report: InspectReport) -> dict[str, Any]:
-    """One file: form, metadata, faults, and every field with its column, unit and evidence."""
+    """One file: form, metadata, faults, and every field with its column, unit and evidence.
+
+    Parameters
+    ----------
+    path
+        The file, as the user named it.
+    report
+        What is known of the file.
+
+    """
     return {
         "path": path,
         "form": report.form,
@@ -56,7 +65,14 @@ def _field(seen: FieldSeen) -> dict[str, Any]:
 
 
 def motor_record(campaign: Campaign) -> dict[str, Any]:
-    """Captures of a motor with the constants that rest on each, and what none determines."""
+    """Captures of a motor with the constants that rest on each, and what none determines.
+
+    Parameters
+    ----------
+    campaign
+        The captures of one motor.
+
+    """
     from pipeline.api.fits import fit
     from pipeline.api.recordings import Recordings
 
@@ -77,7 +93,14 @@ def motor_record(campaign: Campaign) -> dict[str, Any]:
 
 
 def motor_lines(motor: Mapping[str, Any]) -> list[str]:
-    """The record of a motor as text for people."""
+    """The record of a motor as text for people.
+
+    Parameters
+    ----------
+    motor
+        A result of `motor_record`.
+
+    """
     lines = [f"motor {printable(motor['motor_id'])}"]
     for capture in motor["captures"]:
         given = ", ".join(capture["constants"]) or "no constant by itself"

@@ -42,7 +42,16 @@ U_OF = {"resistance_imbalance": 0.005}
 def main(settings: PlanSettings) -> Outcome:
     """The plan of one motor, or of each, of an output folder or of a folder of captures.
 
-    Raises UsageError where there is no such motor or limits file.
+    Parameters
+    ----------
+    settings
+        The keys of `plan`.
+
+    Raises
+    ------
+    UsageError
+        There is no such motor or limits file.
+
     """
     check_constants(settings.constants)
     limits = limits_file(settings.limits, settings.config_dir)
@@ -75,7 +84,16 @@ def _of_captures(settings: PlanSettings, folder: str, required: frozenset[str]) 
 
 
 def plan_of(sheet: Datasheet, required: frozenset[str]) -> Plan:
-    """What to record next of the motor of a datasheet, to have `required` and settle its doubts."""
+    """What to record next of the motor of a datasheet, to have `required` and settle its doubts.
+
+    Parameters
+    ----------
+    sheet
+        The motor's datasheet.
+    required
+        Constants that a release needs.
+
+    """
     tests = frozenset(capture.test for capture in sheet.captures)
     known = Known(sheet.motor_id, sheet.constants, sheet.checks, tests, sheet.model)
     return _planned(known, required)

@@ -33,7 +33,19 @@ TAG = re.compile("[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
 
 def main(settings: RegistrySettings) -> Outcome:
-    """Does one action; raises UsageError for an action or a key that is missing or wrong."""
+    """Does one action.
+
+    Parameters
+    ----------
+    settings
+        The keys of `registry`.
+
+    Raises
+    ------
+    UsageError
+        An action or a key that is missing or wrong.
+
+    """
     if settings.action not in ACTIONS:
         problem = f"no action {settings.action!r}" if settings.action else "the action is missing"
         raise UsageError(f"registry: {problem}", f"one of {', '.join(ACTIONS)}")
@@ -42,7 +54,14 @@ def main(settings: RegistrySettings) -> Outcome:
 
 
 def place_of(settings: RegistrySettings) -> str:
-    """Folder or URL of the registry that the keys name."""
+    """Folder or URL of the registry that the keys name.
+
+    Parameters
+    ----------
+    settings
+        The keys of `registry`.
+
+    """
     if settings.registry in ("", "auto"):
         return (Path(settings.output) / "registry").as_posix()
     return settings.registry
@@ -206,7 +225,16 @@ ACTIONS: Mapping[str, Callable[[Registry, RegistrySettings], Outcome]] = {
 def moment(text: str) -> datetime:
     """The moment that ISO 8601 text names, in UTC where it says no zone; a date means its end.
 
-    Raises UsageError for other text.
+    Parameters
+    ----------
+    text
+        A date or a moment in ISO 8601.
+
+    Raises
+    ------
+    UsageError
+        Other text.
+
     """
     try:
         found = datetime.fromisoformat(text)

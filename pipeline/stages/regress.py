@@ -35,6 +35,12 @@ def main(settings: RegressSettings) -> Outcome:
 
     Every verdict that is neither a pass nor a failure (CONFOUNDED, INSUFFICIENT_HISTORY and the
     like) is undecided.
+
+    Parameters
+    ----------
+    settings
+        The keys of `regress`.
+
     """
     terms = _terms()
     limits = read_limits(limits_file(settings.limits, settings.config_dir))

@@ -51,7 +51,14 @@ class Opened:
 
 
 def main(settings: ReviewSettings) -> Outcome:
-    """Opens the fleet, one motor or one lot; refuses recordings that cannot be verified."""
+    """Opens the fleet, one motor or one lot; refuses recordings that cannot be verified.
+
+    Parameters
+    ----------
+    settings
+        The keys of `review`.
+
+    """
     output = Path(settings.output)
     if not 0 <= settings.port <= LAST_PORT:
         raise UsageError(f"port={settings.port} is none", f"0, or one of 1 to {LAST_PORT}")

@@ -68,7 +68,14 @@ class Registered:
 
 
 def main(settings: RunSettings) -> Outcome:
-    """Processes every motor of `input`; refused captures are named and the others go on."""
+    """Processes every motor of `input`; refused captures are named and the others go on.
+
+    Parameters
+    ----------
+    settings
+        The keys of `run`.
+
+    """
     check_options(settings)
     check_stated(asdict(settings.operate))
     ReadLimits(settings.read_seconds, settings.read_memory_mb)
@@ -103,7 +110,14 @@ def main(settings: RunSettings) -> Outcome:
 
 
 def process_motor(job: MotorJob) -> MotorResult:
-    """One motor, in a worker: what it needs is imported there and not in the driver."""
+    """One motor, in a worker: what it needs is imported there and not in the driver.
+
+    Parameters
+    ----------
+    job
+        What to do with one motor, and how.
+
+    """
     from pipeline.stages.steps import motor
 
     return motor.process_motor(job)

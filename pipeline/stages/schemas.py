@@ -40,7 +40,19 @@ def build() -> dict[str, bytes]:
 
 
 def main(settings: Settings) -> Outcome:
-    """Writes every built file into the checkout; raises UsageError where there is none."""
+    """Writes every built file into the checkout.
+
+    Parameters
+    ----------
+    settings
+        The command has no keys of its own.
+
+    Raises
+    ------
+    UsageError
+        There is none.
+
+    """
     del settings
     root = Path(pipeline.__file__).parent.parent
     if not (root / "pyproject.toml").is_file():

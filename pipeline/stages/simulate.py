@@ -33,7 +33,14 @@ LARGE_ROWS = 3000
 
 
 def main(settings: SimulateSettings) -> Outcome:
-    """Writes the captures of one motor, or of every motor of a fleet, each with `truth.json`."""
+    """Writes the captures of one motor, or of every motor of a fleet, each with `truth.json`.
+
+    Parameters
+    ----------
+    settings
+        The keys of `simulate`.
+
+    """
     if not settings.output:
         raise UsageError("simulate needs output=DIR", "name the folder to write to")
     if settings.encoding != "mixed" and settings.encoding not in FORMATS:

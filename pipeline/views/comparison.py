@@ -75,7 +75,14 @@ class ComparisonView:
 
 
 def comparison_view(result: Comparison) -> ComparisonView:
-    """The view of one comparison."""
+    """The view of one comparison.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    """
     own = ("", *result.effects)
     moved = [m for m in result.moved if abs(m.in_u) >= MOVED]
     still = counted(len(result.moved) - len(moved), "parameter")
@@ -105,7 +112,14 @@ def comparison_view(result: Comparison) -> ComparisonView:
 
 
 def headline(result: Comparison) -> str:
-    """How far the model is off, and how far it was without what was added, in a sentence."""
+    """How far the model is off, and how far it was without what was added, in a sentence.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    """
     if not result.errors:
         return "; ".join(result.notes)
     effects = ", ".join(result.effects) or "no effects"
@@ -120,12 +134,28 @@ def headline(result: Comparison) -> str:
 
 
 def ratio_of(error: SignalError) -> float:
-    """An error over its noise floor."""
+    """An error over its noise floor.
+
+    Parameters
+    ----------
+    error
+        The error.
+
+    """
     return error.rmse / max(error.noise_floor, 1e-300)
 
 
 def pooled(errors: Sequence[SignalError], name: str) -> float:
-    """Root of the mean square of `rmse` or `noise_floor` over all windows of some captures."""
+    """Root of the mean square of `rmse` or `noise_floor` over all windows of some captures.
+
+    Parameters
+    ----------
+    errors
+        The errors of some captures.
+    name
+        `rmse` or `noise_floor`.
+
+    """
     total = sum(e.n * getattr(e, name) ** 2 for e in errors)
     return math.sqrt(total / max(sum(e.n for e in errors), 1))
 
@@ -214,6 +244,13 @@ def _worst(error_map: ErrorMap) -> str:
 
 
 def signal_title(row: ErrorRow) -> str:
-    """A signal in words, with `on its own` for a free run."""
+    """A signal in words, with `on its own` for a free run.
+
+    Parameters
+    ----------
+    row
+        The row.
+
+    """
     words = quantity_words(row.signal)
     return words if row.kind == "equation" else f"{words}, {KINDS[row.kind]}"

@@ -11,7 +11,14 @@ _LOW, _HIGH = "low", "high"
 
 
 def conditions(at: Conditions) -> str:
-    """Conditions in order of their names; `X_low_UNIT` with `X_high_UNIT` is one range."""
+    """Conditions in order of their names; `X_low_UNIT` with `X_high_UNIT` is one range.
+
+    Parameters
+    ----------
+    at
+        Conditions by name [unit of the name].
+
+    """
     texts = []
     for key in sorted(at, key=_without_end):
         end, partner = _end(key), at.get(_partner(key))

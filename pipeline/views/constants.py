@@ -93,12 +93,28 @@ _SYMBOLS: dict[str, tuple[str, str]] = {
 
 
 def symbol(name: str) -> tuple[str, str]:
-    """Letter and subscript of a constant; both empty where it has no usual symbol."""
+    """Letter and subscript of a constant; both empty where it has no usual symbol.
+
+    Parameters
+    ----------
+    name
+        Name of the constant.
+
+    """
     return _SYMBOLS.get(name, ("", ""))
 
 
 def constant_words(name: str, own: Mapping[str, Term] | None = None) -> str:
-    """What a constant is, in the glossary's words or in those of the plug-in that owns it."""
+    """What a constant is, in the glossary's words or in those of the plug-in that owns it.
+
+    Parameters
+    ----------
+    name
+        Name of the constant.
+    own
+        Terms of plug-ins that the glossary lacks, by name.
+
+    """
     term = CONSTANTS.get(name) or (own or {}).get(name)
     if term is None:
         return name.replace("_", " ")
@@ -107,7 +123,14 @@ def constant_words(name: str, own: Mapping[str, Term] | None = None) -> str:
 
 
 def grouped(names: Iterable[str]) -> list[tuple[str, list[str]]]:
-    """The names under the headings of a datasheet, known ones in its order, others sorted last."""
+    """The names under the headings of a datasheet, known ones in its order, others sorted last.
+
+    Parameters
+    ----------
+    names
+        Names of constants.
+
+    """
     present = set(names)
     known = {name for group in GROUPS.values() for name in group}
     groups = [(title, [n for n in group if n in present]) for title, group in GROUPS.items()]
@@ -116,11 +139,25 @@ def grouped(names: Iterable[str]) -> list[tuple[str, list[str]]]:
 
 
 def in_order(name: str) -> list[tuple[int, str]]:
-    """A key that sorts numbers in names by their size: harmonic 5 before harmonic 11."""
+    """A key that sorts numbers in names by their size: harmonic 5 before harmonic 11.
+
+    Parameters
+    ----------
+    name
+        The name.
+
+    """
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
 
 
 def sentence(text: str) -> str:
-    """The text with a capital first letter, unless its first word is a name such as `lq_h`."""
+    """The text with a capital first letter, unless its first word is a name such as `lq_h`.
+
+    Parameters
+    ----------
+    text
+        The text.
+
+    """
     first = text.split(" ", 1)[0]
     return text if "_" in first else text[:1].upper() + text[1:]

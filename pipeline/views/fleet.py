@@ -72,7 +72,13 @@ def fleet_view(
 ) -> FleetView:
     """The view of all motors, whatever order they come in.
 
-    `statuses` are the current ones, by motor; what a datasheet says of itself without.
+    Parameters
+    ----------
+    datasheets
+        The datasheets of the batch.
+    statuses
+        Current status of each motor; None for what each datasheet states of itself.
+
     """
     sheets = sorted(datasheets, key=lambda sheet: sheet.motor_id)
     now = [(statuses or {}).get(sheet.motor_id, current_status(sheet)) for sheet in sheets]
@@ -96,7 +102,16 @@ def fleet_view(
 
 
 def known_estimates(name: str, sheets: Sequence[Datasheet]) -> list[Estimate]:
-    """The estimates of a constant that have a value."""
+    """The estimates of a constant that have a value.
+
+    Parameters
+    ----------
+    name
+        Name of the constant.
+    sheets
+        The datasheets.
+
+    """
     found = (sheet.constants.get(name) for sheet in sheets)
     return [estimate for estimate in found if estimate is not None and estimate.known]
 
@@ -145,7 +160,16 @@ def _cell(estimate: Estimate | None, scale: Scale) -> Cell:
 
 
 def kind_of_reason(sheet: Datasheet, reason: str) -> str:
-    """The reason less what is the motor's own: the capture and the size of what a model misses."""
+    """The reason less what is the motor's own: the capture and the size of what a model misses.
+
+    Parameters
+    ----------
+    sheet
+        The datasheet.
+    reason
+        The reason, as the datasheet has it.
+
+    """
     model = sheet.model
     if not reason.startswith(MODEL_REASON) or model is None or model.worst is None:
         return reason
@@ -159,6 +183,12 @@ def kind_of_reason(sheet: Datasheet, reason: str) -> str:
 def lacking_alike(datasheets: Sequence[Datasheet]) -> list[list[Datasheet]]:
     """The motors whose model was tested and not passed, by what it lacks; the largest group first,
     in it the motor with the largest error.
+
+    Parameters
+    ----------
+    datasheets
+        The datasheets of the batch.
+
     """
     groups: dict[str, list[Datasheet]] = {}
     for sheet in datasheets:
@@ -177,6 +207,14 @@ def _error(sheet: Datasheet) -> float:
 def floors_of(reason: Reason, rows: Sequence[MotorRow]) -> str:
     """The error of models that lack the same effects, or how far the same signal is over its floor;
     empty for a reason that is not a model's.
+
+    Parameters
+    ----------
+    reason
+        The reason with its motors.
+    rows
+        Rows of the table of motors.
+
     """
     own = [row for row in rows if row.sheet.motor_id in reason.members]
     models = [

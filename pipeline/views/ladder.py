@@ -80,7 +80,16 @@ class LadderView:
 
 
 def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
-    """The view of one diagnosis of the captures in a `folder`."""
+    """The view of one diagnosis of the captures in a `folder`.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+    folder
+        The input folder, as the user named it.
+
+    """
     signals = shown_signals(result)
     ranked = {one.effect: one for one in result.ranking}
     words = f"input={shlex.quote(folder)} motor={shlex.quote(result.motor_id)}"
@@ -100,7 +109,14 @@ def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
 
 
 def headline(result: Diagnosis) -> str:
-    """The verdict in words with sizes, in sentences: what is missing, and what adding it does."""
+    """The verdict in words with sizes, in sentences: what is missing, and what adding it does.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+
+    """
     ranked = {one.effect: one for one in result.ranking}
     names = [ranked[name].headline or name for name in result.missing if name in ranked]
     found = f"{sentence(_listed(names))}. {_fall(result)}" if names else ""
@@ -144,6 +160,12 @@ def _doubt(ranked: RankedEffect) -> Doubt:
 def shown_signals(result: Diagnosis) -> tuple[str, ...]:
     """Signals shown on every step, the one farthest over its floor on the first step first, those
     of which no floor is known last.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+
     """
     if not result.ladder:
         return ()
@@ -157,25 +179,55 @@ def shown_signals(result: Diagnosis) -> tuple[str, ...]:
 
 
 def mapped_signals(result: Diagnosis) -> tuple[str, ...]:
-    """Signals with a floor on every step, those with a map over speed and current first."""
+    """Signals with a floor on every step, those with a map over speed and current first.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+
+    """
     names = [n for n in shown_signals(result) if all(n in step.errors for step in result.ladder)]
     flat = [n for n in names if result.ladder[0].map_of(n, SPEED, CURRENT) is not None]
     return (*flat, *(n for n in names if n not in flat))
 
 
 def over_floor(step: StepRecord, name: str) -> float:
-    """A signal's error over its noise floor, 0 where it is not known."""
+    """A signal's error over its noise floor, 0 where it is not known.
+
+    Parameters
+    ----------
+    step
+        The step.
+    name
+        The signal.
+
+    """
     error = step.errors.get(name)
     return 0.0 if error is None else error.rmse / max(error.noise_floor, 1e-300)
 
 
 def angle_of(signal: str) -> str:
-    """The angle that a signal's error is drawn over: torque ripples with the shaft."""
+    """The angle that a signal's error is drawn over: torque ripples with the shaft.
+
+    Parameters
+    ----------
+    signal
+        The signal.
+
+    """
     return "theta_mech_rad" if signal == "torque_shaft_nm" else "theta_elec_rad"
 
 
 def reaches(ladder: Sequence[StepRecord]) -> dict[tuple[str, str], float]:
-    """Full colour, or the axis' end, of each signal's maps: the largest mean on any step [unit]."""
+    """Full colour, or the axis' end, of each signal's maps: the largest mean on any step [unit].
+
+    Parameters
+    ----------
+    ladder
+        The steps.
+
+    """
     reach: dict[tuple[str, str], float] = {}
     for step in ladder:
         for one in step.maps:
@@ -230,7 +282,16 @@ def _rmse(step: StepRecord, name: str) -> float | None:
 
 
 def percent(now: float, before: float) -> str:
-    """A change in percent with its sign; empty where there was nothing before."""
+    """A change in percent with its sign; empty where there was nothing before.
+
+    Parameters
+    ----------
+    now
+        The value now.
+    before
+        The value before.
+
+    """
     if before <= 0.0:
         return ""
     return f"{100.0 * (now / before - 1.0):+.0f} %".replace("-", MINUS)

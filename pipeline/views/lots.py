@@ -55,7 +55,14 @@ class LotView:
 
 
 def lot_view(regression: LotRegression) -> LotView:
-    """The view of one comparison of lots."""
+    """The view of one comparison of lots.
+
+    Parameters
+    ----------
+    regression
+        The comparison of lots.
+
+    """
     present = tuple(sorted((one for one in regression.constants if one.motors), key=_weight))
     reasons = shared_reasons((one.name, one.why) for one in present if one.why)
     numbers = {reason.text: number for number, reason in enumerate(reasons, 1)}
@@ -68,13 +75,29 @@ def lot_view(regression: LotRegression) -> LotView:
 
 
 def compared(regression: LotRegression) -> tuple[ConstantResult, ...]:
-    """Constants that both sides have, what matters first."""
+    """Constants that both sides have, what matters first.
+
+    Parameters
+    ----------
+    regression
+        The comparison of lots.
+
+    """
     both = [one for one in regression.constants if one.of("baseline") and one.of("candidate")]
     return tuple(sorted(both, key=_weight))
 
 
 def mean_of(constant: ConstantResult, side: Side) -> float | None:
-    """The mean of lot means of a side, or of its motors where there are no lots."""
+    """The mean of lot means of a side, or of its motors where there are no lots.
+
+    Parameters
+    ----------
+    constant
+        The constant's comparison.
+    side
+        `baseline` or `candidate`.
+
+    """
     means = [lot.mean for lot in constant.lots if lot.side == side]
     means = means or [motor.value for motor in constant.of(side)]
     return sum(means) / len(means) if means else None
@@ -85,6 +108,12 @@ def change_text(constant: ConstantResult) -> str:
 
     In percent of the baseline, but where U or the change is beyond it: a share of nearly nothing
     says nothing.
+
+    Parameters
+    ----------
+    constant
+        The constant's comparison.
+
     """
     effect, before = constant.effect, mean_of(constant, "baseline")
     difference, spread = effect.difference, effect.expanded_u or 0.0
@@ -99,7 +128,14 @@ def change_text(constant: ConstantResult) -> str:
 
 
 def p_text(value: float | None) -> str:
-    """A p-value to three places."""
+    """A p-value to three places.
+
+    Parameters
+    ----------
+    value
+        The p-value; None where there is none.
+
+    """
     return NONE if value is None else "< 0.001" if value < 0.001 else f"{value:.3f}"
 
 

@@ -41,7 +41,18 @@ class ModelWords:
 
 
 def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER") -> ModelWords:
-    """What the residual test of a motor came to; None is a datasheet of before there was one."""
+    """What the residual test of a motor came to; None is a datasheet of before there was one.
+
+    Parameters
+    ----------
+    model
+        The verdict of the residual test; None for a datasheet without one.
+    motor_id
+        The motor.
+    folder
+        The input folder, as the user named it.
+
+    """
     model = model or OLD
     verdict = " ".join((model.verdict.replace("_", " "), *_names(model)))
     floors = f"error {model.errors} floors" if model.errors else ""

@@ -63,12 +63,28 @@ class Row:
     alternatives: tuple[Alternative, ...]
 
     def shares(self, least: float = 0.0) -> str:
-        """The parts of u² that have at least this share of it, in words."""
+        """The parts of u² that have at least this share of it, in words.
+
+        Parameters
+        ----------
+        least
+            Smallest share that is named [1].
+
+        """
         return ", ".join(f"{p.kind} {p.percent}" for p in self.parts if p.share >= least)
 
 
 def motor_rows(datasheet: Datasheet, own: Mapping[str, Term] | None = None) -> dict[str, Row]:
-    """The constants of a datasheet by name, sorted; `own` are terms that the glossary lacks."""
+    """The constants of a datasheet by name, sorted; `own` are terms that the glossary lacks.
+
+    Parameters
+    ----------
+    datasheet
+        The datasheet.
+    own
+        Terms of plug-ins that the glossary lacks, by name.
+
+    """
     return {
         name: _row(name, constant_words(name, own), datasheet)
         for name in sorted(datasheet.constants)
@@ -76,19 +92,44 @@ def motor_rows(datasheet: Datasheet, own: Mapping[str, Term] | None = None) -> d
 
 
 def ordered_checks(checks: Iterable[Check]) -> list[Check]:
-    """The failed ones first, by name."""
+    """The failed ones first, by name.
+
+    Parameters
+    ----------
+    checks
+        The checks.
+
+    """
     return sorted(checks, key=lambda check: (CHECK_ORDER.index(check.status), check.name))
 
 
 def check_number(value: float | None, unit: str, digits: int = 5) -> str:
-    """A number of a check with its unit; a dash where it was not evaluated."""
+    """A number of a check with its unit; a dash where it was not evaluated.
+
+    Parameters
+    ----------
+    value
+        The number; None where there is none.
+    unit
+        Unit of the number.
+    digits
+        Significant digits.
+
+    """
     if value is None:
         return "–"
     return plain(value, digits) if unit == "1" else quantity(value, unit)
 
 
 def parts_of(budget: Budget) -> tuple[Part, ...]:
-    """Shares of u² by kind of source: scatter, disagreement, assumptions, and each instrument."""
+    """Shares of u² by kind of source: scatter, disagreement, assumptions, and each instrument.
+
+    Parameters
+    ----------
+    budget
+        Contributions to the uncertainty.
+
+    """
     squares: dict[str, float] = {}
     for one in budget:
         kind = kind_of(one.source)
@@ -101,7 +142,14 @@ def parts_of(budget: Budget) -> tuple[Part, ...]:
 
 
 def kind_of(source: str) -> str:
-    """What a contribution comes from: `current@bench-1` is current, `scatter:lcr:r` scatter."""
+    """What a contribution comes from: `current@bench-1` is current, `scatter:lcr:r` scatter.
+
+    Parameters
+    ----------
+    source
+        Name of the contribution.
+
+    """
     head = re.split("[:@]", source, maxsplit=1)[0]
     head = head.removesuffix("_commanded")
     if head.startswith("theta"):

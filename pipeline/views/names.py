@@ -16,7 +16,14 @@ _AXES = {"ia", "ib", "ic", "id", "iq", "va", "vb", "vc", "vd", "vq", "vab", "vbc
 
 
 def quantity_words(name: str) -> str:
-    """A glossary name without its unit, in words: `temp_winding_degc` is temperature winding."""
+    """A glossary name without its unit, in words: `temp_winding_degc` is temperature winding.
+
+    Parameters
+    ----------
+    name
+        Name of the glossary, ending in its unit.
+
+    """
     suffix = suffix_of(name)
     stem = name[: -len(suffix) - 1] if suffix else name
     first, *rest = stem.split("_")
@@ -26,10 +33,24 @@ def quantity_words(name: str) -> str:
 
 
 def unit_words(name: str) -> str:
-    """The unit that a name ends in, as people write it; 1 where it has none."""
+    """The unit that a name ends in, as people write it; 1 where it has none.
+
+    Parameters
+    ----------
+    name
+        Name of the glossary, ending in its unit.
+
+    """
     return unit_text(unit_of(name)) or "1"
 
 
 def with_unit(name: str) -> str:
-    """A glossary name in words with its unit: `speed mech [rad/s]`."""
+    """A glossary name in words with its unit: `speed mech [rad/s]`.
+
+    Parameters
+    ----------
+    name
+        Name of the glossary, ending in its unit.
+
+    """
     return f"{quantity_words(name)} [{unit_words(name)}]"

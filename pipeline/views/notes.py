@@ -14,6 +14,12 @@ def shown_and_folded(result: Diagnosis) -> tuple[tuple[str, ...], tuple[str, ...
     """Notes to show, and those on single effects that a few lines among the former stand for.
 
     Each effect goes with one test that would excite it, the tests that would excite most first.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+
     """
     single = tuple(one.words for one in result.unexcited)
     if len(single) <= FEW:

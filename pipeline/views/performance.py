@@ -52,7 +52,14 @@ class PerformanceView:
 
 
 def performance_view(performance: Performance) -> PerformanceView:
-    """The view of a motor's performance."""
+    """The view of a motor's performance.
+
+    Parameters
+    ----------
+    performance
+        The performance of the motor.
+
+    """
     return PerformanceView(
         tuple(_row(one) for one in performance.numbers),
         () if performance.operation is None else _conditions(performance.operation),

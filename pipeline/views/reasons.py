@@ -18,7 +18,14 @@ class Reason:
 
 
 def shared_reasons(reasons: Iterable[tuple[str, str]]) -> tuple[Reason, ...]:
-    """Reasons of two members or more, the commonest first, of (member, reason) pairs."""
+    """Reasons of two members or more, the commonest first, of (member, reason) pairs.
+
+    Parameters
+    ----------
+    reasons
+        Pairs of member and reason.
+
+    """
     members: dict[str, dict[str, None]] = {}
     for member, text in reasons:
         members.setdefault(text, {})[member] = None

@@ -18,7 +18,14 @@ IN_SPITE = "Approved in spite of what its model leaves."
 
 
 def status_words(current: CurrentStatus) -> str:
-    """What the status means, in a sentence."""
+    """What the status means, in a sentence.
+
+    Parameters
+    ----------
+    current
+        The status in the registry.
+
+    """
     if current.status == "released" and current.why:
         return IN_SPITE
     return WORDS[current.status]
@@ -28,6 +35,12 @@ def status_lines(current: CurrentStatus) -> tuple[str, ...]:
     """Who decided what, and which version an export takes where it is not this one.
 
     Empty for a version on which nothing was decided and beside which nothing else is released.
+
+    Parameters
+    ----------
+    current
+        The status in the registry.
+
     """
     lines = []
     if current.decision is not None and current.version is not None:
@@ -38,25 +51,53 @@ def status_lines(current: CurrentStatus) -> tuple[str, ...]:
 
 
 def exported(version: Version) -> str:
-    """Which version an export writes, and since when it counts: `revision 1, approved by ...`."""
+    """Which version an export writes, and since when it counts: `revision 1, approved by ...`.
+
+    Parameters
+    ----------
+    version
+        The version.
+
+    """
     since = decision(version.decisions[-1]) if version.decisions else "released as published"
     return f"revision {version.revision}, {since}"
 
 
 def not_exported(last: Version) -> str:
-    """That a newer version than the exported one is there, and what it is."""
+    """That a newer version than the exported one is there, and what it is.
+
+    Parameters
+    ----------
+    last
+        The newest version.
+
+    """
     points = "; ".join(last.published.reasons[:3])
     why = f" ({points})" if points else ""
     return f"revision {last.revision} is newer and {last.status}{why}; it is not exported"
 
 
 def decision(event: Event) -> str:
-    """`approved by NAME on DATE: why`."""
+    """`approved by NAME on DATE: why`.
+
+    Parameters
+    ----------
+    event
+        The event.
+
+    """
     word = "approved" if event.kind == "approve" else "revoked"
     who, why = safe(event.by or NONE), safe(event.why or NONE)
     return f"{word} by {who} on {when(event.recorded_at)}: {why}"
 
 
 def when(moment: datetime) -> str:
-    """A moment to the second, in UTC."""
+    """A moment to the second, in UTC.
+
+    Parameters
+    ----------
+    moment
+        The moment, with a zone.
+
+    """
     return moment.strftime("%Y-%m-%dT%H:%M:%SZ")

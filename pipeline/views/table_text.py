@@ -10,14 +10,30 @@ WIDTH = 80
 
 
 def safe(text: str) -> str:
-    """The text with everything that a terminal would act on written out."""
+    """The text with everything that a terminal would act on written out.
+
+    Parameters
+    ----------
+    text
+        Text that may hold control characters.
+
+    """
     return "".join(
         char if char.isprintable() else char.encode("unicode_escape").decode() for char in text
     )
 
 
 def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
-    """Columns of text, left-aligned but for those named."""
+    """Columns of text, left-aligned but for those named.
+
+    Parameters
+    ----------
+    rows
+        Cells of each row.
+    right
+        Numbers of the columns that are aligned to the right.
+
+    """
     cells = [[safe(cell) for cell in row] for row in rows]
     return _block(cells, range(len(cells[0])), right)
 
@@ -25,7 +41,18 @@ def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
 def blocks(
     rows: Sequence[Sequence[str]], right: Sequence[int] = (), width: int = WIDTH
 ) -> list[str]:
-    """The same in tables of at most `width` characters that all begin with the first column."""
+    """The same in tables of at most `width` characters that all begin with the first column.
+
+    Parameters
+    ----------
+    rows
+        Cells of each row.
+    right
+        Numbers of the columns that are aligned to the right.
+    width
+        Most characters of a line.
+
+    """
     cells = [[safe(cell) for cell in row] for row in rows]
     widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))]
     return [_block(cells, columns, right) for columns in _column_blocks(widths, width)]

@@ -38,6 +38,18 @@ def constant_rows(
     """One row an estimate; value, uncertainty and interval are null where it is not identifiable.
 
     `dof` is null where it is infinite.
+
+    Parameters
+    ----------
+    motor_id
+        The motor.
+    motor_type
+        Type of the motor.
+    lot
+        Lot of the motor.
+    estimates
+        The estimates.
+
     """
     rows = []
     for one in estimates:
@@ -67,8 +79,14 @@ def constant_rows(
 
 
 def constants_frame(sheet: Datasheet) -> pl.DataFrame:
-    """The constants of one datasheet, by name, with its status and version; then the parameters
-    of the effects that its model lacks, as EFFECT.PARAMETER.
+    """The constants of one datasheet, by name, with its status and version; then the parameters of
+    the effects that its model lacks, as EFFECT.PARAMETER.
+
+    Parameters
+    ----------
+    sheet
+        The datasheet.
+
     """
     estimates = [estimate for _, estimate in sorted(sheet.constants.items())]
     estimates += found_estimates(sheet)
@@ -80,8 +98,14 @@ def constants_frame(sheet: Datasheet) -> pl.DataFrame:
 
 
 def found_estimates(sheet: Datasheet) -> list[Estimate]:
-    """The parameters of the effects that were found missing, as estimates named
-    EFFECT.PARAMETER, by method `residual_test`.
+    """The parameters of the effects that were found missing, as estimates named EFFECT.PARAMETER,
+    by method `residual_test`.
+
+    Parameters
+    ----------
+    sheet
+        The datasheet.
+
     """
     found = []
     for effect, one in () if sheet.model is None else sheet.model.missing.items():
@@ -103,6 +127,12 @@ def fleet_files(frames: Sequence[pl.DataFrame]) -> dict[str, bytes]:
     """`fleet.csv` and `fleet.parquet` of some motors' constants; equal tables give equal bytes.
 
     A list of captures is one text in CSV, its paths parted by semicolons.
+
+    Parameters
+    ----------
+    frames
+        Results of `constants_frame`.
+
     """
     whole = pl.concat(frames)
     flat, packed = io.BytesIO(), io.BytesIO()

@@ -37,7 +37,14 @@ NOT_OF_A_BATCH = frozenset(
 
 
 def key_of(parts: Parts) -> str:
-    """sha256 of the parts."""
+    """sha256 of the parts.
+
+    Parameters
+    ----------
+    parts
+        What the result depends on, by name.
+
+    """
     return content_digest(dict(parts))
 
 
@@ -51,7 +58,26 @@ def answer_parts(
     *,
     recover: bool,
 ) -> Parts:
-    """What the survey's answer on one file depends on; the question holds its manifest row."""
+    """What the survey's answer on one file depends on; the question holds its manifest row.
+
+    Parameters
+    ----------
+    tools
+        Version of the code and of the libraries that give the result.
+    question
+        The file and its row of the manifest.
+    file_sha256
+        Digest of the file.
+    sidecar_sha256
+        Digest of its sidecar; None without one.
+    sources
+        Source maps by name.
+    limits
+        Time [s] and memory [MB] that reading one file may take.
+    recover
+        Whether damaged MCAP files are read up to the damage.
+
+    """
     return {
         "tools": tools,
         "question": question,
@@ -64,7 +90,16 @@ def answer_parts(
 
 
 def motor_parts(tools: str, job: MotorJob) -> Parts:
-    """What the findings and files of one motor depend on."""
+    """What the findings and files of one motor depend on.
+
+    Parameters
+    ----------
+    tools
+        Version of the code and of the libraries that give the result.
+    job
+        What to do with one motor, and how.
+
+    """
     parts = {f.name: getattr(job, f.name) for f in fields(job) if f.name not in NOT_OF_A_MOTOR}
     return {"tools": tools, **parts}
 
@@ -78,8 +113,19 @@ def batch_parts(
 ) -> Parts:
     """What the pages and the outcome of a batch depend on.
 
-    `motors` are the keys of its motors, which cover its captures; `commit` is the registry's last
-    one, as a version may be revoked later.
+    Parameters
+    ----------
+    tools
+        Version of the code and of the libraries that give the result.
+    settings
+        The keys of `run`.
+    motors
+        Keys of the motors; they cover the captures.
+    survey
+        What the input folder holds.
+    commit
+        Last commit of the registry; a version may be revoked later.
+
     """
     every = {f.name: getattr(settings, f.name) for f in fields(settings)}
     surveyed = {f.name: getattr(survey, f.name) for f in fields(survey)}
@@ -93,7 +139,16 @@ def batch_parts(
 
 
 def campaign_key(campaign: Campaign, readings: Sequence[str]) -> list[Any]:
-    """Every field of a campaign, with its captures by their digests."""
+    """Every field of a campaign, with its captures by their digests.
+
+    Parameters
+    ----------
+    campaign
+        The captures of one motor.
+    readings
+        Digests of the captures as they were read.
+
+    """
     parts = {f.name: getattr(campaign, f.name) for f in fields(campaign) if f.name != "captures"}
     return [parts, list(readings)]
 
@@ -101,7 +156,17 @@ def campaign_key(campaign: Campaign, readings: Sequence[str]) -> list[Any]:
 def version_parts(code: str, libraries: str, campaign: Sequence[Any], config_sha256: str) -> Parts:
     """What a datasheet depends on: captures as they were read, configuration, code, libraries.
 
-    `campaign` is the result of `campaign_key`.
+    Parameters
+    ----------
+    code
+        Version of the code.
+    libraries
+        Versions of the libraries.
+    campaign
+        The result of `campaign_key`.
+    config_sha256
+        Digest of the configuration.
+
     """
     return {
         "campaign": campaign,
@@ -112,7 +177,16 @@ def version_parts(code: str, libraries: str, campaign: Sequence[Any], config_sha
 
 
 def superseding_parts(version: str, superseded: Superseded) -> Parts:
-    """What a version depends on that supersedes a revoked one of the same work."""
+    """What a version depends on that supersedes a revoked one of the same work.
+
+    Parameters
+    ----------
+    version
+        Digest of the datasheet's version.
+    superseded
+        The revoked version.
+
+    """
     return {"version": version, "supersedes": superseded}
 
 
@@ -128,6 +202,22 @@ def fit_parts(
 
     Its code, the captures as they were read, its options, the constants that it uses, and the
     revocations of a version that was made of such fits (`revoked`).
+
+    Parameters
+    ----------
+    code
+        Version of the code.
+    libraries
+        Versions of the libraries.
+    campaign
+        The result of `campaign_key`.
+    options
+        Options of the estimator.
+    known
+        Constants that the estimator uses.
+    revoked
+        Revocations of versions that were made of these results.
+
     """
     return {
         "code": code,
@@ -153,6 +243,24 @@ def model_parts(
 
     The code of criticism, the captures as they were read, the model, the constants that it starts
     from, the revocations, as for fits, and whether what is missing is searched for.
+
+    Parameters
+    ----------
+    code
+        Version of the code.
+    libraries
+        Versions of the libraries.
+    campaign
+        The result of `campaign_key`.
+    model
+        The model and its effects.
+    start
+        Constants that the fit starts from.
+    revoked
+        Revocations of versions that were made of these results.
+    search
+        Whether missing effects are searched for.
+
     """
     return {
         "code": code,

@@ -30,7 +30,16 @@ class ModelMemory:
         self._revoked = [revoked for revoked in job.revoked if revoked.version == stamp.version]
 
     def key(self, model: ModelSpec, start: Constants) -> str:
-        """The key of everything that the verdict depends on."""
+        """The key of everything that the verdict depends on.
+
+        Parameters
+        ----------
+        model
+            The model and its effects.
+        start
+            Constants that the fit starts from.
+
+        """
         code, libraries = closure_digest(TEST), libraries_version(TEST)
         known = start.estimates
         search, revoked = self._search, self._revoked
@@ -39,12 +48,28 @@ class ModelMemory:
         )
 
     def recall(self, key: str) -> ModelVerdict | None:
-        """The cached verdict of this key, else None."""
+        """The cached verdict of this key, else None.
+
+        Parameters
+        ----------
+        key
+            The key, a digest of all that the result depends on.
+
+        """
         entry = read_checksummed(self._path)
         if entry is None or entry["key"] != key:
             return None
         return ModelVerdict.of(entry["model"])
 
     def keep(self, key: str, verdict: ModelVerdict) -> None:
-        """Stores a verdict; a place that cannot be written is no failure."""
+        """Stores a verdict; a place that cannot be written is no failure.
+
+        Parameters
+        ----------
+        key
+            The key, a digest of all that the result depends on.
+        verdict
+            The verdict.
+
+        """
         keep_checksummed(self._path, {"key": key, "model": verdict.document()})

@@ -31,7 +31,16 @@ FOLDER = ".cache"
 
 
 def motor_note(output: Path, motor_id: str) -> Path:
-    """The cache entry of a finished motor."""
+    """The cache entry of a finished motor.
+
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+    motor_id
+        The motor.
+
+    """
     return output / FOLDER / "motors" / f"{file_stem(motor_id)}.json"
 
 
@@ -47,7 +56,20 @@ class Batch:
 
 
 def note_motor(output: Path, motor_id: str, key: str, finished: Finished) -> None:
-    """Records that a motor is done; its files are on the disk already."""
+    """Records that a motor is done; its files are on the disk already.
+
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+    motor_id
+        The motor.
+    key
+        The key, a digest of all that the result depends on.
+    finished
+        What the motor came to.
+
+    """
     keep_checksummed(
         motor_note(output, motor_id),
         {
@@ -62,6 +84,16 @@ def note_files(output: Path, motor_id: str, files: Files) -> None:
     """Updates the digests of a finished motor's files; does nothing without an entry.
 
     An entry that cannot be written is no failure: the motor is then processed again.
+
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+    motor_id
+        The motor.
+    files
+        Digest of each file by name.
+
     """
     path = motor_note(output, motor_id)
     entry = read_checksummed(path)
@@ -92,7 +124,20 @@ class RunCache:
         *,
         recover: bool,
     ) -> dict[int, Answer]:
-        """Answers by the number of the question, for files that have not changed."""
+        """Answers by the number of the question, for files that have not changed.
+
+        Parameters
+        ----------
+        questions
+            One a file: the file and its row of the manifest.
+        sources
+            Source maps by name.
+        limits
+            Time [s] and memory [MB] that reading one file may take.
+        recover
+            Whether damaged MCAP files are read up to the damage.
+
+        """
         entries = (read_checksummed(self._notes / "survey.json") if self.on else None) or {}
         self._context = partial(
             answer_parts, tools(SURVEY), sources=sources, limits=limits, recover=recover
@@ -107,7 +152,16 @@ class RunCache:
         return known
 
     def keep_answers(self, questions: Sequence[Question], answers: Sequence[Answer]) -> None:
-        """Stores the survey's answer on each file."""
+        """Stores the survey's answer on each file.
+
+        Parameters
+        ----------
+        questions
+            One a file: the file and its row of the manifest.
+        answers
+            The answer to each question, in order.
+
+        """
         if not self.on:
             return
         notes = {}
@@ -131,7 +185,16 @@ class RunCache:
         return key_of(self._context(question, sha256, beside))
 
     def finished(self, motor_id: str, key: str) -> Finished | None:
-        """The finished motor of this key, or None where a file of it is missing or changed."""
+        """The finished motor of this key, or None where a file of it is missing or changed.
+
+        Parameters
+        ----------
+        motor_id
+            The motor.
+        key
+            The motor's key.
+
+        """
         entry = read_checksummed(motor_note(self._notes.parent, motor_id)) if self.on else None
         if entry is None or entry["key"] != key:
             return None
@@ -141,7 +204,14 @@ class RunCache:
         return Finished(tuple(record_of(Finding, f) for f in entry["findings"]), files)
 
     def outcome(self, key: str) -> Batch | None:
-        """The finished batch of this key, or None where a file of it is missing or changed."""
+        """The finished batch of this key, or None where a file of it is missing or changed.
+
+        Parameters
+        ----------
+        key
+            The key, a digest of all that the result depends on.
+
+        """
         entry = read_checksummed(self._notes / "run.json") if self.on else None
         if entry is None or entry["key"] != key:
             return None
@@ -154,7 +224,18 @@ class RunCache:
         return Batch(outcome, tuple(contents))
 
     def keep_outcome(self, key: str, batch: Batch, files: Files) -> None:
-        """Stores a batch that ended without an error."""
+        """Stores a batch that ended without an error.
+
+        Parameters
+        ----------
+        key
+            The key, a digest of all that the result depends on.
+        batch
+            What the batch came to.
+        files
+            Digest of each file by name.
+
+        """
         if not self.on:
             return
         self._note_outputs(files)
@@ -170,7 +251,14 @@ class RunCache:
         keep_checksummed(self._notes / "run.json", entry)
 
     def forget_others(self, motors: Sequence[str]) -> None:
-        """Removes the entries of motors that are no longer in the batch."""
+        """Removes the entries of motors that are no longer in the batch.
+
+        Parameters
+        ----------
+        motors
+            The motors of the batch.
+
+        """
         wanted = {motor_note(self._notes.parent, motor_id).name for motor_id in motors}
         for path in (self._notes / "motors").glob("*.json") if self.on else ():
             if path.name not in wanted:

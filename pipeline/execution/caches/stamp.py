@@ -17,7 +17,16 @@ from pipeline.settings import RunSettings, result_document
 
 
 def stamp_of(job: MotorJob, campaign: Campaign) -> Stamp:
-    """The version of a motor's datasheet, with the parts of its digest."""
+    """The version of a motor's datasheet, with the parts of its digest.
+
+    Parameters
+    ----------
+    job
+        What to do with one motor, and how.
+    campaign
+        The captures of one motor.
+
+    """
     readings = tuple(content_digest(capture) for capture in campaign.captures)
     code, libraries = datasheet_code(), datasheet_libraries()
     given = campaign_key(campaign, readings)
@@ -34,8 +43,20 @@ def configuration_digest(
 ) -> str:
     """Digest of the settings that can change a result.
 
-    It covers the conditions of a release, and the source maps that the captures need.
-    The limits of a lot change no datasheet.
+    It covers the conditions of a release, and the source maps that the captures need. The limits of
+    a lot change no datasheet.
+
+    Parameters
+    ----------
+    settings
+        The keys of `run`.
+    required
+        Constants that a release needs.
+    sources
+        The source map of each capture, None for one in the contract's form.
+    model_gates
+        Whether a model that lacks something prevents a release.
+
     """
     conditions = {"required": tuple(required), "model_gates": model_gates}
     work = canonical_json({**result_document(settings), **conditions})

@@ -23,5 +23,12 @@ def datasheet_libraries() -> str:
 
 
 def tools(module: str) -> str:
-    """Version of a module's code with everything that it imports, and of its libraries."""
+    """Version of a module's code with everything that it imports, and of its libraries.
+
+    Parameters
+    ----------
+    module
+        Dotted name of the module.
+
+    """
     return f"{closure_digest(module)}; {libraries_version(module)}"

@@ -61,7 +61,17 @@ def links_of(
 ) -> tuple[Link, ...]:
     """The links of a page of `output`: a key of the table above, of a motor where it has one.
 
-    `coming` are files that are not there yet and will be when the page is.
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+    page
+        Kind of the page.
+    motor_id
+        The motor, empty for a page of all motors.
+    coming
+        Files that do not exist yet and will when the page does.
+
     """
     stem = file_stem(motor_id) if motor_id else ""
     found = []
@@ -77,6 +87,16 @@ def relink(output: Path, motor_id: str, but: Collection[str] = ()) -> dict[str, 
 
     What a run keeps of its work learns of its own pages: they are still what that work came to.
     Pages of the kinds `but` are left alone.
+
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+    motor_id
+        The motor.
+    but
+        Kinds of pages that are left alone.
+
     """
     changed: dict[str, str] = {}
     for page in _OF_PAGE:
@@ -89,7 +109,14 @@ def relink(output: Path, motor_id: str, but: Collection[str] = ()) -> dict[str, 
 
 
 def relink_index(output: Path) -> None:
-    """Rewrites the page of all motors where its links are out of date."""
+    """Rewrites the page of all motors where its links are out of date.
+
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+
+    """
     _relinked(output, INDEX, links_of(output, INDEX))
 
 

@@ -58,7 +58,18 @@ Others = Mapping[str, tuple[str, ...]]
 
 
 def other_motors(output: Path, batch: Collection[str], *, prune: bool) -> Others:
-    """The motors of earlier runs that stay in an output: none with `prune`."""
+    """The motors of earlier runs that stay in an output: none with `prune`.
+
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+    batch
+        The motors of this run.
+    prune
+        Whether motors of earlier runs are removed.
+
+    """
     listed = {} if prune else _manifest(output).get("motors")
     others = {}
     for motor_id, names in listed.items() if isinstance(listed, dict) else ():
@@ -75,6 +86,16 @@ def fleet_of(output: Path, results: Sequence[MotorResult], others: Others) -> Fl
     """The datasheets of an output, read back from where they were written.
 
     Only what belongs to the batch is kept of each, or memory would grow with the batch.
+
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+    results
+        What each motor came to.
+    others
+        Motors of earlier runs that stay in the output.
+
     """
     from pipeline.views.tables import constants_frame, fleet_files
 
@@ -105,8 +126,26 @@ def publish(
 ) -> tuple[Files, tuple[str, ...]]:
     """Writes the outputs of the batch, then removes the outdated files of an earlier run.
 
-    `statuses` are the current ones by motor; the files of `others` stay.
-    Returns every file of the batch, and the names of the removed files.
+    Parameters
+    ----------
+    settings
+        The keys of `run`.
+    results
+        What each motor came to.
+    fleet
+        What the fleet's outputs need of each datasheet.
+    findings
+        What was refused or is doubtful.
+    statuses
+        Current status of each motor.
+    others
+        Motors of earlier runs that stay in the output.
+
+    Returns
+    -------
+    tuple
+        Every file of the batch, and the names of the removed files.
+
     """
     output = Path(settings.output)
     files: list[tuple[str, str]] = []
@@ -157,7 +196,16 @@ def _sweep(output: Path, files: Sequence[str]) -> tuple[str, ...]:
 
 
 def removed_note(removed: Sequence[str], output: str) -> tuple[str, ...]:
-    """A line that counts and names the removed files of an earlier run."""
+    """A line that counts and names the removed files of an earlier run.
+
+    Parameters
+    ----------
+    removed
+        Names of the removed files.
+    output
+        The output folder, as the user named it.
+
+    """
     if not removed:
         return ()
     names = ", ".join(removed[:MOST_NAMED]) + (", ..." if len(removed) > MOST_NAMED else "")
@@ -165,7 +213,16 @@ def removed_note(removed: Sequence[str], output: str) -> tuple[str, ...]:
 
 
 def others_note(others: Others, output: str) -> tuple[str, ...]:
-    """A line that counts and names the motors of earlier runs that the output still holds."""
+    """A line that counts and names the motors of earlier runs that the output still holds.
+
+    Parameters
+    ----------
+    others
+        Motors of earlier runs that stay in the output.
+    output
+        The output folder, as the user named it.
+
+    """
     if not others:
         return ()
     names = ", ".join([printable(one) for one in sorted(others)][:MOST_NAMED])
@@ -218,7 +275,22 @@ def outcome_of(
     *,
     report: bool,
 ) -> Outcome:
-    """The text and exit code of the command; `with_folder_names` fills in the folders."""
+    """The text and exit code of the command; `with_folder_names` fills in the folders.
+
+    Parameters
+    ----------
+    datasheets
+        The datasheets of the batch.
+    findings
+        What was refused or is doubtful.
+    survey
+        What the input folder holds.
+    statuses
+        Current status of each motor.
+    report
+        Whether pages are written.
+
+    """
     outcomes = [{check.status for check in sheet.checks} for sheet in datasheets]
     refused = any(finding.severity == "refused" for finding in findings)
     code = first_that_applies(
@@ -239,6 +311,14 @@ def with_folder_names(outcome: Outcome, settings: RunSettings) -> Outcome:
     """The outcome with the names of the folders, which the cache does not hold.
 
     In a command a name stands quoted where a shell asks for it.
+
+    Parameters
+    ----------
+    outcome
+        The outcome.
+    settings
+        The keys of `run`.
+
     """
 
     def name(text: str) -> str:

@@ -31,7 +31,14 @@ Statuses = Mapping[str, CurrentStatus]
 
 
 def histories_of(registry: Registry | None) -> Histories:
-    """The versions of each motor; empty without a registry, or where it cannot be read."""
+    """The versions of each motor; empty without a registry, or where it cannot be read.
+
+    Parameters
+    ----------
+    registry
+        The registry; None for none.
+
+    """
     if registry is None:
         return {}
     try:
@@ -41,7 +48,18 @@ def histories_of(registry: Registry | None) -> Histories:
 
 
 def status_now(output: Path, sheet: Datasheet, versions: Histories) -> CurrentStatus:
-    """The current status of a datasheet of an output folder."""
+    """The current status of a datasheet of an output folder.
+
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+    sheet
+        The datasheet.
+    versions
+        Versions of each motor, oldest first.
+
+    """
     name = output / "datasheets" / f"{file_stem(sheet.motor_id)}.json"
     sha256 = hashlib.sha256(name.read_bytes()).hexdigest()
     return current_status(sheet, versions.get(sheet.motor_id, ()), sha256)
@@ -52,7 +70,20 @@ def with_current_statuses(
 ) -> tuple[list[MotorResult], Statuses]:
     """Rewrites the pages whose status is out of date.
 
-    Returns the results with the new digests, and the current status of each motor.
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+    results
+        What each motor came to.
+    versions
+        Versions of each motor, oldest first.
+
+    Returns
+    -------
+    tuple
+        The results with the new digests, and the current status of each motor.
+
     """
     updated, statuses = [], {}
     for result in results:
@@ -92,10 +123,27 @@ def _rewritten(output: Path, sheet: Datasheet, current: CurrentStatus) -> dict[s
 
 
 def show_decision(registry: Registry, motor_id: str) -> tuple[str, ...]:
-    """Rewrites the pages that show a motor in the output folder of a registry; returns their names.
+    """Rewrites the pages that show a motor in the output folder of a registry.
 
     Does nothing for a registry outside an output folder, or a motor that is not in the output.
-    Raises MachineError where a page cannot be written.
+
+    Parameters
+    ----------
+    registry
+        The registry.
+    motor_id
+        The motor.
+
+    Returns
+    -------
+    tuple
+        Their names.
+
+    Raises
+    ------
+    MachineError
+        A page cannot be written.
+
     """
     output = None if "://" in registry.place else Path(registry.place).parent
     if output is None or not (output / "report").is_dir():

@@ -33,7 +33,16 @@ class ReadTask:
         return f"motor {printable(self.motor_id)}"
 
     def without(self, path: str, reason: str) -> ReadTask:
-        """The task with a file refused for a reason."""
+        """The task with a file refused for a reason.
+
+        Parameters
+        ----------
+        path
+            The file, relative to the input folder.
+        reason
+            The reason, in words.
+
+        """
         return replace(self, refused=(*self.refused, (path, reason)))
 
 
@@ -41,7 +50,16 @@ Usable = tuple[tuple[Capture, ...], tuple[Finding, ...]]
 
 
 def usable_captures(task: ReadTask, watch: Stopwatch | None = None) -> Usable:
-    """The usable captures by path, and the findings on refused or doubtful files."""
+    """The usable captures by path, and the findings on refused or doubtful files.
+
+    Parameters
+    ----------
+    task
+        The files of one motor, and how to read them.
+    watch
+        Takes the time of each stage [s]; None for no timing.
+
+    """
     from pipeline.contracts.duplicates import once
     from pipeline.contracts.validate import validate
     from pipeline.io.ingest.capture_reader import read_capture

@@ -42,7 +42,16 @@ class InspectTask:
         return Path(self.folder) / self.file
 
     def without(self, path: str, reason: str) -> InspectTask:  # noqa: ARG002 (it has one file)
-        """The task with its file refused for a reason."""
+        """The task with its file refused for a reason.
+
+        Parameters
+        ----------
+        path
+            The file, relative to the input folder.
+        reason
+            The reason, in words.
+
+        """
         return replace(self, refused=reason)
 
 
@@ -56,7 +65,21 @@ class Looked:
 
 
 def in_workers(work: Callable[[Any], Any], tasks: Sequence[Any]) -> list[Any]:
-    """The results of tasks in workers, in their order; raises MachineError where one cannot be."""
+    """The results of tasks in workers, in their order.
+
+    Parameters
+    ----------
+    work
+        What is done with a task; importable in a worker.
+    tasks
+        The tasks.
+
+    Raises
+    ------
+    MachineError
+        One cannot be.
+
+    """
     pool = open_pool("local", Cluster())
     count = min(core_count(), len(tasks)) or 1
     with (
@@ -74,6 +97,12 @@ def look_into(task: InspectTask) -> Looked:
     """What a file holds, and the lines by which `run` would refuse it.
 
     In a worker, under its limits.
+
+    Parameters
+    ----------
+    task
+        The file, and how to read it.
+
     """
     from pipeline.io.inspection.describe import describe
     from pipeline.io.maps.places import source_maps

@@ -29,13 +29,38 @@ class Verdicts(Protocol):
     """A cache of verdicts, by a key of everything that they depend on."""
 
     def key(self, model: ModelSpec, start: Constants) -> str:
-        """The key of a model that is compared with the captures from these constants."""
+        """The key of a model that is compared with the captures from these constants.
+
+        Parameters
+        ----------
+        model
+            The model and its effects.
+        start
+            Constants that the fit starts from.
+
+        """
 
     def recall(self, key: str) -> ModelVerdict | None:
-        """The verdict of a key, or None."""
+        """The verdict of a key, or None.
+
+        Parameters
+        ----------
+        key
+            The key, a digest of all that the result depends on.
+
+        """
 
     def keep(self, key: str, verdict: ModelVerdict) -> None:
-        """Stores a verdict."""
+        """Stores a verdict.
+
+        Parameters
+        ----------
+        key
+            The key, a digest of all that the result depends on.
+        verdict
+            The verdict.
+
+        """
 
 
 def judged_model(
@@ -48,9 +73,27 @@ def judged_model(
     """The verdict on a model of one motor, `not_tested` for None.
 
     `diagnose` is the key of a run: `true` gives the diagnosis as well, which no memory holds;
-    `false` searches for no effects where that some are missing is sure without.
-    A test that fails on some captures does not stop the datasheet. Raises UsageError for an
-    unknown model or effect.
+    `false` searches for no effects where that some are missing is sure without. A test that fails
+    on some captures does not stop the datasheet.
+
+    Parameters
+    ----------
+    campaign
+        The captures of one motor.
+    model
+        The model and its effects; None for no test.
+    constants
+        The fitted constants.
+    memory
+        Cache of verdicts; None for no cache.
+    diagnose
+        The key `diagnose` of `run`: `auto`, `true` or `false`.
+
+    Raises
+    ------
+    UsageError
+        An unknown model or effect.
+
     """
     if model is None:
         return Tested(SWITCHED_OFF)

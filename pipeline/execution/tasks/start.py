@@ -12,6 +12,14 @@ def start_constants(campaign: Campaign, fitted: Constants | None = None) -> Cons
     """The constants from which criticism starts.
 
     Empty where the nameplate or a spin gives the pole pairs, else `fitted`, fitted now if None.
+
+    Parameters
+    ----------
+    campaign
+        The captures of one motor.
+    fitted
+        Constants that were fitted before; None to fit them now.
+
     """
     if campaign.nameplate("pole_pairs") is not None or counted_pole_pairs(campaign) is not None:
         return Constants()

@@ -35,12 +35,28 @@ class SurveyTask:
         return f"the survey of {self.questions[0].path} and {len(self.questions) - 1} more files"
 
     def without(self, path: str, reason: str) -> SurveyTask:
-        """The task with a file refused for a reason."""
+        """The task with a file refused for a reason.
+
+        Parameters
+        ----------
+        path
+            The file, relative to the input folder.
+        reason
+            The reason, in words.
+
+        """
         return replace(self, refused=(*self.refused, (path, reason)))
 
 
 def survey_files(task: SurveyTask) -> tuple[Answer, ...]:
-    """The answers to a task's questions, in their order."""
+    """The answers to a task's questions, in their order.
+
+    Parameters
+    ----------
+    task
+        The files, and how to read them.
+
+    """
     folder, refused = Path(task.folder), dict(task.refused)
     answers = []
     for question in task.questions:
@@ -64,7 +80,29 @@ def survey_with(
     *,
     recover: bool,
 ) -> list[Answer]:
-    """The answers of the workers; raises MachineError where a batch of files fails as a whole."""
+    """The answers of the workers.
+
+    Parameters
+    ----------
+    workers
+        The workers.
+    folder
+        The input folder.
+    sources
+        Source maps by name.
+    limits
+        Time [s] and memory [MB] that reading one file may take.
+    questions
+        One a file: the file and its row of the manifest.
+    recover
+        Whether damaged MCAP files are read up to the damage.
+
+    Raises
+    ------
+    MachineError
+        A batch of files fails as a whole.
+
+    """
     share = -(-len(questions) // (4 * workers.count)) if questions else 1
     size = min(max(share, SMALLEST_BATCH), LARGEST_BATCH)
     tasks = [

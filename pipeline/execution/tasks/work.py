@@ -63,7 +63,16 @@ class Judged:
 
 
 def read(job: MotorJob, watch: Stopwatch) -> Usable:
-    """The motor's usable captures by path, and the findings on refused or doubtful files."""
+    """The motor's usable captures by path, and the findings on refused or doubtful files.
+
+    Parameters
+    ----------
+    job
+        What to do with one motor, and how.
+    watch
+        Takes the time of each stage [s].
+
+    """
     task = ReadTask(job.motor_id, job.input, job.entries, job.limits, job.gates, job.refused)
     return usable_captures(task, watch)
 
@@ -78,6 +87,20 @@ def judge(
     """Fits every estimator, makes every check, and compares the model with the captures.
 
     Results that `recall` and `verdicts` have cached are not computed again.
+
+    Parameters
+    ----------
+    job
+        What to do with one motor, and how.
+    campaign
+        The captures of one motor.
+    recall
+        Cache of the estimators' fits; None for no cache.
+    verdicts
+        Cache of verdicts; None for no cache.
+    watch
+        Takes the time of each stage [s].
+
     """
     with watch.stage("fit"):
         constants, evidence, failures = fit_all(campaign, job.fit, recall)
@@ -94,7 +117,22 @@ def check(
     verdicts: Verdicts | None,
     watch: Stopwatch,
 ) -> Judged:
-    """Makes every check of fitted constants, and compares the model with the captures."""
+    """Makes every check of fitted constants, and compares the model with the captures.
+
+    Parameters
+    ----------
+    job
+        What to do with one motor, and how.
+    campaign
+        The captures of one motor.
+    constants
+        The fitted constants.
+    verdicts
+        Cache of verdicts; None for no cache.
+    watch
+        Takes the time of each stage [s].
+
+    """
     with watch.stage("crosscheck"):
         apart = disagreements_between_captures(campaign, job.fit)
         checks = check_all(constants, campaign, job.crosscheck, apart)
@@ -110,6 +148,14 @@ def disagreements_between_captures(
     """Disagreements between captures that are not of one motor.
 
     Constants that one capture alone determines show which motor the majority is of.
+
+    Parameters
+    ----------
+    campaign
+        The captures of one motor.
+    options
+        Options by estimator.
+
     """
     for captures in (alone.repeated(campaign), campaign.captures):
         apart = agreement.disagreements(alone.readings(campaign.motor_id, captures, options))
@@ -119,7 +165,20 @@ def disagreements_between_captures(
 
 
 def assemble(job: MotorJob, campaign: Campaign, judged: Judged, stamp: Stamp) -> Datasheet:
-    """The datasheet of one motor."""
+    """The datasheet of one motor.
+
+    Parameters
+    ----------
+    job
+        What to do with one motor, and how.
+    campaign
+        The captures of one motor.
+    judged
+        Constants, checks and verdict of the motor.
+    stamp
+        The version and the parts of its digest.
+
+    """
     references = references_of(campaign, stamp.readings)
     chosen = _with_notes(judged.constants.chosen(), judged.model)
     status, why = verdict(
@@ -159,7 +218,16 @@ def _with_notes(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[
 
 
 def references_of(campaign: Campaign, readings: Sequence[str]) -> tuple[CaptureReference, ...]:
-    """The captures as a datasheet names them."""
+    """The captures as a datasheet names them.
+
+    Parameters
+    ----------
+    campaign
+        The captures of one motor.
+    readings
+        Digests of the captures as they were read.
+
+    """
     return tuple(
         CaptureReference(
             c.path, c.sha256, c.meta.test, c.integrity, c.meta.station, c.meta.started_at, reading
@@ -169,5 +237,12 @@ def references_of(campaign: Campaign, readings: Sequence[str]) -> tuple[CaptureR
 
 
 def content_of(sheet: Datasheet) -> bytes:
-    """The bytes of a datasheet's file."""
+    """The bytes of a datasheet's file.
+
+    Parameters
+    ----------
+    sheet
+        The datasheet.
+
+    """
     return canonical_json(sheet.document())

@@ -49,7 +49,21 @@ class Cluster:
 
 
 def open_pool(executor: str, cluster: Cluster) -> OpenPool:
-    """How to open a pool of a kind, `local` or `dask`; raises UsageError for any other."""
+    """How to open a pool of a kind, `local` or `dask`.
+
+    Parameters
+    ----------
+    executor
+        `local` or `dask`.
+    cluster
+        Address and certificates of a Dask cluster.
+
+    Raises
+    ------
+    UsageError
+        Any other.
+
+    """
     if executor == "local":
         if cluster != Cluster():
             raise UsageError("a scheduler or TLS file is named", "add executor=dask")
@@ -79,7 +93,14 @@ def core_count() -> int:
 
 @contextmanager
 def local_pool(workers: int) -> Iterator[Pool]:
-    """Spawned processes of this machine; the driver itself reads no untrusted file."""
+    """Spawned processes of this machine; the driver itself reads no untrusted file.
+
+    Parameters
+    ----------
+    workers
+        Number of processes.
+
+    """
     share = str(max(1, core_count() // max(workers, 1)))
     context = _Context()
     executor = ProcessPoolExecutor(workers, context, begin_worker, (share,))

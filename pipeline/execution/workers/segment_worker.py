@@ -48,7 +48,18 @@ class SegmentWorker:
     def share(
         self, work: Work, segments: Sequence[Segment], arguments: Sequence[tuple[Any, ...]]
     ) -> tuple[Any, ...]:
-        """`work(segment, *arguments)` of every segment, in order; the worker does half of them."""
+        """`work(segment, *arguments)` of every segment, in order; the worker does half of them.
+
+        Parameters
+        ----------
+        work
+            What is done with a segment; importable in a worker.
+        segments
+            The segments.
+        arguments
+            Further arguments for each segment.
+
+        """
         if self._executor is None or len(segments) < 2:
             return by_threads(work, segments, arguments)
         local, remote = halves(self._costs(segments))
@@ -87,7 +98,14 @@ class SegmentWorker:
 
 @contextmanager
 def segment_worker(effects_path: str | None) -> Iterator[SegmentWorker]:
-    """A worker that has loaded the effects; no process where only one core may be used."""
+    """A worker that has loaded the effects; no process where only one core may be used.
+
+    Parameters
+    ----------
+    effects_path
+        Folder of the user's effects; None without any.
+
+    """
     if core_count() < 2:
         yield SegmentWorker(None)
         return
@@ -97,7 +115,14 @@ def segment_worker(effects_path: str | None) -> Iterator[SegmentWorker]:
 
 
 def halves(sizes: Sequence[float]) -> tuple[list[int], list[int]]:
-    """Indices in two shares of about equal total size; the largest is assigned first."""
+    """Indices in two shares of about equal total size; the largest is assigned first.
+
+    Parameters
+    ----------
+    sizes
+        Size of each item.
+
+    """
     shares: tuple[list[int], list[int]] = [], []
     loads = [0.0, 0.0]
     for n in sorted(range(len(sizes)), key=lambda n: -sizes[n]):

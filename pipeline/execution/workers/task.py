@@ -38,6 +38,16 @@ def perform(function: Callable[[Any], Any], task: Any, progress: str | None) -> 
     """Runs `function(task)` with its warnings and log lines collected.
 
     An error is part of the report, not raised, so that its log lines are not lost.
+
+    Parameters
+    ----------
+    function
+        What is done with a task; importable in a worker.
+    task
+        The task.
+    progress
+        Folder of the progress files; None for none.
+
     """
     logged: list[tuple[int, str]] = []
     value: Any = None
@@ -75,6 +85,12 @@ def begin_worker(threads: str) -> None:
 
     Polars runs every query in threads of its own, and those of several workers would compete.
     Garbage is collected less often.
+
+    Parameters
+    ----------
+    threads
+        Number of threads of this worker.
+
     """
     os.environ.setdefault("POLARS_MAX_THREADS", threads)
     gc.set_threshold(GARBAGE_ROUND)

@@ -42,7 +42,16 @@ class Task(Protocol):
         ...
 
     def without(self, path: str, reason: str) -> Self:
-        """The task with a file refused for a reason."""
+        """The task with a file refused for a reason.
+
+        Parameters
+        ----------
+        path
+            The file, relative to the input folder.
+        reason
+            The reason, in words.
+
+        """
         ...
 
 
@@ -78,8 +87,24 @@ class WorkerPool:
     ) -> list[Any]:
         """`function` of each task, in the order of the tasks; a MachineError for one that failed.
 
-        `done(index, value)` is called as results arrive. Raises the PipelineError of a task, as a
-        full disk affects the next task too, and MachineError where no worker begins a task.
+        `done(index, value)` is called as results arrive.
+
+        Parameters
+        ----------
+        function
+            What is done with a task; importable in a worker.
+        tasks
+            The tasks.
+        done
+            Called as `done(index, value)` as results arrive.
+
+        Raises
+        ------
+        the
+            PipelineError of a task, as a full disk affects the next task too.
+        MachineError
+            No worker begins a task.
+
         """
         results: list[Any] = [None] * len(tasks)
         pending = list(range(len(tasks)))

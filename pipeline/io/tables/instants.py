@@ -32,7 +32,20 @@ def instants(texts: Any, form: str) -> Any:
 def seconds_of(texts: Any, name: str, form: str) -> NDArray[np.float64]:
     """Seconds from the first row [rows]; a time of day goes on past midnight.
 
-    Raises CaptureError for a text that is not of the form.
+    Parameters
+    ----------
+    texts
+        The texts of a column [rows].
+    name
+        Name of the column, for messages.
+    form
+        Name of the form of time.
+
+    Raises
+    ------
+    CaptureError
+        A text that is not of the form.
+
     """
     times = instants(texts, form)
     wrong = np.flatnonzero((times.is_null() & texts.is_not_null()).to_numpy())

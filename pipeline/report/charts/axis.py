@@ -30,11 +30,25 @@ class Axis:
     title: str
 
     def pixels(self, values: Array) -> Array:
-        """Where values [n, data unit] lie [n, px]."""
+        """Where values [n, data unit] lie [n, px].
+
+        Parameters
+        ----------
+        values
+            The values [n, data unit].
+
+        """
         return self.start + (values - self.low) * ((self.end - self.start) / (self.high - self.low))
 
     def pixel(self, value: float) -> float:
-        """Where one value [data unit] lies [px]."""
+        """Where one value [data unit] lies [px].
+
+        Parameters
+        ----------
+        value
+            The value [data unit].
+
+        """
         return float(self.pixels(np.array([value]))[0])
 
     def labels(self) -> tuple[str, ...]:
@@ -48,6 +62,22 @@ def axis_for(name: str, low: float, high: float, start: float, end: float, count
     """An axis for a quantity named with its unit last, widened to hold a little air.
 
     `count` is about how many ticks there will be; a range of no width is opened around its value.
+
+    Parameters
+    ----------
+    name
+        Name of the quantity, ending in its unit.
+    low
+        Lower end [data unit].
+    high
+        Upper end [data unit].
+    start
+        Where the axis begins [px].
+    end
+        Where the axis ends [px].
+    count
+        About how many ticks there are.
+
     """
     low, high = _open(low, high)
     unit = unit_of(name)
@@ -58,7 +88,20 @@ def axis_for(name: str, low: float, high: float, start: float, end: float, count
 
 
 def symmetric_axis(name: str, reach: float, start: float, end: float) -> Axis:
-    """An axis from -reach to reach with three ticks, for residuals."""
+    """An axis from -reach to reach with three ticks, for residuals.
+
+    Parameters
+    ----------
+    name
+        Name of the glossary, ending in its unit.
+    reach
+        Value at the ends [data unit].
+    start
+        Where the axis begins [px].
+    end
+        Where the axis ends [px].
+
+    """
     reach = reach if reach > 0.0 and math.isfinite(reach) else 1.0
     step = _step(reach, degrees=False)
     step = step if step <= reach else _step(reach / 2, degrees=False)
@@ -68,7 +111,18 @@ def symmetric_axis(name: str, reach: float, start: float, end: float) -> Axis:
 
 
 def padded(low: float, high: float, share: float = 0.05) -> tuple[float, float]:
-    """The range with a share of its width added on both sides."""
+    """The range with a share of its width added on both sides.
+
+    Parameters
+    ----------
+    low
+        Lower end [data unit].
+    high
+        Upper end [data unit].
+    share
+        Share of the width that is added on each side [1].
+
+    """
     air = share * (high - low)
     return low - air, high + air
 

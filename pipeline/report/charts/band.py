@@ -18,6 +18,14 @@ def extremes(x_px: Array, y_px: Array) -> tuple[Array, Array, Array] | None:
     """Middle, top and bottom [C, px] of the columns of a dense trace; None for any other.
 
     `x_px`, `y_px` are [n], x rising; samples that are not finite are left out.
+
+    Parameters
+    ----------
+    x_px
+        Places across [n, px], rising.
+    y_px
+        Places down [n, px].
+
     """
     fine = np.isfinite(x_px) & np.isfinite(y_px)
     x, y = x_px[fine], y_px[fine]
@@ -34,7 +42,16 @@ def extremes(x_px: Array, y_px: Array) -> tuple[Array, Array, Array] | None:
 
 
 def filled(x_px: Array, y_px: Array) -> str:
-    """The path of the band, closed between its gaps; empty where the trace is not dense."""
+    """The path of the band, closed between its gaps; empty where the trace is not dense.
+
+    Parameters
+    ----------
+    x_px
+        Places across [n, px], rising.
+    y_px
+        Places down [n, px].
+
+    """
     return "".join(
         f"{_path(x, top)}L{_path(x[::-1], bottom[::-1])[1:]}Z"
         for x, top, bottom in _runs(x_px, y_px)
@@ -42,7 +59,16 @@ def filled(x_px: Array, y_px: Array) -> str:
 
 
 def outlined(x_px: Array, y_px: Array) -> str:
-    """The path of the band's two edges, so that another shows through; empty as above."""
+    """The path of the band's two edges, so that another shows through; empty as above.
+
+    Parameters
+    ----------
+    x_px
+        Places across [n, px], rising.
+    y_px
+        Places down [n, px].
+
+    """
     return "".join(_path(x, top) + _path(x, bottom) for x, top, bottom in _runs(x_px, y_px))
 
 

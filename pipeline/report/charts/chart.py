@@ -44,7 +44,16 @@ class Panel:
     y: Axis
 
     def place(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Pixels of points [n]."""
+        """Pixels of points [n].
+
+        Parameters
+        ----------
+        x
+            Places across [n, data unit].
+        y
+            Places down [n, data unit].
+
+        """
         return self.x.pixels(x), self.y.pixels(y)
 
 
@@ -53,6 +62,12 @@ def chart(evidence: Evidence) -> str:
 
     Every series with a fit gets its residual in the lower panel, whose band is two standard
     deviations of the point-to-point noise. Paths carry class and label for the page's read-out.
+
+    Parameters
+    ----------
+    evidence
+        Measured and fitted samples of one plot.
+
     """
     ranges = _ranges(evidence)
     if ranges is None:
@@ -176,7 +191,16 @@ def _fit_line(panel: Panel, x: Array, y: Array, index: int, count: int) -> str:
 
 
 def residual_words(scale: ResidualScale, axis: Axis) -> str:
-    """One line: rms of the residual beside the noise between neighbours, and their ratio."""
+    """One line: rms of the residual beside the noise between neighbours, and their ratio.
+
+    Parameters
+    ----------
+    scale
+        Scatter of the residuals.
+    axis
+        Axis of the residuals.
+
+    """
     unit = axis.scale.unit
     rms = f"rms {axis.scale.shown(scale.rms):.3g} {unit}".strip()
     if scale.noise is None or scale.ratio is None:

@@ -15,7 +15,18 @@ WIDTH, LEFT, RIGHT, TOP, HEIGHT, BOTTOM = 560.0, 62.0, 14.0, 20.0, 200.0, 38.0
 
 
 def curve_chart(variable: str, unit: str, points: Sequence[Mapping[str, float]]) -> str:
-    """SVG of points with `at` [variable], `value`, `low` and `high` [unit], in order of `at`."""
+    """SVG of points with `at` [variable], `value`, `low` and `high` [unit], in order of `at`.
+
+    Parameters
+    ----------
+    variable
+        Name of the variable across.
+    unit
+        Unit of the values.
+    points
+        Points in order of `at`.
+
+    """
     at, value, low, high = (
         np.array([point[key] for point in points]) for key in ("at", "value", "low", "high")
     )

@@ -23,7 +23,14 @@ _COLD, _WARM, _NEUTRAL = (33, 102, 172), (178, 24, 43), 247
 
 
 def colour(share: float) -> str:
-    """Hexadecimal colour of a share from −1 (blue) over 0 (white) to 1 (red)."""
+    """Hexadecimal colour of a share from −1 (blue) over 0 (white) to 1 (red).
+
+    Parameters
+    ----------
+    share
+        From −1 to 1 [1].
+
+    """
     end = _WARM if share > 0 else _COLD
     strength = min(abs(share), 1.0)
     return "#" + "".join(f"{round(_NEUTRAL + (c - _NEUTRAL) * strength):02x}" for c in end)
@@ -33,7 +40,19 @@ def heatmap(error_map: ErrorMap, reach: float) -> str:
     """SVG of a map of x and y; `reach` [unit] is full colour. Cells show their numbers on hover.
 
     A dot marks a cell whose mean chance does not make: p below 0.05 over the number of cells.
-    Raises ValueError for a map of one variable.
+
+    Parameters
+    ----------
+    error_map
+        The map.
+    reach
+        Value at full colour or at the axis' end [unit of the map].
+
+    Raises
+    ------
+    ValueError
+        A map of one variable.
+
     """
     if error_map.y is None:
         raise ValueError("a heat map needs two variables")
@@ -101,7 +120,16 @@ def _scale_bar(error_map: ErrorMap, reach: float, right: float) -> str:
 
 
 def angle_bars(error_map: ErrorMap, reach: float) -> str:
-    """SVG of a signal's mean error over one turn, on an axis from −reach to reach [unit]."""
+    """SVG of a signal's mean error over one turn, on an axis from −reach to reach [unit].
+
+    Parameters
+    ----------
+    error_map
+        The map.
+    reach
+        Value at full colour or at the axis' end [unit of the map].
+
+    """
     x = axis_for("theta_deg", 0.0, 360.0, LEFT, WIDTH - 14.0, 4)
     y = symmetric_axis(error_map.signal, 1.05 * reach, TOP + ANGLE_HEIGHT, TOP)
     edges = x.pixels(np.degrees(np.array(error_map.x.edges)))

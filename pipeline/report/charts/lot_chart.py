@@ -20,7 +20,14 @@ NAME_CHARS = 11
 
 
 def lot_chart(constant: ConstantResult) -> str:
-    """SVG of a constant's lots; an empty text where it has none."""
+    """SVG of a constant's lots; an empty text where it has none.
+
+    Parameters
+    ----------
+    constant
+        The constant's comparison.
+
+    """
     if not constant.lots:
         return ""
     y = _range(constant)
@@ -153,7 +160,16 @@ def _names(lots: Sequence[LotMean], pitch: float) -> str:
 
 
 def cogging_chart(bands: Sequence[CoggingBand], orders: Sequence[OrderLevel]) -> str:
-    """SVG of both sides' cogging torque over the common period of their orders, ± 1 sd."""
+    """SVG of both sides' cogging torque over the common period of their orders, ± 1 sd.
+
+    Parameters
+    ----------
+    bands
+        Cogging torque of each side over the angle.
+    orders
+        Levels of the orders on both sides.
+
+    """
     if not bands:
         return ""
     common = math.gcd(*(level.order for level in orders)) if orders else 1

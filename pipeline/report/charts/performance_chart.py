@@ -20,8 +20,15 @@ AIR = 1.08
 def band_chart(curves: Sequence[Curve], y_name: str, regimes: Sequence[str] = ()) -> str:
     """SVG of curves over one x with their 95 % bands; empty for none.
 
-    `y_name` ends in the unit of all of them; `regimes` name what limits the first at each x, and
-    a stroke stands where that changes.
+    Parameters
+    ----------
+    curves
+        The curves, over one x.
+    y_name
+        Name of the quantity, ending in its unit.
+    regimes
+        What limits the first curve at each x.
+
     """
     if not curves:
         return ""
@@ -85,6 +92,14 @@ def efficiency_chart(cells: Sequence[MapCell], envelope: Curve | None) -> str:
     """SVG of efficiency over speed and shaft torque, a cell an operating point; empty for none.
 
     Cells show speed, torque, efficiency and the losses by place on hover; the line is peak torque.
+
+    Parameters
+    ----------
+    cells
+        The operating points.
+    envelope
+        Peak torque over speed; None for none.
+
     """
     if not cells:
         return ""
@@ -121,6 +136,12 @@ def efficiency_chart(cells: Sequence[MapCell], envelope: Curve | None) -> str:
 def heat_colour(share: float) -> str:
     """Hexadecimal colour of a share from 0 (dark blue) over green to 1 (yellow), of even steps in
     lightness; shares beyond are the ends.
+
+    Parameters
+    ----------
+    share
+        From 0 to 1 [1].
+
     """
     stops = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)])
     place = min(max(share, 0.0), 1.0) * (len(stops) - 1)

@@ -35,7 +35,14 @@ FEWEST = 5
 
 
 def residual_of(series: Series) -> Array:
-    """What the fit left over, measured - fitted [n]; empty where the series has no fit."""
+    """What the fit left over, measured - fitted [n]; empty where the series has no fit.
+
+    Parameters
+    ----------
+    series
+        Measured and fitted samples.
+
+    """
     if series.fitted.size == 0:
         return np.empty(0)
     with np.errstate(invalid="ignore"):
@@ -45,9 +52,15 @@ def residual_of(series: Series) -> Array:
 def residual_scale(series: Iterable[Series]) -> ResidualScale | None:
     """Scatter of the residuals of several series, each in order of x; None without any fit.
 
-    The noise is the root of half the mean squared difference of neighbours, which a smooth
-    misfit hardly moves. Reference: J. von Neumann, R. H. Kent, H. R. Bellinson, B. I. Hart,
-    "The mean square successive difference", Ann. Math. Statist. 12 (1941) 153-162.
+    The noise is the root of half the mean squared difference of neighbours, which a smooth misfit
+    hardly moves. Reference: J. von Neumann, R. H. Kent, H. R. Bellinson, B. I. Hart, "The mean
+    square successive difference", Ann. Math. Statist. 12 (1941) 153-162.
+
+    Parameters
+    ----------
+    series
+        Measured and fitted samples, each in order of x.
+
     """
     values, steps = [], []
     for one in series:

@@ -21,6 +21,14 @@ def step_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
 
     `names` are the steps in words. The band below 1 is the noise floor. What is below `LEAST`
     stands at the foot with an arrow.
+
+    Parameters
+    ----------
+    names
+        The steps in words.
+    over
+        Error over noise floor of each signal [steps].
+
     """
     finite = [max(v, LEAST) for values in over.values() for v in values if math.isfinite(v)]
     if not finite or not names:

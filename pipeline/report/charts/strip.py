@@ -31,6 +31,16 @@ def strip_plot(name: str, unit: str, rows: Sequence[tuple[str, Sequence[Dot]]]) 
     """SVG of (lot, motors) rows: a dot a motor with its ±U, an orange stroke at the lot's median.
 
     `name` ends in its unit, from which the axis is built; dots link to their motors' pages.
+
+    Parameters
+    ----------
+    name
+        Name of the constant, ending in its unit.
+    unit
+        Unit that the numbers are shown in.
+    rows
+        Lot and dots of each row.
+
     """
     dots = [dot for _, members in rows for dot in members]
     reach = [(d.value - _expanded(d), d.value + _expanded(d)) for d in dots]

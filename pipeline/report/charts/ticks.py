@@ -8,7 +8,18 @@ from pipeline.report.charts.axis import Axis
 
 
 def x_ticks(x: Axis, below: float, lines: tuple[float, float] | None = None) -> str:
-    """Labels under a drawing that ends at `below` [px], with lines from the first to the second."""
+    """Labels under a drawing that ends at `below` [px], with lines from the first to the second.
+
+    Parameters
+    ----------
+    x
+        The axis.
+    below
+        Where the drawing ends [px].
+    lines
+        From where to where lines go [px]; None for no lines.
+
+    """
     return "".join(
         (f'<path class="grid" d="M{place:.1f} {lines[0]:.1f}V{lines[1]:.1f}"/>' if lines else "")
         + f'<text class="tick x" x="{place:.1f}" y="{below + 15:.1f}">{label}</text>'
@@ -17,7 +28,18 @@ def x_ticks(x: Axis, below: float, lines: tuple[float, float] | None = None) -> 
 
 
 def y_ticks(y: Axis, left: float, right: float | None = None) -> str:
-    """Labels left of a drawing that begins at `left` [px], with lines to `right`."""
+    """Labels left of a drawing that begins at `left` [px], with lines to `right`.
+
+    Parameters
+    ----------
+    y
+        The axis.
+    left
+        Where the drawing begins [px].
+    right
+        Where lines end [px]; None for no lines.
+
+    """
     return "".join(
         (f'<path class="grid" d="M{left:.1f} {place:.1f}H{right:.1f}"/>' if right else "")
         + f'<text class="tick y" x="{left - 5:.1f}" y="{place + 4:.1f}">{label}</text>'

@@ -35,7 +35,15 @@ def render_comparison(
 ) -> str:
     """The self-contained HTML page of one comparison; equal input gives equal text.
 
-    `earlier` are those of the same motor before it, `links` lead to the motor's other pages.
+    Parameters
+    ----------
+    result
+        The comparison.
+    earlier
+        Comparisons of the same motor before this one.
+    links
+        Links to other pages.
+
     """
     view = comparison_view(result)
     return render(

@@ -35,8 +35,19 @@ def render_fleet(
 ) -> str:
     """The self-contained HTML page of all motors; pages of motors lie beside it.
 
-    `statuses` are the current ones, by motor; what a datasheet says of itself without. `links` lead
-    to what there is of all motors together. Equal input, equal text.
+    Equal input, equal text.
+
+    Parameters
+    ----------
+    datasheets
+        The datasheets of the batch.
+    findings
+        What was refused or is doubtful.
+    statuses
+        Current status of each motor; None for what each datasheet states of itself.
+    links
+        Links to other pages.
+
     """
     view = fleet_view(datasheets, statuses)
     ordered = sorted(findings)
@@ -53,7 +64,14 @@ def render_fleet(
 
 
 def page_of(motor_id: str) -> str:
-    """The relative link of a motor's page."""
+    """The relative link of a motor's page.
+
+    Parameters
+    ----------
+    motor_id
+        The motor.
+
+    """
     return f"{quote(file_stem(motor_id), safe='~')}.html"
 
 

@@ -54,7 +54,15 @@ class Shown:
 def render_ladder(result: Diagnosis, folder: str = "FOLDER", links: Sequence[Link] = ()) -> str:
     """The self-contained HTML page of one diagnosis; equal input gives equal text.
 
-    `folder` is where the captures lie, for the commands; `links` lead to the motor's other pages.
+    Parameters
+    ----------
+    result
+        The diagnosis.
+    folder
+        The input folder, as the user named it.
+    links
+        Links to other pages.
+
     """
     view = ladder_view(result, folder)
     reach = reaches(result.ladder)

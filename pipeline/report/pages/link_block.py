@@ -22,7 +22,14 @@ class Link:
 
 
 def link_block(links: Sequence[Link]) -> str:
-    """The links between two marks; the marks alone where there are none."""
+    """The links between two marks; the marks alone where there are none.
+
+    Parameters
+    ----------
+    links
+        Links to other pages.
+
+    """
     return f"{BEGIN}\n{render('links.html.jinja', links=links).strip()}\n{END}"
 
 
@@ -30,12 +37,31 @@ def with_links(page: str, links: Sequence[Link]) -> str:
     """The page with its links as they are now; a page without the marks stays as it is.
 
     No text of a capture can hold a mark: `<` is escaped in all of it.
+
+    Parameters
+    ----------
+    page
+        HTML text of the page.
+    links
+        Links to other pages.
+
     """
     return replaced(page, (BEGIN, END), link_block(links))
 
 
 def replaced(page: str, marks: tuple[str, str], block: str) -> str:
-    """The page with what stands from one mark to the other replaced; as it is without them."""
+    """The page with what stands from one mark to the other replaced; as it is without them.
+
+    Parameters
+    ----------
+    page
+        HTML text of the page.
+    marks
+        The mark before and the mark after.
+    block
+        What stands between the marks then.
+
+    """
     before, begin, rest = page.partition(marks[0])
     _, end, after = rest.partition(marks[1])
     return f"{before}{block}{after}" if begin and end else page

@@ -31,7 +31,16 @@ class Detail:
 
 
 def render_regression(regression: LotRegression, links: Sequence[Link] = ()) -> str:
-    """The self-contained HTML page; equal input, equal text. `links` lead to other pages."""
+    """The self-contained HTML page; equal input, equal text. `links` lead to other pages.
+
+    Parameters
+    ----------
+    regression
+        The comparison of lots.
+    links
+        Links to other pages.
+
+    """
     view = lot_view(regression)
     return render(
         "lot.html.jinja",

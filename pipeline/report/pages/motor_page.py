@@ -48,8 +48,22 @@ def render_motor(
     """The self-contained HTML page of one motor; equal input gives equal text.
 
     Its status is what the datasheet says of itself, until `status_block.with_status`.
-    `own` are the terms of constants that the glossary does not know, by name; `links` lead to the
-    motor's other pages; without a `performance` the page has no such section.
+
+    Parameters
+    ----------
+    datasheet
+        The datasheet.
+    evidence
+        Measured and fitted samples of each plot.
+    findings
+        What was refused or is doubtful in the motor's captures.
+    own
+        Terms of plug-ins that the glossary lacks, by name.
+    links
+        Links to other pages.
+    performance
+        The performance of the motor; None for no such section.
+
     """
     rows = motor_rows(datasheet, own)
     figures = _figures(datasheet.constants, evidence)

@@ -17,6 +17,14 @@ def render(template: str, **values: Any) -> str:
     """HTML text of a template; a value that the template names and nobody gave is an error.
 
     The indentation of the templates is not part of it.
+
+    Parameters
+    ----------
+    template
+        File name of the template.
+    values
+        Object or mapping that the template reads.
+
     """
     text = _environment().get_template(template).render(**values)
     return re.sub(r"\s*\n\s*", "\n", text)

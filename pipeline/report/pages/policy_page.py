@@ -30,7 +30,14 @@ This page is built by `python -m pipeline schemas`.
 
 
 def policy_page(policies: Mapping[str, Any]) -> str:
-    """Markdown with one table a section of each policy, under the policies' titles."""
+    """Markdown with one table a section of each policy, under the policies' titles.
+
+    Parameters
+    ----------
+    policies
+        Policies by title.
+
+    """
     lines = [_HEAD]
     for title, policy in policies.items():
         lines += [f"## {title}\n", *_sections(policy)]

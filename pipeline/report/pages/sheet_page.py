@@ -37,6 +37,14 @@ def render_sheet(sheet: Datasheet, performance: Performance) -> str:
     """The self-contained HTML page of one motor's sheet; equal input gives equal text.
 
     The status is what the datasheet says of itself; an approval is in the registry.
+
+    Parameters
+    ----------
+    sheet
+        The datasheet.
+    performance
+        The performance of the motor.
+
     """
     rows = motor_rows(sheet)
     curves = [

@@ -17,7 +17,16 @@ BEGIN, END = "<!-- status -->", "<!-- end of status -->"
 
 
 def status_block(sheet: Datasheet, current: CurrentStatus) -> str:
-    """Heading, status, who decided what, and the reasons that stand, between two marks."""
+    """Heading, status, who decided what, and the reasons that stand, between two marks.
+
+    Parameters
+    ----------
+    sheet
+        The datasheet.
+    current
+        The status in the registry.
+
+    """
     text = render(
         "status.html.jinja",
         sheet=sheet,
@@ -35,5 +44,15 @@ def with_status(page: str, sheet: Datasheet, current: CurrentStatus) -> str:
     """The page with its status as it is now; a page without the marks stays as it is.
 
     No text of a capture can hold a mark: `<` is escaped in all of it.
+
+    Parameters
+    ----------
+    page
+        HTML text of the page.
+    sheet
+        The datasheet.
+    current
+        The status in the registry.
+
     """
     return replaced(page, (BEGIN, END), status_block(sheet, current))

@@ -12,7 +12,14 @@ _KINDS = {"equation": "", "free_run": ", on its own"}
 
 
 def comparison_text(result: Comparison) -> str:
-    """A few lines and tables for a terminal."""
+    """A few lines and tables for a terminal.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    """
     view = comparison_view(result)
     lines = [f"{safe(result.motor_id)}: {safe(view.headline)}"]
     if not result.errors:

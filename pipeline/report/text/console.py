@@ -32,7 +32,19 @@ def summary(
 ) -> str:
     """The text for a terminal: a table of motors, the failed checks, the counts, the way in.
 
-    `statuses` are the current ones, by motor; what a datasheet says of itself without.
+    Parameters
+    ----------
+    datasheets
+        The datasheets of the batch.
+    findings
+        What was refused or is doubtful.
+    output
+        The output folder, as the user named it.
+    report
+        Whether pages are written.
+    statuses
+        Current status of each motor; None for what each datasheet states of itself.
+
     """
     view = fleet_view(datasheets, statuses)
     lines: list[str] = []
@@ -80,7 +92,16 @@ def _unexplained(datasheets: Sequence[Datasheet]) -> list[str]:
 
 
 def nothing_usable(folder: str, *, refused: bool) -> str:
-    """The line that says that a folder holds no capture to work on, and what to do."""
+    """The line that says that a folder holds no capture to work on, and what to do.
+
+    Parameters
+    ----------
+    folder
+        The input folder, as the user named it.
+    refused
+        Whether captures were refused.
+
+    """
     remedy = "`inspect FILE` says why a file is none; name the folder of captures by input="
     if refused:
         remedy = "correct what is refused, or name another folder by input="

@@ -21,7 +21,14 @@ PASSED = ("pass", "marginal")
 
 
 def junit_xml(regression: LotRegression) -> bytes:
-    """The document [UTF-8]: suites `verdict`, `constants`, `effects`; one test each."""
+    """The document [UTF-8]: suites `verdict`, `constants`, `effects`; one test each.
+
+    Parameters
+    ----------
+    regression
+        The comparison of lots.
+
+    """
     root = Xml.Element("testsuites", name=_fit(f"regress {regression.candidate.selector}"))
     _suite(root, "verdict", [_case("verdict", regression.verdict, regression.headline, True)])
     _suite(root, "constants", [_constant(one) for one in regression.constants])

@@ -8,7 +8,14 @@ from pipeline.views.notes import shown_and_folded
 
 
 def ladder_text(result: Diagnosis) -> str:
-    """Verdict, ladder and doubts in a few lines."""
+    """Verdict, ladder and doubts in a few lines.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+
+    """
     view = ladder_view(result)
     missing = ", ".join(result.missing)
     text_lines = [f"{result.motor_id}: {result.verdict}" + (f": {missing}" if missing else "")]

@@ -11,7 +11,16 @@ from pipeline.views.table_text import NONE, blocks, safe
 
 
 def regression_text(regression: LotRegression, files: Sequence[str]) -> str:
-    """The text for a terminal."""
+    """The text for a terminal.
+
+    Parameters
+    ----------
+    regression
+        The comparison of lots.
+    files
+        Names of the files that were written.
+
+    """
     lines = [f"{regression.verdict}: {safe(regression.headline)}"]
     lines += [f"  {safe(reason)}" for reason in regression.reasons]
     if regression.mode == "lots" and regression.history != "sufficient":

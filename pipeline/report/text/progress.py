@@ -12,7 +12,14 @@ class Progress(Protocol):
     """Takes note of what is done."""
 
     def advance(self, number: int) -> None:
-        """The motor of that number is done."""
+        """The motor of that number is done.
+
+        Parameters
+        ----------
+        number
+            Number of the motor in the batch.
+
+        """
         ...
 
 
@@ -23,7 +30,14 @@ class _Silent:
 
 @contextmanager
 def progress(sizes: Sequence[tuple[int, int]]) -> Iterator[Progress]:
-    """Shows motors, captures, MB/s and the time left; `sizes` are captures and bytes a motor."""
+    """Shows motors, captures, MB/s and the time left; `sizes` are captures and bytes a motor.
+
+    Parameters
+    ----------
+    sizes
+        Captures and bytes of each motor.
+
+    """
     if not sizes or not sys.stderr.isatty():
         yield _Silent()
         return

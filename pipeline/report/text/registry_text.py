@@ -19,7 +19,14 @@ SHOWN_DIGITS = 12
 
 
 def versions_table(versions: Sequence[Version]) -> str:
-    """One line a version: motor, revision, status, lot, type, when, digest, last decision."""
+    """One line a version: motor, revision, status, lot, type, when, digest, last decision.
+
+    Parameters
+    ----------
+    versions
+        The versions.
+
+    """
     head = ("motor", "revision", "status", "lot", "type", "published", "version", "decided")
     rows = [
         (
@@ -38,7 +45,14 @@ def versions_table(versions: Sequence[Version]) -> str:
 
 
 def in_force_table(versions: Sequence[tuple[str, Version | None, Version]]) -> str:
-    """One line a motor: (motor, what is valid, what is newest) at one moment."""
+    """One line a motor: (motor, what is valid, what is newest) at one moment.
+
+    Parameters
+    ----------
+    versions
+        Of each motor its id, the version in force and the newest one.
+
+    """
     head = ("motor", "valid", "published", "version", "newest")
     rows = [
         (
@@ -54,7 +68,16 @@ def in_force_table(versions: Sequence[tuple[str, Version | None, Version]]) -> s
 
 
 def datasheet_text(version: Version, sheet: Datasheet) -> str:
-    """A version with its constants, checks and decisions."""
+    """A version with its constants, checks and decisions.
+
+    Parameters
+    ----------
+    version
+        The version.
+    sheet
+        The datasheet.
+
+    """
     own = version.published
     lines = [
         f"{safe(version.motor_id)} revision {version.revision}: {version.status}",
@@ -81,7 +104,18 @@ def datasheet_text(version: Version, sheet: Datasheet) -> str:
 
 
 def difference_text(before: Version, after: Version, changes: Sequence[Change]) -> str:
-    """Two versions of a motor and the change of every constant in units of its uncertainty."""
+    """Two versions of a motor and the change of every constant in units of its uncertainty.
+
+    Parameters
+    ----------
+    before
+        The earlier version.
+    after
+        The later version.
+    changes
+        Change of each constant.
+
+    """
     name = safe(after.motor_id)
     lines = [
         f"{name}: revision {before.revision} ({before.status}) to "

@@ -25,7 +25,14 @@ class Waiting:
     started_s: float = field(default_factory=time.monotonic)
 
     def say(self, label: str) -> None:
-        """From now on the line says `label`."""
+        """From now on the line says `label`.
+
+        Parameters
+        ----------
+        label
+            What is going on, in a few words.
+
+        """
         self.label = label
 
     def _show(self, ended: threading.Event) -> None:
@@ -46,6 +53,14 @@ def waiting(label: str, stream: TextIO | None = None) -> Iterator[Waiting]:
     """Shows `label` and the seconds since the start on a terminal, until the block ends.
 
     Nothing is shown without a label, or where `stream` (standard error) is no terminal.
+
+    Parameters
+    ----------
+    label
+        What is going on, in a few words.
+    stream
+        Where the line is shown; None for standard error.
+
     """
     stream = sys.stderr if stream is None else stream
     line, ended = Waiting(label, stream), threading.Event()

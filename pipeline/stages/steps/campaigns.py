@@ -44,7 +44,26 @@ def campaigns(
 ) -> Gathered:
     """Every motor's usable captures, of the files `only` where that is given.
 
-    Raises UsageError where the folder is not there or holds no capture of `motor`.
+    Parameters
+    ----------
+    folder
+        The input folder, as the user named it.
+    source
+        Name of the source map, `auto` to recognise it.
+    motor
+        A motor_id; None for all motors.
+    limits
+        Time [s] and memory [MB] that reading one file may take; None for the defaults.
+    config_dir
+        Folder of configuration files that come before those of the package.
+    only
+        Files to read, relative to the folder; None for all.
+
+    Raises
+    ------
+    UsageError
+        The folder is not there or holds no capture of `motor`.
+
     """
     input_folder(folder)
     sources = source_maps(source, config_dir)
@@ -89,7 +108,20 @@ def _tasks(folder: str, survey: Survey, motor: str | None, limits: ReadLimits) -
 def outcome_of(
     folder: str, gathered: Gathered, texts: Sequence[str], *, undecided: bool
 ) -> Outcome:
-    """The text of each motor, the refusals, and the remedy where nothing is usable."""
+    """The text of each motor, the refusals, and the remedy where nothing is usable.
+
+    Parameters
+    ----------
+    folder
+        The input folder, as the user named it.
+    gathered
+        The captures of each motor, and the refusals.
+    texts
+        Text of each motor.
+    undecided
+        Whether too little data decided any motor.
+
+    """
     refused = any(finding.severity == "refused" for finding in gathered.findings)
     lines = lines_of(gathered.findings)
     if not texts:

@@ -58,6 +58,18 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str)
 
     While workers read the captures, the module that the judge `needs` is imported. `folder` is
     where under the output it writes.
+
+    Parameters
+    ----------
+    settings
+        The keys of `compare` or `diagnose`.
+    judge
+        Makes and writes the result of one motor.
+    needs
+        Dotted name of the module that `judge` needs.
+    folder
+        Folder under the output that results are written to.
+
     """
     input_folder(settings.input)
     if settings.model.effects or settings.effects_path is not None:

@@ -31,6 +31,12 @@ def process_motor(job: MotorJob) -> MotorResult:
     """Reads, validates, fits, checks and writes one motor; refused captures become findings.
 
     When all its files are on the disk, this is noted, so that a batch that was stopped goes on.
+
+    Parameters
+    ----------
+    job
+        What to do with one motor, and how.
+
     """
     watch = Stopwatch()
     finished = _finish(job, watch)
@@ -62,6 +68,14 @@ def superseding(sheet: Datasheet, revoked: Sequence[Revocation]) -> Datasheet:
 
     Where the revoked version holds these very bytes, it was not them that were doubted alone: they
     stay that version, and stay revoked.
+
+    Parameters
+    ----------
+    sheet
+        The datasheet.
+    revoked
+        Revocations of the motor's versions.
+
     """
     known = {revocation.version: revocation for revocation in revoked}
     while (old := known.get(sheet.version)) is not None:
@@ -129,6 +143,16 @@ def performance_at(
     """The performance of a motor at stated conditions, else at those of its captures.
 
     Numbers that break on odd constants cost nothing but themselves.
+
+    Parameters
+    ----------
+    campaign
+        The captures of one motor.
+    sheet
+        The datasheet.
+    stated
+        Stated conditions by key; None where a key is not given.
+
     """
     from pipeline.performance.conditions import operation_of
     from pipeline.performance.derive import performance_of

@@ -58,8 +58,16 @@ class _Windows:
 def replay(capture: Capture, datasheet: Datasheet) -> tuple[Evidence, ...]:
     """Voltages (window means) and shaft torque (samples) of a capture beside the datasheet's.
 
-    Empty where the capture lacks the columns or the datasheet the constants. Losses, saturation
-    and cogging are left out on purpose, so that the residual shows them.
+    Empty where the capture lacks the columns or the datasheet the constants. Losses, saturation and
+    cogging are left out on purpose, so that the residual shows them.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+    datasheet
+        The datasheet.
+
     """
     known = {n: e.number for n, e in datasheet.constants.items() if e.known}
     return (*_torque(capture, known), *_voltages(capture, known))

@@ -45,9 +45,28 @@ class Sheet:
 def choose(
     registry: Registry, baseline: str, candidate: str, mode: str, golden: Sequence[str]
 ) -> Chosen:
-    """The two sides, golden motors and repeats; raises UsageError where a side is empty.
+    """The two sides, golden motors and repeats.
 
     Of a motor the newest version on a side counts. Golden motors stand in no lot.
+
+    Parameters
+    ----------
+    registry
+        The registry.
+    baseline
+        Selector of the baseline.
+    candidate
+        Selector of the candidate.
+    mode
+        As the key `mode` of `regress`.
+    golden
+        Motors that are measured again and again.
+
+    Raises
+    ------
+    UsageError
+        A side is empty.
+
     """
     versions = [v for history in histories(registry.events()).values() for v in history]
     queries = {

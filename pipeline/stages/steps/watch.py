@@ -127,7 +127,14 @@ class Watch:
 
 
 def end_at_once_or_next(signalled: Callable[..., None]) -> None:
-    """Ctrl-C, and SIGTERM as service managers send it, call `signalled`."""
+    """Ctrl-C, and SIGTERM as service managers send it, call `signalled`.
+
+    Parameters
+    ----------
+    signalled
+        Called with the signal's number and frame.
+
+    """
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signalled)
         signal.signal(signal.SIGTERM, signalled)
