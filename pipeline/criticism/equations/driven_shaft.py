@@ -107,6 +107,8 @@ def predicted(segment: Segment, x: Operating, _: Pieces, model: Model, values: V
         The log, on its true clock.
     x
         True state [n], without current.
+    _
+        Not needed.
     model, values
         Flux, drops and drags.
 
