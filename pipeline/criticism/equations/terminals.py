@@ -36,14 +36,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         or heat run only the settled windows are used, of a step those clear of its edges.
 
     """
-    pairs = [one for one in PAIR_RAD if capture.has(f"v{one}_v")]
-    pair = capture.meta.pair or (pairs[0] if len(pairs) == 1 else None)
-    if pair is None or not capture.has(f"v{pair}_v"):
-        return None
-    current = next((n for n in (f"i{pair[0]}_a", f"i{pair[1]}_a") if capture.has(n)), None)
+    recorded = _pair_and_current(capture)
     place, stepped = capture.meta.theta_elec_deg, capture.meta.test == "current_step"
-    if current is None or (stepped and place is None):
+    if recorded is None or (stepped and place is None):
         return None
+    pair, current = recorded
     sign = 1.0 if current[1] == pair[0] else -1.0
     extra = ["temp_winding_degc"] if capture.has("temp_winding_degc") else []
     policy = machine.policy.cutting
@@ -61,7 +58,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     else:
         window = window_of(period, keep.size, policy)
     weak = projection(np.zeros(keep.size), window_starts(keep, window), window, ())
-    if capture.meta.test != "current_step":
+    if not stepped:
         weak = _settled(weak, amps, policy.change_u * sensors.noise["i_pair_a"])
     return segment_of(
         capture,
@@ -76,6 +73,16 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         offsets=None,
         **fixed,
     )
+
+
+def _pair_and_current(capture: Capture) -> tuple[str, str] | None:
+    """The pair of terminals with a voltage, and the column of a current through it."""
+    pairs = [one for one in PAIR_RAD if capture.has(f"v{one}_v")]
+    pair = capture.meta.pair or (pairs[0] if len(pairs) == 1 else None)
+    if pair is None or not capture.has(f"v{pair}_v"):
+        return None
+    current = next((n for n in (f"i{pair[0]}_a", f"i{pair[1]}_a") if capture.has(n)), None)
+    return None if current is None else (pair, current)
 
 
 def _settled(weak: Projection, amps: Array, change_a: float) -> Projection:

@@ -239,15 +239,20 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if len(setups) > 1:
         words = _setups_reason(setups)
         estimates = tuple(replace(e, note=f"{words}; {e.note}") for e in estimates)
+    return Fit(_of_a_known_sign(estimates), _evidence(rows, y, found))
+
+
+def _of_a_known_sign(estimates: tuple[Estimate, ...]) -> tuple[Estimate, ...]:
+    """The estimates; none where the inertia, which comes first, may be zero."""
     inertia = estimates[0]
-    if inertia.known and inertia.u >= abs(inertia.number):
-        estimates = METHOD.nothing(
-            GIVES,
-            f"the acceleration does not follow the torque: the inertia came out as "
-            f"{inertia.number:.3g} ± {inertia.u:.2g} kg·m²; look at the signs of iq_a and "
-            f"torque_shaft_nm, else {EXPERIMENT}",
-        ).estimates
-    return Fit(estimates, _evidence(rows, y, found))
+    if not inertia.known or inertia.u < abs(inertia.number):
+        return estimates
+    note = (
+        f"the acceleration does not follow the torque: the inertia came out as "
+        f"{inertia.number:.3g} ± {inertia.u:.2g} kg·m²; look at the signs of iq_a and "
+        f"torque_shaft_nm, else {EXPERIMENT}"
+    )
+    return METHOD.nothing(GIVES, note).estimates
 
 
 def _setups_reason(setups: Sequence[Setup]) -> str:

@@ -257,7 +257,7 @@ def settled(folder: Path, question: Question, sources: Mapping[str, SourceMap]) 
     if question.sidecar is not None or question.listed:
         return None
     try:
-        if _may_be_capture(folder, question.path, {}, {}, sources):
+        if _may_be_capture(folder, _File(question.path, {}, {}), sources):
             return None
     except CaptureError as fault:
         return Answer(question.path, None, None, (Finding.refusal(question.path, fault),))
@@ -291,33 +291,45 @@ def look(
     entry: Entry | None = None
     try:
         with refusing():
-            listed = dict(question.listed)
             beside = {}
             if question.sidecar is not None:
                 beside = sidecar(read_whole(folder / question.sidecar, MAX_SIDECAR_BYTES))
-            if _may_be_capture(folder, question.path, listed, beside, sources):
+            file = _File(question.path, beside, dict(question.listed))
+            if _may_be_capture(folder, file, sources):
                 data = read_whole(folder / question.path)
                 digest = hashlib.sha256(data).hexdigest()
-                entry = _entry(
-                    question.path, data, digest, listed, beside, sources, findings, recover=recover
-                )
+                entry = _entry(file, data, digest, sources, findings, recover=recover)
     except CaptureError as fault:
         findings.append(Finding.refusal(question.path, fault))
         entry = None
     return Answer(question.path, digest, entry, tuple(findings))
 
 
-def _may_be_capture(
-    folder: Path,
-    path: str,
-    listed: Mapping[str, str],
-    beside: Mapping[str, str],
-    sources: Mapping[str, SourceMap],
-) -> bool:
+@dataclass(frozen=True, slots=True)
+class _File:
+    """A file by its path, with what its sidecar and its row of a manifest state of it."""
+
+    path: str
+    beside: Mapping[str, str]
+    listed: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class _Content:
+    """What the bytes of a file show: form, own metadata, first lines, topics, layout of an MCAP."""
+
+    form: Form
+    own: Mapping[str, str]
+    head: str | None
+    topics: list[str]
+    layout: Layout | None = None
+
+
+def _may_be_capture(folder: Path, file: _File, sources: Mapping[str, SourceMap]) -> bool:
     """Whether the name, the first bytes or what is stated of a file make it worth reading."""
-    if path.lower().endswith(_MCAP_SUFFIX) or _is_text(path, listed, beside, sources):
+    if file.path.lower().endswith(_MCAP_SUFFIX) or _is_text(file, sources):
         return True
-    head = read_head(folder / path, _FIRST_BYTES)
+    head = read_head(folder / file.path, _FIRST_BYTES)
     return head.startswith(MAGIC) or _CONTRACT.match(head) is not None
 
 
@@ -366,35 +378,24 @@ def _manifests(
 
 
 def _entry(
-    path: str,
+    file: _File,
     data: bytes,
     digest: str,
-    listed: Mapping[str, str],
-    beside: Mapping[str, str],
     sources: Mapping[str, SourceMap],
     findings: list[Finding],
     *,
     recover: bool,
 ) -> Entry | None:
     """What a file is, or None where it is no capture."""
-    recovered = False
-    if data.startswith(MAGIC) or path.lower().endswith(_MCAP_SUFFIX):
-        form: Form = "mcap"
-        layout = scan(data, recover=recover)
-        own, head, topics = layout.metadata_named(METADATA_RECORD), None, _topics(layout)
-        if layout.cut is not None:
-            recovered = True
-            findings.append(_recovered(path, layout))
-    else:
-        form, topics = "csv", []
-        form_known = any(s.reader and _may_read(s, path, beside, listed) for s in sources.values())
-        own, head = _text_head(data, bool(listed or beside) and not form_known)
-        named = (s.reader for s in sources.values() if s.topics and s.recognises_name(path))
-        topics = table_names(named, data)
-    source, known = _source(path, own, beside, listed, head, topics, sources)
+    path, content = file.path, _content(file, data, sources, recover=recover)
+    recovered = content.layout is not None and content.layout.cut is not None
+    if content.layout is not None and recovered:
+        findings.append(_recovered(path, content.layout))
+    source, known = _source(file, content, sources)
     if not known:
         _not_lost(path, data)
         return None
+    form, own = content.form, content.own
     if source is not None and source.reader is not None:
         form, own = "foreign", dict(find_reader(source.reader).metadata(data))
     fixed = {} if source is None else source.metadata_for(path)
@@ -402,8 +403,8 @@ def _entry(
         own = {key: value for key, value in own.items() if key in METADATA}
     statements = [
         ("the file", own),
-        (f"NAME{SIDECAR_SUFFIX}", beside),
-        (MANIFEST, listed),
+        (f"NAME{SIDECAR_SUFFIX}", file.beside),
+        (MANIFEST, file.listed),
     ]
     stated, contradictions = merge(path, statements)
     findings += contradictions
@@ -413,12 +414,23 @@ def _entry(
     return Entry(path, digest, form, source, tuple(sorted(stated.items())), recovered)
 
 
-def _may_read(
-    source: SourceMap, path: str, beside: Mapping[str, str], listed: Mapping[str, str]
-) -> bool:
+def _content(
+    file: _File, data: bytes, sources: Mapping[str, SourceMap], *, recover: bool
+) -> _Content:
+    if data.startswith(MAGIC) or file.path.lower().endswith(_MCAP_SUFFIX):
+        layout = scan(data, recover=recover)
+        own = layout.metadata_named(METADATA_RECORD)
+        return _Content("mcap", own, None, _topics(layout), layout)
+    form_known = any(s.reader and _may_read(s, file) for s in sources.values())
+    own, head = _text_head(data, bool(file.listed or file.beside) and not form_known)
+    named = (s.reader for s in sources.values() if s.topics and s.recognises_name(file.path))
+    return _Content("csv", own, head, table_names(named, data))
+
+
+def _may_read(source: SourceMap, file: _File) -> bool:
     """Whether a map is named beside a file, or knows it by its name."""
-    named = beside.get("source") or listed.get("source")
-    return source.name.partition("/")[0] == named or source.recognises_name(path)
+    named = file.beside.get("source") or file.listed.get("source")
+    return source.name.partition("/")[0] == named or source.recognises_name(file.path)
 
 
 def _not_lost(path: str, data: bytes) -> None:
@@ -459,17 +471,12 @@ def _topics(layout: Layout) -> list[str]:
     return [channel.topic for channel in channels.values()]
 
 
-def _is_text(
-    path: str,
-    listed: Mapping[str, str],
-    beside: Mapping[str, str],
-    sources: Mapping[str, SourceMap],
-) -> bool:
+def _is_text(file: _File, sources: Mapping[str, SourceMap]) -> bool:
     """Whether a file's name, or what is stated of it, makes it worth reading as text."""
-    suffix = PurePosixPath(path).suffix.lower()
-    named = any(source.files and source.recognises_name(path) for source in sources.values())
-    written = suffix in _TEXT_SUFFIXES or _is_packed(path)
-    return written or bool(listed) or bool(beside) or named
+    suffix = PurePosixPath(file.path).suffix.lower()
+    named = any(source.files and source.recognises_name(file.path) for source in sources.values())
+    written = suffix in _TEXT_SUFFIXES or _is_packed(file.path)
+    return written or bool(file.listed) or bool(file.beside) or named
 
 
 def _text_head(data: bytes, named: bool) -> tuple[dict[str, str], str]:
@@ -494,29 +501,23 @@ def _sidecar(path: str, there: frozenset[str]) -> str | None:
 
 
 def _source(
-    path: str,
-    own: Mapping[str, str],
-    beside: Mapping[str, str],
-    listed: Mapping[str, str],
-    head: str | None,
-    topics: list[str],
-    sources: Mapping[str, SourceMap],
+    file: _File, content: _Content, sources: Mapping[str, SourceMap]
 ) -> tuple[SourceMap | None, bool]:
     """The source map to read a file with (None: the contract's own form), and if it is a capture.
 
     A map named by `source` counts first, then the file's own `contract`, then what recognises it.
     """
-    named = beside.get("source") or listed.get("source") or own.get("source")
+    named = file.beside.get("source") or file.listed.get("source") or content.own.get("source")
     if named:
         try:
             maps = list(find_maps(sources, named).values())
         except UsageError as fault:
             raise CaptureError("unknown_source", fault.message, fault.remedy) from None
-        fitting = [s for s in maps if s.recognises(path, head, topics)]
+        fitting = [s for s in maps if s.recognises(file.path, content.head, content.topics)]
         return (fitting or maps)[0], True
-    if "contract" in own:
+    if "contract" in content.own:
         return None, True
-    matches = [s for s in sources.values() if s.recognises(path, head, topics)]
+    matches = [s for s in sources.values() if s.recognises(file.path, content.head, content.topics)]
     if len(matches) > 1:
         raise CaptureError(
             "ambiguous_source",
@@ -525,4 +526,4 @@ def _source(
         )
     if matches:
         return matches[0], True
-    return None, "contract" in beside or "contract" in listed
+    return None, "contract" in file.beside or "contract" in file.listed
