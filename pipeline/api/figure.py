@@ -60,8 +60,6 @@ class Figure:
 def figure(title: str, element: str) -> Figure:
     """A figure of the report's inline `<svg>` element, with the report's style sheet.
 
-    Raises ValueError where there is nothing to draw.
-
     Parameters
     ----------
     title
@@ -69,10 +67,6 @@ def figure(title: str, element: str) -> Figure:
     element
         Text that begins with `<svg`; anything else is the report's remark that there is nothing to
         draw.
-
-    Attributes
-    ----------
-    figure of an inline `<svg>` element of the report, with the report's style sheet in it.
 
     Returns
     -------

@@ -54,10 +54,6 @@ def frame(rows: Iterable[Mapping[str, Any]], schema: Mapping[str, Any]) -> pl.Da
     schema
         Type of each column by name, in the order of the columns.
 
-    Attributes
-    ----------
-    polars frame with stated types, also where there is no row.
-
     Returns
     -------
     DataFrame

@@ -49,7 +49,6 @@ class Key:
 
     Attributes
     ----------
-    quantity that may be given.
     name, unit, words
         Its name ends in its unit, and may be typed without it.
     other_names
@@ -116,10 +115,6 @@ class Given:
         ----------
         name
             Name of the key.
-
-        Attributes
-        ----------
-        number that was given.
 
         Returns
         -------
@@ -338,10 +333,6 @@ def number(value: float | int | str) -> str:
     ----------
     value
         The number.
-
-    Attributes
-    ----------
-    number with six significant digits, a whole number as it is.
 
     """
     return f"{value:.6g}" if isinstance(value, float) else str(value)

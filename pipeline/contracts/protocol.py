@@ -62,10 +62,6 @@ def warning(
     rows
         First and last row concerned, from 0.
 
-    Attributes
-    ----------
-    finding that lets the capture through.
-
     """
     return Finding(capture.path, "warning", code, message, remedy, rows)
 

@@ -30,10 +30,6 @@ def or_null(schema: Schema) -> Schema:
     schema
         The schema.
 
-    Attributes
-    ----------
-    schema, or null.
-
     """
     return {"anyOf": [schema, {"type": "null"}]}
 
@@ -59,10 +55,6 @@ def list_of(items: Schema, **more: Any) -> Schema:
         Schema of an item.
     **more
         Further keys, such as `minItems`.
-
-    Attributes
-    ----------
-    list of one kind of item.
 
     """
     return {"type": "array", "items": items, **more}

@@ -544,10 +544,6 @@ def between(signal: Any, at: Array) -> Any:
     at
         Places [n] in samples from the first; clipped to the record.
 
-    Attributes
-    ----------
-    signal at places between its samples, its ends constant.
-
     Returns
     -------
     array [n]

@@ -52,10 +52,6 @@ class Ratio(NamedTuple):
         budget
             Its contributions [1].
 
-        Attributes
-        ----------
-        ratio with the uncertainty of a budget.
-
         """
         return cls(value, standard_uncertainty(budget), effective_dof(budget))
 
@@ -186,10 +182,6 @@ def not_evaluated(name: str, missing: str) -> Check:
         Name of the rule.
     missing
         What is missing, in words.
-
-    Attributes
-    ----------
-    check that could not be made.
 
     """
     return Check(name, "not_evaluated", missing)

@@ -124,10 +124,6 @@ class Method:
         note
             The test that would determine it.
 
-        Attributes
-        ----------
-        constant that the captures do not determine.
-
         """
         return not_identifiable(constant, self.unit(constant), self.name, note)
 
@@ -140,10 +136,6 @@ class Method:
             Its name.
         note
             Down to what size it was searched for.
-
-        Attributes
-        ----------
-        constant that was searched for and is absent.
 
         """
         return not_there(constant, self.unit(constant), self.name, note)

@@ -57,10 +57,6 @@ def drag_polynomial(table: EffectTable) -> Array | None:
     table
         Drag over speed.
 
-    Attributes
-    ----------
-    polynomial through a curve of drag.
-
     Returns
     -------
     array [3] or None

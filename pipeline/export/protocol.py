@@ -24,7 +24,6 @@ class Source:
 
     Attributes
     ----------
-    released datasheet to be exported.
     sheet, revision
         The datasheet and its revision.
     terms
@@ -42,17 +41,10 @@ class Source:
     def estimate(self, name: str) -> Estimate:
         """A constant that may be exported.
 
-        Raises UsageError for one that is missing, assumed or not identifiable, and for one whose
-        convention is not known: not in the glossary, or in another unit than the glossary's.
-
         Parameters
         ----------
         name
             Glossary name.
-
-        Attributes
-        ----------
-        constant that may be exported.
 
         Raises
         ------
@@ -80,10 +72,6 @@ class Source:
         ----------
         name
             Glossary name.
-
-        Attributes
-        ----------
-        constant where it may be exported.
 
         Returns
         -------
@@ -221,11 +209,6 @@ def plain(text: str) -> str:
     ----------
     text
         Any text.
-
-    Attributes
-    ----------
-    text as a comment may hold it in C, XML, shell or CSV
-        printable, without the end of a comment.
 
     """
     shown = "".join(char if char.isprintable() else " " for char in text)

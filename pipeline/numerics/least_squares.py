@@ -29,7 +29,6 @@ class LinearFit:
 
     Attributes
     ----------
-    weighted linear least-squares fit.
     coefficients
         [k].
     covariance
@@ -193,7 +192,6 @@ class NonlinearFit:
 
     Attributes
     ----------
-    nonlinear least-squares fit.
     parameters
         At the minimum [k].
     covariance

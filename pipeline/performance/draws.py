@@ -103,10 +103,6 @@ def interval(values: Array) -> tuple[float, float, float]:
     values
         The published value, then draws [1 + n].
 
-    Attributes
-    ----------
-    value and its 95 % interval, from draws.
-
     Returns
     -------
     tuple of float

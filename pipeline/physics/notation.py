@@ -60,10 +60,6 @@ def unit_text(unit: str) -> str:
     unit
         Such as `ohm`, which is Ω; `1` is the empty text.
 
-    Attributes
-    ----------
-    unit of the glossary as people write it.
-
     """
     return _WORDS.get(unit, unit)
 

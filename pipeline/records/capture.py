@@ -130,10 +130,6 @@ class CaptureMeta:
         key
             A key of `extra`.
 
-        Attributes
-        ----------
-        relative standard uncertainty that a capture states under a key of its own.
-
         Returns
         -------
         float or None

@@ -67,10 +67,6 @@ def with_latest(earlier: Sequence[Earlier], latest: Earlier) -> tuple[Earlier, .
     latest
         The new one; it replaces an earlier one of the same model and effects.
 
-    Attributes
-    ----------
-    history with one more comparison in it.
-
     Returns
     -------
     tuple of Earlier

@@ -74,7 +74,6 @@ class CaptureReference(PlainRecord):
 
     Attributes
     ----------
-    file that a datasheet rests on.
     path
         Relative to the input folder.
     sha256

@@ -39,11 +39,6 @@ def meant(typed: str, known: Iterable[str]) -> str:
     known
         The names that there are.
 
-    Attributes
-    ----------
-    remedy for a name that there is not
-        the nearest one, and all that there are.
-
     Returns
     -------
     str

@@ -208,11 +208,6 @@ def not_identifiable(name: str, unit: str, method: str, note: str) -> Estimate:
     note
         Which experiment is missing.
 
-    Attributes
-    ----------
-    result without a value
-        the captures do not determine the constant.
-
     """
     return Estimate(name, None, unit, "not_identifiable", method, note=note)
 
@@ -228,11 +223,6 @@ def not_there(name: str, unit: str, method: str, note: str) -> Estimate:
         Name of the estimator.
     note
         Down to what size it was searched for.
-
-    Attributes
-    ----------
-    result without a value
-        what was searched for is absent.
 
     """
     return replace(not_identifiable(name, unit, method, note), settled=True)

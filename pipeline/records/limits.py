@@ -23,7 +23,6 @@ class Amount:
 
     Attributes
     ----------
-    size in a limits file.
     value
         In what `per` says.
     per
@@ -106,7 +105,6 @@ class Limits:
 
     Attributes
     ----------
-    limits file.
     name, sha256
         Of the file.
     required
@@ -187,10 +185,6 @@ def number_from(text: str) -> float:
     ----------
     text
         Such as `0.0071`.
-
-    Attributes
-    ----------
-    finite number from the text of a limits file.
 
     Returns
     -------

@@ -168,8 +168,6 @@ class LotTest:
 
     Attributes
     ----------
-    t test whose unit is the lot
-        is the candidate beyond the scatter of the baseline lots.
     status
         `INSUFFICIENT_HISTORY` below `needed` baseline lots; there is no p-value then.
     lots, needed

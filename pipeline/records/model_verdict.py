@@ -24,7 +24,6 @@ class Excess(PlainRecord):
 
     Attributes
     ----------
-    residual above its noise floor.
     capture, signal
         Where it was found.
     order
@@ -302,11 +301,6 @@ def number(floors: float) -> str:
     ----------
     floors
         [noise floors].
-
-    Attributes
-    ----------
-    number of noise floors as text
-        whole from ten on, two digits below.
 
     """
     return f"{floors:.0f}" if floors >= 10.0 else f"{floors:.2g}"

@@ -59,11 +59,6 @@ def counted(number: int, noun: str) -> str:
     noun
         Regular, in the singular.
 
-    Attributes
-    ----------
-    number of things
-        `1 motor`, `2 motors`, `2 mismatches`.
-
     """
     ending = "" if number == 1 else "es" if noun.endswith(("s", "ch")) else "s"
     return f"{number} {noun}{ending}"
@@ -76,10 +71,6 @@ def printable(text: str) -> str:
     ----------
     text
         May hold control characters; these are written as escapes.
-
-    Attributes
-    ----------
-    text in one line that a terminal shows and does not obey.
 
     """
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

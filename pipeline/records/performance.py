@@ -162,10 +162,6 @@ class Performance:
         name
             Of the number.
 
-        Attributes
-        ----------
-        number by name.
-
         Returns
         -------
         Derived or None
@@ -181,10 +177,6 @@ class Performance:
         ----------
         name
             Of the curve.
-
-        Attributes
-        ----------
-        curve by name.
 
         Returns
         -------

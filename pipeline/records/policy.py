@@ -55,10 +55,6 @@ def derived(value: Number, unit: str, meaning: str, *, source: str) -> Any:
     source
         A formula, a distribution or a standard.
 
-    Attributes
-    ----------
-    field of a policy whose default follows from something else.
-
     """
     return _field(value, unit, meaning, Origin("derived", source))
 
@@ -79,10 +75,6 @@ def calibrated(value: Number, unit: str, meaning: str, *, by: str, on: str) -> A
     on
         The data that it was run on.
 
-    Attributes
-    ----------
-    field of a policy whose default was found by a command.
-
     """
     return _field(value, unit, meaning, Origin("calibrated", f"`{by}` on {on}"))
 
@@ -101,10 +93,6 @@ def chosen(value: Number, unit: str, meaning: str, *, why: str) -> Any:
     why
         Why it is that.
 
-    Attributes
-    ----------
-    field of a policy whose default is a judgement.
-
     """
     return _field(value, unit, meaning, Origin("chosen", why))
 
@@ -116,10 +104,6 @@ def section(kind: type[Made]) -> Made:
     ----------
     kind
         The class of the section.
-
-    Attributes
-    ----------
-    field of a policy that holds a section with its defaults.
 
     """
     made: Made = field(default_factory=kind)
@@ -197,10 +181,6 @@ def with_overrides(policy: Made, changes: Overrides) -> Made:
         The policy; it is not changed.
     changes
         Full names of its fields with new values, as `overrides` gives them.
-
-    Attributes
-    ----------
-    policy with some of its numbers replaced.
 
     """
     for name, value in changes:

@@ -26,7 +26,6 @@ class Contribution:
 
     Attributes
     ----------
-    signed standard uncertainty from one source.
     source
         An instrument (`current@rig-1`) or the scatter of one fit (`scatter:spin_down:tau`). Equal
         sources are fully correlated, different ones independent.
@@ -64,10 +63,6 @@ def type_a(source: str, u: float, dof: float = math.inf) -> Budget:
     dof
         Its degrees of freedom.
 
-    Attributes
-    ----------
-    budget of one contribution from scatter (GUM 4.2).
-
     """
     return (Contribution(source, u, "A", dof),)
 
@@ -83,10 +78,6 @@ def type_b(source: str, u: float, dof: float = math.inf) -> Budget:
         Signed standard uncertainty [unit of the estimate].
     dof
         Its degrees of freedom.
-
-    Attributes
-    ----------
-    budget of one contribution known otherwise (GUM 4.3), usually of an instrument.
 
     """
     return (Contribution(source, u, "B", dof),)

@@ -135,3 +135,29 @@ def test_a_section_that_does_not_fit_is_seen() -> None:
         "f: ['b', 'a'] for ['a', 'b']"
     ]
     assert list(wrong(ast.parse(source.replace("a, c", "a, b")))) == []
+
+
+def test_only_classes_have_attributes() -> None:
+    """A function states its result under Returns; attributes would repeat its summary."""
+    found = [
+        f"{path}: {node.name}"
+        for path in FILES
+        for node in ast.walk(trees()[path])
+        if isinstance(node, ast.FunctionDef)
+        and re.search(r"^Attributes\n-+$", ast.get_docstring(node) or "", re.MULTILINE)
+    ]
+    assert found == []
+
+
+def test_every_entry_of_a_section_of_attributes_is_a_name() -> None:
+    entry = re.compile(r"\w+(?:, \w+)*(?: : .+)?")
+    found = [
+        f"{path}: {node.name}: {line}"
+        for path in FILES
+        for node in ast.walk(trees()[path])
+        if isinstance(node, ast.ClassDef)
+        for text in re.split(r"^Attributes\n-+\n", ast.get_docstring(node) or "", flags=re.M)[1:]
+        for line in re.split(r"^\w+\n-+$", text, flags=re.M)[0].splitlines()
+        if line and not line.startswith(" ") and not entry.fullmatch(line)
+    ]
+    assert found == []

@@ -29,7 +29,6 @@ class DriveLog:
 
     Attributes
     ----------
-    log of a drive on an even clock.
     period_s
         Sample period.
     columns

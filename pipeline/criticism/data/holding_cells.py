@@ -24,7 +24,6 @@ class Cells:
 
     Attributes
     ----------
-    holding current, averaged in cells of angle and sense.
     theta_mech_rad, iq_a
         Mean angle and current of each cell [n].
     sense

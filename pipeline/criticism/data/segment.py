@@ -281,10 +281,6 @@ def with_lines(segment: Segment, lines: Array) -> Segment:
     lines
         Weak samples [K, C, W, M].
 
-    Attributes
-    ----------
-    segment with other disturbances.
-
     """
     return replace(segment, disturbances=replace(segment.disturbances, lines=lines))
 

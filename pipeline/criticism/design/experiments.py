@@ -46,7 +46,6 @@ class Plan:
 
     Attributes
     ----------
-    further experiment.
     words
         What it is.
     normal

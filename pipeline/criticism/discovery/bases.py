@@ -182,10 +182,6 @@ def coarse(variable: Variable, machine: Machine, policy: Discovery) -> Basis:
     policy
         Number of knots.
 
-    Attributes
-    ----------
-    few smooth curves, enough to see whether and how something depends on a variable.
-
     Returns
     -------
     Basis

@@ -32,7 +32,6 @@ class Change:
 
     Attributes
     ----------
-    constant with one value in most captures and another in some.
     name, unit
         Full name of the parameter, and its unit.
     value

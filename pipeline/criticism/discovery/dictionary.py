@@ -27,7 +27,6 @@ class Shape:
 
     Attributes
     ----------
-    curve of a = |u|.
     name
         Its name.
     even, odd

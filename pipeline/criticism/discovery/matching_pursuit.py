@@ -42,7 +42,6 @@ class Expression:
 
     Attributes
     ----------
-    sum of terms.
     terms, amplitudes
         Terms, and their amplitudes [unit of the input].
     directions
@@ -182,10 +181,6 @@ class Pursuit:
         ----------
         term
             The term.
-
-        Attributes
-        ----------
-        term as coefficients of the hats and waves of the input.
 
         Returns
         -------

@@ -127,10 +127,6 @@ def refined(port: Port, machine: Machine, policy: Discovery) -> Port:
     policy
         Number of hats.
 
-    Attributes
-    ----------
-    residual input with narrow hats in place of a few smooth curves.
-
     Returns
     -------
     Port

@@ -31,7 +31,6 @@ class Found:
 
     Attributes
     ----------
-    residual input that helps.
     port
         The input.
     gain

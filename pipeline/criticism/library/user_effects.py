@@ -120,10 +120,6 @@ def guarded(effect: Effect, path: Path, text: str) -> Effect:
     text
         Content of the file, to find lines in.
 
-    Attributes
-    ----------
-    user's effect whose hooks report what goes wrong in them.
-
     Returns
     -------
     Effect

@@ -43,7 +43,6 @@ class Constant:
 
     Attributes
     ----------
-    parameter of the base model.
     name, unit, words
         Name, unit and meaning.
     center
@@ -149,7 +148,6 @@ class Model:
 
     Attributes
     ----------
-    machine, its base constants and effects; parameters are addressed `effect.parameter`.
     machine
         Size and policy.
     effects

@@ -219,10 +219,6 @@ def rough_anew(fit: Fit) -> Fit:
     fit
         The fit whose model is meant.
 
-    Attributes
-    ----------
-    rough fit, begun once more from orders of magnitude; shapes of effects keep their values.
-
     Returns
     -------
     Fit

@@ -45,7 +45,6 @@ class Hum:
 
     Attributes
     ----------
-    line of the mains that the recordings of one signal share.
     kind
         Of the equations: terminals, drive and slow turn have instruments of their own.
     signal
@@ -153,10 +152,6 @@ def hum_notes(hums: Sequence[Hum]) -> tuple[str, ...]:
     ----------
     hums
         The lines.
-
-    Attributes
-    ----------
-    note on every signal with mains hum in it.
 
     """
     notes = []

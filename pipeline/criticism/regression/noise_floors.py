@@ -158,10 +158,6 @@ def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
     values
         Parameters by full name.
 
-    Attributes
-    ----------
-    floor by the machine's own scale, whatever the noise.
-
     Returns
     -------
     array [groups]

@@ -329,10 +329,6 @@ def unit_diagonal(normal: Array) -> Array:
     normal
         [k, k].
 
-    Attributes
-    ----------
-    normal matrix with each column divided by its own size, so that the diagonal is 1.
-
     Returns
     -------
     array [k, k]

@@ -141,10 +141,6 @@ def sparse(segment: Segment, windows: int) -> Segment:
     windows
         How many windows are kept.
 
-    Attributes
-    ----------
-    segment with a few of its windows only, for a first, rough fit.
-
     Returns
     -------
     Segment

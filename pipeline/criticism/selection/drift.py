@@ -70,10 +70,6 @@ def with_drift(segment: Segment, model: Model, values: Values) -> Segment:
     values
         Parameters by full name.
 
-    Attributes
-    ----------
-    segment with the slowest sines of a random walk of each of its sensors as disturbances.
-
     Returns
     -------
     Segment

@@ -45,10 +45,6 @@ def unused(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str, ..
     cut_segments
         Segments made of them.
 
-    Attributes
-    ----------
-    note of the captures that no equation could use.
-
     Returns
     -------
     tuple of str

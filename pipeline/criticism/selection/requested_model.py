@@ -28,7 +28,6 @@ class BaseFit:
 
     Attributes
     ----------
-    requested model, fitted.
     system
         The fit, linearised; its segments know the mains lines in them.
     hum
@@ -76,10 +75,6 @@ def frame_notes(segments: Sequence[Segment]) -> tuple[str, ...]:
     ----------
     segments
         The segments of a fit.
-
-    Attributes
-    ----------
-    note on voltages that are in the rotor frame of the sampling instant.
 
     Returns
     -------

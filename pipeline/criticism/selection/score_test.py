@@ -208,10 +208,6 @@ def widened(
     before
         An earlier system whose columns of candidates may be used again.
 
-    Attributes
-    ----------
-    fit with the columns of candidates behind its own.
-
     Returns
     -------
     LinearSystem

@@ -202,10 +202,6 @@ def as_sensed(torque_nm: Array, model: Model, values: Values) -> Array:
     values
         Parameters by full name.
 
-    Attributes
-    ----------
-    true torque of the shaft as its transducer shows it.
-
     Returns
     -------
     array [n]

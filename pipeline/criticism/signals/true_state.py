@@ -67,10 +67,6 @@ def on_true_clock(segment: Segment, recorder: str | None, model: Model, values: 
     values
         Parameters by full name.
 
-    Attributes
-    ----------
-    segment with its true sample period in place of the recorded one.
-
     """
     gain = clock_gain(recorder, model, values)
     return replace(segment, ts_s=segment.ts_s / (1.0 + gain)) if gain else segment

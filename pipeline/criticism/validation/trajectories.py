@@ -77,10 +77,6 @@ class Batch:
         column
             [n], real or complex.
 
-        Attributes
-        ----------
-        column by window.
-
         Returns
         -------
         array [W, n / W]

@@ -95,8 +95,6 @@ def rotor_angle_rad(capture: Capture) -> float | None:
 def read_step(capture: Capture) -> StepRecord | None:
     """The record of a capture, or None where it holds no step to speak of.
 
-    Raises KeyError where voltage, current, pair or rotor angle is missing.
-
     Parameters
     ----------
     capture

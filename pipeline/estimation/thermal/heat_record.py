@@ -71,9 +71,6 @@ class HeatRecord:
 def read_heat(capture: Capture, known: Constants) -> HeatRecord | None:
     """The record of a capture, or None where no current flows long enough.
 
-    Raises KeyError where voltage, current or winding temperature is missing, or where the rotor
-    turns and the flux, pole pairs or inductances needed to take its back-EMF off are unknown.
-
     Parameters
     ----------
     capture

@@ -238,10 +238,6 @@ def budget_of(parts: Iterable[Contribution]) -> Budget:
     parts
         Contributions [unit of the estimate], in any order.
 
-    Attributes
-    ----------
-    budget with one part a source.
-
     Returns
     -------
     Budget

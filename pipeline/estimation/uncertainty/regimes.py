@@ -73,7 +73,6 @@ class Disagreement:
 
     Attributes
     ----------
-    partition whose regimes differ beyond chance in one coefficient.
     partition
         The regimes that were compared.
     relative

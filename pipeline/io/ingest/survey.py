@@ -55,8 +55,6 @@ class Entry:
 
     Attributes
     ----------
-    file that is a capture
-        where it is, what it is, and all that is stated of it.
     path
         Relative to the input folder, with forward slashes.
     sha256

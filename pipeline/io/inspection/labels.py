@@ -101,10 +101,6 @@ def known_unit(target: str, text: str) -> str | None:
     text
         The unit as it is written.
 
-    Attributes
-    ----------
-    unit as the table of units spells it, whatever its capitals.
-
     Returns
     -------
     str or None

@@ -205,10 +205,6 @@ def numeric_columns(body: bytes, dialect: CsvDialect) -> Callable[[str], bool]:
     dialect
         Its layout.
 
-    Attributes
-    ----------
-    filter for the columns whose first rows hold numbers.
-
     Returns
     -------
     callable

@@ -90,10 +90,6 @@ def map_text(
     by_name
         Whether the file states `contract`, so that it must name the map that it is read by.
 
-    Attributes
-    ----------
-    source map in YAML for files of some shapes.
-
     Returns
     -------
     str

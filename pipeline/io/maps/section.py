@@ -124,10 +124,6 @@ class Section:
         key
             The key.
 
-        Attributes
-        ----------
-        list of texts, or one text.
-
         Raises
         ------
         UsageError
@@ -148,10 +144,6 @@ class Section:
         key
             The key.
 
-        Attributes
-        ----------
-        regular expression, None where the key is not there.
-
         """
         value = self.text(key)
         return None if value is None else self._expression(key, value)
@@ -163,10 +155,6 @@ class Section:
         ----------
         key
             The key.
-
-        Attributes
-        ----------
-        list of regular expressions.
 
         """
         return tuple(self._expression(key, value) for value in self.texts(key))
@@ -189,10 +177,6 @@ class Section:
             The key.
         default
             Where the key is not there.
-
-        Attributes
-        ----------
-        finite number.
 
         Raises
         ------

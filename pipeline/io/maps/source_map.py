@@ -369,10 +369,6 @@ def parse_source_map(data: bytes, name: str) -> SourceMap:
     name
         Name of the map.
 
-    Attributes
-    ----------
-    source map without variants.
-
     """
     return _parsed(_plain(data, name), name)
 

@@ -209,10 +209,6 @@ def normal_unit(text: str) -> str:
     text
         As it is written; brackets, spaces and the two micro signs are unified.
 
-    Attributes
-    ----------
-    unit as the table spells it.
-
     """
     bare = text.strip().strip("()[]").strip()
     bare = bare.translate(_LETTERS_ALIKE)

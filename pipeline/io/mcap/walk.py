@@ -44,10 +44,6 @@ def view_at_every_byte(data: Bytes | bytes, dtype: str) -> NDArray[np.generic]:
     dtype
         numpy's name of the type.
 
-    Attributes
-    ----------
-    view whose element i is the value that begins at byte i.
-
     Returns
     -------
     array

@@ -116,10 +116,6 @@ def table_of(trace: Trace) -> Table:
     trace
         The trace; extremes of measured, model and residual are kept in every stretch.
 
-    Attributes
-    ----------
-    trace as columns of float32, of a long one the rows that a screen can separate.
-
     """
     columns = {
         "measured": trace.measured,

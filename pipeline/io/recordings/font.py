@@ -44,11 +44,6 @@ def in_headings(unit: str) -> str:
     unit
         As people write it.
 
-    Attributes
-    ----------
-    unit for the heading of a table, whose font has no superscript minus
-        ×10⁻⁶ as 1e-6.
-
     """
 
     def plain(match: re.Match[str]) -> str:
@@ -64,10 +59,6 @@ def drawable(text: str) -> str:
     ----------
     text
         Any text.
-
-    Attributes
-    ----------
-    text with every character that the viewer cannot draw as its code point, ‹1F600›.
 
     """
     return _OTHER.sub(lambda found: f"‹{ord(found.group()):X}›", text)

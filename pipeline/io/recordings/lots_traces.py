@@ -69,10 +69,6 @@ def drift(constant: ConstantResult) -> pl.DataFrame | None:
     constant
         Its result.
 
-    Attributes
-    ----------
-    constant lot by lot, as change from the baseline.
-
     Returns
     -------
     DataFrame or None
@@ -110,10 +106,6 @@ def band_trace(band: CoggingBand) -> Trace:
     ----------
     band
         Mean and standard deviation over the motors of a side.
-
-    Attributes
-    ----------
-    band of cogging torque over the angle, with lines between its edges that fill it.
 
     Returns
     -------

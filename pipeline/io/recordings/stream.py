@@ -86,10 +86,6 @@ def recording(
     ids
         Ids of application and recording, where they have a meaning by themselves.
 
-    Attributes
-    ----------
-    recording that is made in memory inside the block.
-
     Yields
     ------
     Recording
@@ -180,10 +176,6 @@ def timed(entity: str, t_s: NDArray[np.float64], values: pl.DataFrame) -> Trace:
         Instants [n]; rows whose instant is not finite are left out.
     values
         Columns [n].
-
-    Attributes
-    ----------
-    table on the time line.
 
     """
     finite = np.isfinite(t_s)

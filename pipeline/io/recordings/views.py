@@ -68,10 +68,6 @@ def time_view(plan: ViewPlan) -> TimeSeriesView:
     plan
         What it shows.
 
-    Attributes
-    ----------
-    view over time; the x axes of all but magnifiers move together.
-
     """
     import rerun.blueprint as rrb
     from rerun.blueprint.components import LinkAxis
@@ -182,10 +178,6 @@ def page_view(entity: str, name: str) -> TextDocumentView:
     name
         Of the view.
 
-    Attributes
-    ----------
-    page of text.
-
     """
     import rerun.blueprint as rrb
 
@@ -201,10 +193,6 @@ def findings_view(entity: str, name: str) -> Any:
         Where it lies.
     name
         Of the view.
-
-    Attributes
-    ----------
-    log of findings; a click on a line moves the cursor to its row.
 
     """
     import rerun.blueprint as rrb

@@ -35,11 +35,6 @@ def policy(further: Sequence[str]) -> str:
     further
         Origins that are allowed beside the page's own.
 
-    Attributes
-    ----------
-    content security policy
-        nothing is loaded from, or sent to, other origins.
-
     """
     places = " ".join(["'self'", *further])
     return (

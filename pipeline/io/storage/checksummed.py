@@ -41,10 +41,6 @@ def read_checksummed(path: Path) -> Any:
     path
         The file.
 
-    Attributes
-    ----------
-    document whose digest holds.
-
     Returns
     -------
     object or None

@@ -110,10 +110,6 @@ def read_limits(path: Path) -> Limits:
     path
         The limits file.
 
-    Attributes
-    ----------
-    limits file as a record.
-
     Returns
     -------
     Limits

@@ -34,10 +34,6 @@ def load_plain(data: bytes, what: str) -> Plain:
     what
         Its name, for messages.
 
-    Attributes
-    ----------
-    YAML document as texts, lists and maps.
-
     Returns
     -------
     object

@@ -96,11 +96,6 @@ def csv_bytes(meta: Mapping[str, str], table: Table) -> bytes:
     table
         Columns by name [n each]; NaN is an empty field.
 
-    Attributes
-    ----------
-    capture as CSV
-        metadata lines, header and rows.
-
     Returns
     -------
     bytes
@@ -132,10 +127,6 @@ def mcap_bytes(meta: Mapping[str, str], tables: Sequence[Table], form: Format) -
         Columns by name [n each].
     form
         Encoding, compression and blocks.
-
-    Attributes
-    ----------
-    capture as MCAP, with the metadata record `capture` and all checksums that the format has.
 
     """
     from mcap.writer import CompressionType, Writer
