@@ -57,7 +57,8 @@ class Parameter:
         Parameters of one number above 0 form a term that the effect can do without; without it they
         are zero.
     u
-        Standard uncertainty [unit] of a value that a discriminator gives.
+        Standard uncertainty [unit] of a value that a discriminator gives: of an amplitude the prior
+        `usual`, which is then measured.
     at_least
         Another amplitude of the effect; where this one stays below half of it, captures speak
         against the effect.
@@ -606,6 +607,26 @@ class Discrimination:
     values: Mapping[str, tuple[float, float]]
 
 
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What full logs show of an effect without a fit of it.
+
+    Attributes
+    ----------
+    found
+        The effect, and parameters with their standard uncertainties.
+    start
+        Where a fit with it begins: further parameters of the effect, in their units.
+    base
+        The same of constants of the base.
+
+    """
+
+    found: Discrimination
+    start: Values
+    base: Values
+
+
 CoenergyHook = Callable[[Operating, Values], Any]
 DropHook = Callable[[Operating, Values], Complex]
 TorqueHook = Callable[[Operating, Values], Array]
@@ -615,6 +636,7 @@ LoadHook = Callable[[Recorded, Values], Array]
 VoltageHook = Callable[[Complex, Operating, Values, str], Complex]
 ClockHook = Callable[[str, Values], float]
 DiscriminatorHook = Callable[[Sequence[FullLog], Values], Discrimination | None]
+ShownHook = Callable[[Sequence[FullLog]], Shown | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -691,6 +713,9 @@ class Hooks:
 
     discriminator(logs, q): which of the effects that share this very function it is;
         None where full logs do not say. For effects whose equations differ in what windows smooth.
+
+    shown(logs): what full logs show of the effects that share a discriminator, whatever the
+        model without them has of the shaft; None where they show none.
     """
 
     coenergy: CoenergyHook | None = None
@@ -706,6 +731,7 @@ class Hooks:
     clock: ClockHook | None = None
     linear: LinearForm | None = None
     discriminator: DiscriminatorHook | None = None
+    shown: ShownHook | None = None
 
     @property
     def hook(self) -> str:

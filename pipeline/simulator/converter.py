@@ -66,6 +66,7 @@ class Control(NamedTuple):
     held_speed: bool
     dyno_nms: float
     dyno_nm: float
+    in_coupling: bool
     gain_a: float
     gain_b: float
     gain_c: float
@@ -521,7 +522,8 @@ def shaft_torque(y: Array, want: Array, volt: Pair, warm: Pair, c: Control, p: P
     """Torque the transducer sees, and the electromagnetic torque [N·m].
 
     A dynamometer that holds the far end has it in the coupling; one whose speed gives way shows the
-    reaction torque of its stator, which the inertia of its rotor is in.
+    reaction torque of its stator, which the inertia of its rotor is in. With `in_coupling` the
+    transducer is between the two parts whatever the far end does.
 
     Parameters
     ----------
@@ -542,6 +544,8 @@ def shaft_torque(y: Array, want: Array, volt: Pair, warm: Pair, c: Control, p: P
     """
     mechanics = (y[2], y[3], y[4], y[5])
     field = windings((y[0], y[1]), mechanics, volt, warm, p)
+    if c.in_coupling and p.two_mass:
+        return coupling(y[2] - y[4], y[3] - y[5], p), field[2]
     if not c.held_speed or c.dyno_nms > 0.0:
         return load_torque(y, want, c, p), field[2]
     if p.two_mass:

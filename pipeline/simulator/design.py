@@ -183,7 +183,8 @@ class Bench:
     `encoder_play_rad`; at rated torque the transducer reads `torque_bend_rel` of it too much, by a
     cubic, and `torque_hysteresis_rel` more on the way down than up. `dyno_hz` is the bandwidth of
     the dynamometer's speed loop, whose transducer then shows the reaction torque of its stator; 0
-    holds the shaft's far end at its speed, with the transducer in the coupling.
+    holds the shaft's far end at its speed, with the transducer in the coupling. With
+    `torque_in_coupling` the transducer of every log stands between the two masses.
     """
 
     station: str = "sim-1"
@@ -221,6 +222,7 @@ class Bench:
     torque_bend_rel: float = 0.0
     torque_hysteresis_rel: float = 0.0
     dyno_hz: float = 0.0
+    torque_in_coupling: bool = False
     instruments: Instruments | None = None
 
     def drawn(self, rng: np.random.Generator) -> Instruments:

@@ -130,6 +130,7 @@ def control(
         "held_speed": True,
         "dyno_nms": 0.0,
         "dyno_nm": 0.0,
+        "in_coupling": session.bench.torque_in_coupling,
         "ambient": m.ambient_degc,
         "temp_winding": warm[0],
         "temp_magnet": warm[1],

@@ -36,7 +36,10 @@ class Sensors:
         Angles turned between reversals that stand out of the noise of the angle; the column `run`
         numbers the current one.
     angle_step_rad
-        Resolution of an angle whose noise is its rounding; None where it was not determined.
+        Resolution of an angle whose noise is its rounding, before it was smoothed; None where it
+        was not determined.
+    parabola
+        Samples of the parabola that the angle was smoothed by; 1 for none.
 
     """
 
@@ -44,6 +47,7 @@ class Sensors:
     steps: Mapping[str, float] = field(default_factory=dict)
     runs_rad: Array | None = None
     angle_step_rad: float | None = None
+    parabola: int = 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -489,7 +489,7 @@ def noise_and_steps(
 
 def even_angle(
     columns: dict[str, Array], noise: dict[str, float], window: int, policy: Cutting
-) -> None:
+) -> int:
     """Takes an angle as its local parabola, as long a one as the motion of the shaft allows.
 
     Parameters
@@ -502,6 +502,11 @@ def even_angle(
         Samples of a weak window; a parabola has as many.
     policy
         Constants of judgement.
+
+    Returns
+    -------
+    int
+        Samples of the parabola; 1 where the shaft itself moves.
 
     Notes
     -----
@@ -519,16 +524,17 @@ def even_angle(
     """
     theta, half = columns["theta_mech_rad"], window // 2
     if theta.size < 3 * (2 * half + 1) or noise["theta_mech_rad"] <= 0.0:
-        return
+        return 1
     while (width := 2 * half + 1) >= policy.narrowest:
-        run = _parabolas(theta, width)
+        run = parabolas(theta, width)
         power = np.convolve((theta - run) ** 2, np.full(width, 1.0 / width), mode="valid")
         if float(power.max()) <= (policy.motion_u * noise["theta_mech_rad"]) ** 2:
             columns |= {"theta_mech_rad": run, UNSMOOTHED: theta}
             # variance of a parabola's middle by least squares
             noise["theta_mech_rad"] *= math.sqrt(2.25 / width)
-            return
+            return width
         half //= 2
+    return 1
 
 
 def evened(
@@ -559,15 +565,32 @@ def evened(
         return sensors
     noise = dict(sensors.noise)
     noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
-    even_angle(columns, noise, window, machine.policy.cutting)
-    return replace(sensors, noise=noise)
+    width = even_angle(columns, noise, window, machine.policy.cutting)
+    return replace(sensors, noise=noise, parabola=width)
 
 
-def _parabolas(signal: Array, width: int) -> Array:
-    """Local parabolas [n] of an odd width by least squares, those of the ends to the ends.
+def parabolas(signal: Array, width: int) -> Array:
+    """Local parabolas by least squares, those of the ends to the ends.
 
-    Reference: Savitzky & Golay, Anal. Chem. 36 (1964).
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit].
+    width
+        Samples of a parabola, odd; 1 leaves the signal.
+
+    Returns
+    -------
+    array [n]
+        Same unit.
+
+    References
+    ----------
+    Savitzky and Golay, Anal. Chem. 36(8), 1964, 1627, doi:10.1021/ac60214a047.
+
     """
+    if width == 1:
+        return signal
     half = width // 2
     at = np.arange(-half, half + 1) / half
     basis = np.vander(at, 3, increasing=True)

@@ -7,6 +7,7 @@ from pipeline.criticism.machine.two_masses import (
     discriminator,
     far_drag,
     passed_on,
+    shown,
     side_of,
     spring_twist,
 )
@@ -49,4 +50,5 @@ EFFECT = Effect(
     },
     torque=_torque,
     discriminator=discriminator,
+    shown=shown,
 )

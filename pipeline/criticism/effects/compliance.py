@@ -8,6 +8,7 @@ from pipeline.criticism.machine.two_masses import (
     discriminator,
     far_drag,
     passed_on,
+    shown,
     spring_twist,
 )
 
@@ -44,4 +45,5 @@ EFFECT = Effect(
     torque=_torque,
     linear=LINEAR_COUPLING,
     discriminator=discriminator,
+    shown=shown,
 )

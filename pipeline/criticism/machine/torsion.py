@@ -84,6 +84,8 @@ class Law:
         Rms torque that it passes in the `windows`.
     windows
         Windows in which the torque presses to both sides.
+    mobility, u_mobility
+        1/J of what turns under `momentum_nm` and its standard uncertainty [1/(kg·m²)].
 
     """
 
@@ -93,6 +95,8 @@ class Law:
     u_gap_rad: float
     torque_nm: float
     windows: int
+    mobility: float
+    u_mobility: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +146,8 @@ def law_of_twist(shafts: Iterable[Shaft], policy: Torsion) -> Law | None:
         2.0 * math.sqrt(spread[2, 2]),
         math.sqrt(float(np.mean(turning))),
         len(turning),
+        float(coefficients[0]),
+        math.sqrt(spread[0, 0]),
     )
 
 

@@ -30,9 +30,10 @@ from pipeline.criticism.effect import (
     Machine,
     Operating,
     Parameter,
+    Shown,
     Values,
 )
-from pipeline.criticism.machine.torsion import Shaft, law_of_twist
+from pipeline.criticism.machine.torsion import Law, Shaft, law_of_twist
 from pipeline.criticism.policy.machine import Torsion
 
 
@@ -327,13 +328,25 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
     between, share = q["between"] > 0.0, q["share"]
     if share <= 0.0 or not logs:
         return None
+    law = _law(logs, between, share)
+    if law is None or not between:
+        return None if law is None else _discriminated(law, logs[0], share)
+    return _in_coupling(law, logs[0], (1.0 - share) * logs[0].x.base["j_kgm2"])
+
+
+def _law(logs: Sequence[FullLog], between: bool, share: float) -> Law | None:
+    """The law of twist in logs, of enough windows; None without."""
     policy = logs[0].x.machine.policy.torsion
     law = law_of_twist((_shaft(one, between, share) for one in logs), policy)
-    if law is None or law.windows < policy.windows:
-        return None
-    part = 1.0 if between else share
+    return None if law is None or law.windows < policy.windows else law
+
+
+def _discriminated(law: Law, log: FullLog, part: float) -> Discrimination | None:
+    """The form that a law surely has, `part` of the twist in it; a gap with its own numbers."""
+    machine = log.x.machine
+    policy = machine.policy.torsion
     gap, u_gap = law.gap_rad / part, law.u_gap_rad / part
-    torque = logs[0].x.machine.scales["torque_nm"] / part
+    torque = machine.scales["torque_nm"] / part
     values = {"twist_rad": (torque * law.softness, torque * law.u_softness)}
     if law.softness < policy.sure_u * law.u_softness:
         values.clear()
@@ -341,6 +354,54 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
     if gap > max(matters, policy.sure_u * u_gap):
         return Discrimination("backlash", {**values, "gap_rad": (gap, u_gap)})
     return Discrimination("compliance", {}) if gap + policy.sure_u * u_gap < matters else None
+
+
+def _in_coupling(law: Law, log: FullLog, near_kgm2: float) -> Discrimination | None:
+    """The form that a law surely has where the transducer stands in the coupling, with the spring's
+    numbers and the share of the inertia behind it, as no twist is in the equations there; None
+    without a far inertia.
+    """
+    policy = log.x.machine.policy.torsion
+    found = _discriminated(law, log, 1.0)
+    if found is None or law.mobility < policy.sure_u * law.u_mobility:
+        return None
+    torque = log.x.machine.scales["torque_nm"]
+    near = near_kgm2 * law.mobility
+    values = {**found.values, "share": (1.0 / (1.0 + near), near * law.u_mobility / law.mobility)}
+    if law.softness > policy.sure_u * law.u_softness:
+        values["twist_rad"] = torque * law.softness, torque * law.u_softness
+    return Discrimination(found.name, values)
+
+
+def shown(logs: Sequence[FullLog]) -> Shown | None:
+    """Two masses from the torque in their coupling, whatever a fit has of the shaft.
+
+    Parameters
+    ----------
+    logs
+        Whole logs with angle and the torque in the coupling; their base inertia is taken as that of
+        the motor's side.
+
+    Returns
+    -------
+    Shown or None
+        None where no far inertia, or no twist nor gap, surely stands behind the transducer.
+
+    Notes
+    -----
+    θ = ∬S/(f J) + twist(S), over times in which nothing else turns the far part: no drag of the
+    motor, no current and no flux is in it. A transducer beyond the far part gives no such law, as
+    then its torque turns nothing.
+
+    """
+    law = _law(logs, True, 0.5) if logs else None
+    if law is None:
+        return None
+    near = logs[0].x.base["j_kgm2"]
+    found = _in_coupling(law, logs[0], near)
+    if found is None or "twist_rad" not in found.values:
+        return None
+    return Shown(found, {"between": 1.0}, {"j_kgm2": near + 1.0 / law.mobility})
 
 
 def _shaft(log: FullLog, between: bool, share: float) -> Shaft:

@@ -229,7 +229,7 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
     fit, model, own = system.fit, system.fit.model, system.columns[: system.model_columns.size]
     sure_of = _reported(system, held)
     u = dict(zip((c.name for c in own), sure_of.u.tolist(), strict=True))
-    beyond = _beyond(sure_of.u, system.prior_precision[: len(own)], fit.policy.fit)
+    beyond = _beyond(sure_of.u, _of_handbooks(system), fit.policy.fit)
     determined = within(beyond, sure_of.found.sizes)
     sized = dict(zip(u, determined.tolist(), strict=True))
     limits, stated = limits_of(model), model.stated()
@@ -298,6 +298,15 @@ def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
                 f"these captures say {value:.4g} ± {alone:.2g}"
             )
     return tuple(notes)
+
+
+def _of_handbooks(system: LinearSystem) -> Array:
+    """Prior precision [own] of the parameters, without what full logs of these captures give."""
+    known = system.fit.model.parameters()
+    logged = {name for name, (_, p) in known.items() if p.amplitude and p.u > 0.0}
+    own = system.columns[: system.model_columns.size]
+    elsewhere = np.array([column.name not in logged for column in own])
+    return np.where(elsewhere, system.prior_precision[: len(own)], 0.0)
 
 
 def _beyond(u: Array, prior_precision: Array, policy: GaussNewton) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import UNSMOOTHED, Segment, projected, row_index
 from pipeline.criticism.data.sensor_noise import rounding_error, unrounded
+from pipeline.criticism.data.traces import parabolas
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
@@ -90,8 +91,9 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     -----
     Noise is added to the recording and the residual computed again; the variance of the change is
     pooled over the windows. The noise is white, of each sensor's own level; an angle that is
-    rounded, and signals that are coarse, are rounded anew besides. Where an angle was smoothed,
-    what that changes in the residual counts too: it may have been noise or motion.
+    rounded, and signals that are coarse, are rounded anew besides. The noise of an angle that was
+    smoothed is smoothed alike: what is slow in it stays as it was. What the smoothing changes in
+    the residual counts too: it may have been noise or motion.
 
     """
     policy, even = model.policy.noise_floors, model.policy.sensor_noise.smooth
@@ -108,7 +110,7 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     for replicate in range(replicates):
         generator = np.random.default_rng([seed, replicate])
         noisy = {
-            name: column + generator.normal(0.0, _white(segment, name), column.size)
+            name: column + _smoothed(segment, name, generator.normal(size=column.size))
             for name, column in segment.recorded.items()
         }
         for name, step in sensors.steps.items():
@@ -116,7 +118,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
         if sensors.angle_step_rad:
             theta = segment.recorded["theta_mech_rad"]
             step, shift = sensors.angle_step_rad, generator.uniform(-0.5, 0.5)
-            noisy["theta_mech_rad"] = theta + rounding_error(theta, step, shift, even)
+            error = rounding_error(theta, step, shift, even if sensors.parabola == 1 else 1)
+            noisy["theta_mech_rad"] = theta + parabolas(error, sensors.parabola)
         change = projected(segment, residual(segment, model, values, noisy)) - plain
         np.add.at(total, group[valid], change[valid] ** 2)
         np.add.at(count, group[valid], 1.0)
@@ -127,6 +130,16 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
         power = np.bincount(group[valid], change[valid] ** 2, len(groups))
         variance += power / np.maximum(np.bincount(group[valid], minlength=len(groups)), 1)
     return np.sqrt(variance) + 1e-300
+
+
+def _smoothed(segment: Segment, name: str, normal: Array) -> Array:
+    """Noise of a column from standard normal numbers [n]; that of a smoothed angle is smoothed."""
+    width = segment.sensors.parabola if name == "theta_mech_rad" else 1
+    if width == 1:
+        return _white(segment, name) * normal
+    smooth = parabolas(normal, width)
+    noise: Array = _white(segment, name) / math.sqrt(2.25 / width) * smooth
+    return noise
 
 
 def _white(segment: Segment, name: str) -> float:

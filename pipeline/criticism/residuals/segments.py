@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.instruments import gains_of
-from pipeline.criticism.data.segment import Kept, Segment, with_lines
+from pipeline.criticism.data.segment import UNSMOOTHED, Kept, Segment, with_lines
 from pipeline.criticism.data.sensor_noise import is_rounded, rounding_step
 from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.effect import Machine
@@ -122,6 +122,7 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
     rounding is then periodic in the angle, as an electrical order is.
     """
     theta, step = segment.recorded.get("theta_mech_rad"), machine.encoder_rad
+    theta = segment.recorded.get(UNSMOOTHED, theta)
     if theta is None:
         return segment
     policy = machine.policy.sensor_noise

@@ -36,8 +36,21 @@ def discriminate(fit: Fit, effect: Effect) -> Discrimination | None:
     if effect.discriminator is None:
         return None
     model, values = fit.model.without(effect.name), fit.values
-    logs = [_whole(s, model, fit) for s in fit.segments if s.unthinned.columns is not None]
-    return effect.discriminator(logs, values_of(effect, model.machine, values))
+    return effect.discriminator(full_logs(fit, model), values_of(effect, model.machine, values))
+
+
+def full_logs(fit: Fit, model: Model) -> list[FullLog]:
+    """Every log of a fit at full rate.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    model
+        What is said of the logs: that of the fit, or less.
+
+    """
+    return [_whole(s, model, fit) for s in fit.segments if s.unthinned.columns is not None]
 
 
 def _whole(segment: Segment, model: Model, fit: Fit) -> FullLog:
@@ -89,7 +102,8 @@ def sharing_discriminator(effect: Effect, library: Mapping[str, Effect]) -> tupl
 
 
 def settled(effect: Effect, discrimination: Discrimination) -> Effect:
-    """An effect with the shapes that full logs give; no fit moves them any more.
+    """An effect with the shapes that full logs give, which no fit moves any more, and with their
+    amplitudes as priors.
 
     Parameters
     ----------
@@ -103,8 +117,10 @@ def settled(effect: Effect, discrimination: Discrimination) -> Effect:
 
 
 def _known(p: Parameter, discrimination: Discrimination) -> Parameter:
-    if p.name not in discrimination.values or p.amplitude:
+    if p.name not in discrimination.values:
         return p
+    if p.amplitude:
+        return replace(p, usual=discrimination.values[p.name], u=discrimination.values[p.name][1])
     return replace(p, choice=True, scan=(1.0,), u=discrimination.values[p.name][1])
 
 

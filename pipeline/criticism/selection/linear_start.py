@@ -67,19 +67,42 @@ def with_linear_start(
 
     """
     ranked = list(scores)
-    for name, candidate in {c.effect.name: c for c in reversed(offered)}.items():
+    for candidate in {c.effect.name: c for c in reversed(offered)}.values():
         form = candidate.effect.linear
         if form is None or not _misses(wide, significant, form.channel):
             continue
-        started = _scored(wide, candidate, form)
-        if started is None:
-            continue
-        started = replace(started, penalty=started.penalty + searched(offered))
-        others = [score for score in ranked if score.candidate.effect.name != name]
-        known = [score for score in ranked if score.candidate.effect.name == name]
-        best = max([started, *known], key=lambda score: score.fall)
-        ranked = sorted([*others, best], key=lambda s: (-s.fall, s.candidate.effect.name))
+        begun = _begun(wide.fit, candidate.effect, form)
+        if begun is not None:
+            ranked = with_better(ranked, scored(wide, candidate, begun), offered)
     return tuple(ranked)
+
+
+def with_better(
+    scores: Sequence[Score], started: Score, offered: Sequence[Candidate]
+) -> list[Score]:
+    """Scores with another one of an effect in the place of its own, where that is of more fall.
+
+    Parameters
+    ----------
+    scores
+        One an effect.
+    started
+        The other one, without what the search costs.
+    offered
+        The candidates.
+
+    Returns
+    -------
+    list of Score
+        The largest fall first.
+
+    """
+    name = started.candidate.effect.name
+    started = replace(started, penalty=started.penalty + searched(offered))
+    others = [score for score in scores if score.candidate.effect.name != name]
+    known = [score for score in scores if score.candidate.effect.name == name]
+    best = max([started, *known], key=lambda score: score.fall)
+    return sorted([*others, best], key=lambda s: (-s.fall, s.candidate.effect.name))
 
 
 def _misses(wide: LinearSystem, significant: NDArray[np.bool_], channel: str) -> bool:
@@ -92,33 +115,48 @@ def _misses(wide: LinearSystem, significant: NDArray[np.bool_], channel: str) ->
     )
 
 
-def _scored(wide: LinearSystem, candidate: Candidate, form: LinearForm) -> Score | None:
-    """The score of an effect fitted from its linear form; None where the signal shows none.
+def scored(wide: LinearSystem, candidate: Candidate, begun: Fit) -> Score:
+    """The score of an effect fitted from a start of its own.
 
+    Parameters
+    ----------
+    wide
+        The fit without it.
+    candidate
+        The effect.
+    begun
+        Where the fit with it begins; the last effect of its model is the candidate's.
+
+    Returns
+    -------
+    Score
+        Without what the search over candidates costs.
+
+    Notes
+    -----
     A twist derived from an angle amplifies its noise. Both fits use the noise floors of the fit
     with the effect.
+
     """
-    begun = _begun(wide.fit, candidate.effect, form)
-    if begun is None:
-        return None
     near = gauss_newton(replace(begun, sigma=floors(begun.segments, begun.model, begun.values)))
     end = _reweighted(near.fit, near.fit)
     base = _reweighted(wide.fit, end.fit)
     before, after = _standing(base), _standing(end)
-    prefix, first = f"{candidate.effect.name}.", candidate.effect.parameters_of(wide.fit.machine)[0]
+    effect = begun.model.effects[-1]
+    prefix, first = f"{effect.name}.", effect.parameters_of(wide.fit.machine)[0]
     values = {name: value for name, value in end.fit.values.items() if name.startswith(prefix)}
     score = Score(
-        replace(candidate, values=values),
+        replace(candidate, effect=effect, values=values),
         before.deviance - after.deviance,
         0.0,
         {f"{prefix}{first.name}": values[f"{prefix}{first.name}"]},
         {n: end.fit.values[n] - v for n, v in wide.fit.values.items()},
-        share_of(base, candidate.effect, before, after),
+        share_of(base, effect, before, after),
         values[f"{prefix}{first.name}"] / first.negligible,
         fall_below_floor(base, before.reduced_chi2, after.reduced_chi2),
         policy=wide.policy.selection,
     )
-    dof = paid_for(candidate.effect, wide.fit.machine, score)
+    dof = paid_for(effect, wide.fit.machine, score)
     return replace(score, penalty=dof * math.log(wide.size))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
 from pipeline.criticism.selection.linear_start import with_linear_start
+from pipeline.criticism.selection.log_start import with_log_start
 from pipeline.criticism.selection.pruning import trimmed, with_all_terms
 from pipeline.criticism.selection.score_test import (
     Score,
@@ -90,6 +92,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         scores = score_all(wide, offered, significant)
         scores = with_starts(wide, offered, scores, significant)
         scores = with_linear_start(wide, offered, scores, significant)
+        scores = with_log_start(wide, offered, scores, significant)
         added = tuple(e.name for e in fit.model.effects[base:])
         steps.append(LadderStep(added, wide, scores))
         if len(steps) == policy.most_steps:
@@ -271,7 +274,7 @@ def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np
 def _sure(system: LinearSystem) -> bool:
     """Whether some amplitude of the newest effect differs significantly from zero: two standard
     uncertainties away, whichever capture is left out. Of a coupling, its twist or gap must be so as
-    well.
+    well, by the fit or by full logs.
 
     A counterexample: a drag below the lowest speed of any capture can mend how friction changes
     sense at a reversal, while its own size is not known at all.
@@ -279,7 +282,8 @@ def _sure(system: LinearSystem) -> bool:
     effect = system.fit.model.effects[-1]
     sure = significantly_nonzero(system, leave_out(system), system.policy.selection.least_u)
     known = effect.parameters_of(system.fit.machine)
-    nonzero = [p for p in known if f"{effect.name}.{p.name}" in sure]
+    least, size = system.policy.selection.least_u, partial(system.fit.size, effect)
+    nonzero = [p for p in known if f"{effect.name}.{p.name}" in sure or 0.0 < least * p.u < size(p)]
     twists = [p for p in known if p.negligible > 0 and not p.amplitude]
     coupled = effect.discriminator is None or not twists or any(p in nonzero for p in twists)
     return coupled and any(p.amplitude for p in nonzero)

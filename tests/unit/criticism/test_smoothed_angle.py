@@ -46,3 +46,26 @@ def test_what_smoothing_an_angle_changes_counts_as_noise_of_each_order() -> None
         np.sqrt(np.mean(seen**2)), rel=0.05
     )
     assert added["torque_shaft_nm", 84] < 0.01 * added["torque_shaft_nm", 0]
+
+
+def test_the_slow_part_of_an_encoders_noise_stays_in_a_smoothed_angle() -> None:
+    """A parabola of 21 samples, a millisecond, takes nothing from noise that is as slow as a
+    window: the torque's floor at order 0 is that of the angle as it was, far above that of white
+    noise as small as what is left.
+    """
+    model = Model(machine(), ())
+    values = {c.name: BASE.get(c.name, 0.0) for c in CONSTANTS}
+    segments = (log(),)
+    fit = Fit(segments, model, values, floors(segments, model, values), values)
+    plain = planned("torque_map", fit)[0]
+    sigma = 1e-4
+
+    def floor(size: float, parabola: int) -> float:
+        noise = {**dict.fromkeys(plain.sensors.noise, 0.0), "theta_mech_rad": size}
+        sensors = replace(plain.sensors, noise=noise, steps={}, parabola=parabola)
+        found = noise_floor(replace(plain, sensors=sensors), model, values, 1)
+        return float(dict(zip(row_index(plain)[3], found, strict=True))["torque_shaft_nm", 0])
+
+    left = sigma * np.sqrt(2.25 / 21)
+    assert floor(left, 21) == pytest.approx(floor(sigma, 1), rel=0.15)
+    assert floor(left, 21) > 2.0 * floor(left, 1)

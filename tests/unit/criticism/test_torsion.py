@@ -158,6 +158,10 @@ def test_the_closer_look_names_the_form(gap: float, name: str, between: float):
     assert found is not None and found.name == name
     if gap:
         assert found.values["gap_rad"][0] == pytest.approx(gap, rel=0.15)
+    elif between:
+        assert found.values["share"][0] == pytest.approx(SHARE, rel=0.01)
+        torque = one.x.machine.scales["torque_nm"]
+        assert found.values["twist_rad"][0] == pytest.approx(0.004 * torque, rel=0.05)
     else:
         assert not found.values, "the fit knows the spring better: its damping is in it"
 

@@ -1,0 +1,78 @@
+"""An effect tried from what full logs show of it, where windows hardly show it at all.
+
+A transducer in a coupling reads what the motor's side passes on, and no twist is in that: to the
+windows the shaft is rigid there. A shaft that coasts carries the far part as well, so that its
+inertia contradicts that of the logs, and no tangent tells why. Of the logs as a whole the angle
+against the torque in the coupling gives the far inertia, the spring and the gap without a fit. Any
+effect with `shown` is tried from these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Effect, Values
+from pipeline.criticism.machine.model import zero
+from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.discrimination import full_logs, settled
+from pipeline.criticism.selection.linear_start import scored, with_better
+from pipeline.criticism.selection.score_test import Candidate, Score
+
+
+def with_log_start(
+    wide: LinearSystem,
+    offered: Sequence[Candidate],
+    scores: Sequence[Score],
+    significant: NDArray[np.bool_],
+) -> tuple[Score, ...]:
+    """Scores, those of effects that full logs show from there where no tangent is far better.
+
+    A tangent promises, while this start is fitted; and it leaves a twist or a gap open that full
+    logs know.
+
+    Parameters
+    ----------
+    wide
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+    scores
+        Scores by the tangent.
+    significant
+        Groups [G] over their floor; without any, nothing is tried.
+
+    Returns
+    -------
+    tuple of Score
+        The largest fall first.
+
+    """
+    found = list(scores)
+    by_name = {c.effect.name: c for c in reversed(offered)}
+    hooks = {c.effect.shown: c for c in by_name.values() if c.effect.shown is not None}
+    for hook in hooks if significant.any() else ():
+        seen = hook(full_logs(wide.fit, wide.fit.model))
+        if seen is None or seen.found.name not in by_name:
+            continue
+        candidate = by_name[seen.found.name]
+        effect = settled(candidate.effect, seen.found)
+        given = {name: value for name, (value, _) in seen.found.values.items()}
+        begun = _begun(wide.fit, effect, {**given, **seen.start}, seen.base)
+        started = scored(wide, candidate, begun)
+        alike = [s for s in found if s.candidate.effect.shown is hook]
+        best = max((s.fall for s in alike), default=0.0)
+        if started.fall > started.policy.close_share * best:
+            found = with_better([s for s in found if s not in alike], started, offered)
+    return tuple(found)
+
+
+def _begun(fit: Fit, effect: Effect, values: Values, base: Values) -> Fit:
+    """The fit with an effect at such values, by their short names, and such constants."""
+    model = fit.model.with_effects(effect)
+    own = {f"{effect.name}.{name}": value for name, value in values.items()}
+    return replace(fit, model=model).at({**zero(effect, model), **base, **own})
