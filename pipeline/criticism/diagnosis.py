@@ -157,7 +157,7 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
         ranking,
         _records(ladder.steps, ladder.held),
         end.sketch if verdict == "unknown" else None,
-        _as_reported(last, end.left),
+        _as_reported(last, end.remainders),
         _notes(campaign, machine, end, verdict, together),
         unseen,
         model.effects,
@@ -272,7 +272,7 @@ def _insufficient(
 
 def _verdict_of(end: SearchResult, unseen: Sequence[Unexcited]) -> Verdict:
     """What the end of the ladder says of the model; `unseen` are effects that nothing shows."""
-    if end.left and not end.ladder.explains(end.left):
+    if end.remainders and not end.ladder.explains(end.remainders):
         return "unknown"
     if end.ladder.steps[-1].added:
         return "missing"

@@ -1,8 +1,9 @@
-"""The search of one campaign, with orders that no equation observes and with instruments that
-drift.
+"""The search for missing effects in the captures of one motor.
 
-An order that no equation observes, or an instrument that drifts, is left over whatever effect is
-added. So the search is done once more where either is found, and the last result is reported.
+`search_ladder` adds effects to the requested model step by step (`selection.stepwise`), drops
+unsupported steps, and describes what no effect explains. No effect can explain an order of the
+angle that no equation observes, or an instrument that drifts. Where either is found, the search is
+repeated with it in the model, and the last result is reported.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ class Ladder:
         The steps.
     held
         Their held-out errors.
-    left
+    remainders
         What is over the floor at their end.
     cut
         Every effect that would remove some of that and was dropped, with a note where captures
@@ -69,7 +70,7 @@ class Ladder:
     base: BaseFit
     steps: tuple[LadderStep, ...]
     held: list[HeldOut]
-    left: tuple[Remainder, ...]
+    remainders: tuple[Remainder, ...]
     cut: dict[str, str]
 
     def explains(self, remainders: Sequence[Remainder]) -> bool:
@@ -92,7 +93,7 @@ class Ladder:
         """
         system = self.steps[-1].system
         large = remainder(system, large=True)
-        return tuple(one for one in self.left if one in large)
+        return tuple(one for one in self.remainders if one in large)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +104,7 @@ class SearchResult:
     ----------
     ladder
         Its steps.
-    left
+    remainders
         What is over the floor and is reported.
     sketch
         The unknown structure in that; None without one.
@@ -115,7 +116,7 @@ class SearchResult:
     """
 
     ladder: Ladder
-    left: tuple[Remainder, ...]
+    remainders: tuple[Remainder, ...]
     sketch: UnknownStructure | None
     change: Change | ChangeWithin | None
     notes: tuple[str, ...]
@@ -161,7 +162,7 @@ def search_ladder(
         return ladder_from(fit_of(segments(campaign, wider), model_of(model, wider)), library)
 
     ladder, sketch, gain = _by_orders(search_again, name)
-    remainders, notes = ladder.left, []
+    remainders, notes = ladder.remainders, []
     if sketch is None:
         drifting = _with_drift(ladder, library)
         if drifting is not None:
@@ -174,7 +175,7 @@ def search_ladder(
         notes += [_WITHIN] if sketch else []
     change = None if ladder.explains(remainders) else _changed(ladder.steps[-1].system)
     if change is not None and (sketch is None or change.gain > gain):
-        return SearchResult(ladder, remainders or ladder.left, None, change, (change.words,))
+        return SearchResult(ladder, remainders or ladder.remainders, None, change, (change.words,))
     notes += _beside(sketch, remainders)
     return SearchResult(ladder, remainders, sketch, None, tuple(notes))
 
@@ -207,14 +208,14 @@ def _by_orders(
     that are no whole numbers join where the sketch with them takes more.
     """
     ladder = search_again()
-    unlooked = orders_left(ladder.steps[-1].system)
-    whole = tuple(order for order in unlooked if isinstance(order, int))
+    unobserved = orders_left(ladder.steps[-1].system)
+    whole = tuple(order for order in unobserved if isinstance(order, int))
     if whole:
         ladder = search_again(*whole)
-    sketch, gain = _sketched(ladder, ladder.left, name)
-    if len(unlooked) > len(whole) and not ladder.explains(ladder.left):
-        between = search_again(*unlooked)
-        other, more = _sketched(between, between.left, name)
+    sketch, gain = _sketched(ladder, ladder.remainders, name)
+    if len(unobserved) > len(whole) and not ladder.explains(ladder.remainders):
+        between = search_again(*unobserved)
+        other, more = _sketched(between, between.remainders, name)
         if other is not None and (sketch is None or more > gain):
             return between, other, more
     return ladder, sketch, gain

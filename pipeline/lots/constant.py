@@ -54,7 +54,7 @@ class Material:
     limits: ConstantLimits
     unit: str
     words: str
-    found: Assessment
+    assessment: Assessment
     held: Held
     golden: tuple[Value, ...]
     repeats: tuple[Value, ...]
@@ -83,7 +83,7 @@ def result(
         With its verdict and the reason.
 
     """
-    found = made.found
+    found = made.assessment
     candidate = [v for v in found.values if v.side == "candidate"]
     lots = {lot: list(v) for side in (found.base, found.candidate) for lot, v in side.items()}
     mean = float(np.mean(found.candidate_means)) if found.candidate else 0.0
@@ -255,7 +255,7 @@ def _variance(made: Material, lots: Mapping[str, Sequence[float]]) -> tuple[Comp
     for value in made.repeats:
         again.setdefault((value.motor_id, label(value)), []).append(value.value)
     biases = [b.bias for b in _stations(made) if b.bias is not None and b.u is not None]
-    scatter = [v.u_a for v in made.found.values if v.u_a > 0.0]
+    scatter = [v.u_a for v in made.assessment.values if v.u_a > 0.0]
     return variance_components(lots, list(again.values()), scatter, biases)
 
 
@@ -298,7 +298,7 @@ def gauge_of(repeats: Sequence[Value]) -> Gauge | None:
 
 
 def _stations(made: Material) -> tuple[StationBias, ...]:
-    found = made.found
+    found = made.assessment
     seen = {station: value for value in found.values if (station := label(value))}
     golden: dict[str, set[str]] = {}
     for value in made.golden:

@@ -176,8 +176,8 @@ def _material(
 
 def _families(materials: Sequence[Material], limits: Limits) -> list[Family]:
     """Holm over the constants, for the lot-level test and for that of the motors."""
-    lots = [_lot_p(made.found, limits.min_lots) for made in materials]
-    motors = [_motor_p(made.found) for made in materials]
+    lots = [_lot_p(made.assessment, limits.min_lots) for made in materials]
+    motors = [_motor_p(made.assessment) for made in materials]
     size = max(sum(p is not None for p in motors), 1)
     return [
         Family(lot, motor, size)
@@ -263,8 +263,8 @@ def _notes(materials: Sequence[Material]) -> list[str]:
     """What the comparison left out, once each."""
     notes: dict[str, list[str]] = {}
     for made in materials:
-        if made.found.unlinked and not made.found.confounded:
-            lots = ", ".join(made.found.unlinked)
+        if made.assessment.unlinked and not made.assessment.confounded:
+            lots = ", ".join(made.assessment.unlinked)
             notes.setdefault(
                 f"baseline lots {lots} are of stations that nothing links to the candidate's, "
                 "and are left out",

@@ -134,20 +134,20 @@ class _Steps:
 
     system: LinearSystem
     time_s: Array
-    here: NDArray[np.bool_]
+    in_capture: NDArray[np.bool_]
     away: NDArray[np.bool_]
     column: Array
     times: Array
 
     def end(self, cut: int) -> End:
         """The best fit with another value behind a time."""
-        later = self.away | (self.here & (self.time_s > self.times[cut]))
+        later = self.away | (self.in_capture & (self.time_s > self.times[cut]))
         return End.of(self.system, np.where(later, self.column, 0.0)[:, None])
 
     def ramp(self) -> End:
         """The best fit with a value that moves evenly over the capture."""
         passed = (self.time_s - self.times[0]) / (self.times[-1] - self.times[0])
-        share = np.where(self.here, np.clip(np.nan_to_num(passed), 0.0, 1.0), self.away)
+        share = np.where(self.in_capture, np.clip(np.nan_to_num(passed), 0.0, 1.0), self.away)
         return End.of(self.system, (share * self.column)[:, None])
 
     def near(self, cut: int, deviance: float, least: int) -> tuple[int, int]:

@@ -38,7 +38,7 @@ class Expression:
     """Terms with amplitudes [unit of the port] and the covariance of amplitudes and scales.
 
     `covariance` is in the order of `directions`: (term, "amplitude" or a field of the term).
-    `gain`: fall of −2 log likelihood. `left` [R]: the residual with everything refitted.
+    `gain`: fall of −2 log likelihood. `residual` [R]: the residual with everything refitted.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Expression:
         Of amplitudes and scales, in that order.
     gain
         Fall of −2 log likelihood.
-    left
+    residual
         Residual with everything refitted [R].
 
     """
@@ -60,7 +60,7 @@ class Expression:
     directions: tuple[tuple[int, str], ...]
     covariance: Array
     gain: float
-    left: Array
+    residual: Array
 
     def value(self, v: Array, carrier: int = 0) -> Array:
         """The expression on one carrier.
@@ -505,11 +505,11 @@ def curve_about(
 
     """
     hats = pursuit.system.matrix[:, pursuit.model_size :] @ coarse
-    weight = pursuit.system.weights(pursuit.system.reduced_chi2(expression.left))
+    weight = pursuit.system.weights(pursuit.system.reduced_chi2(expression.residual))
     live = np.any(hats != 0.0, axis=0)
     normal = hats[:, live].T @ (weight[:, None] * hats[:, live])
     covariance = _inverse(normal)
-    step = -covariance @ (hats[:, live].T @ (weight * expression.left))
+    step = -covariance @ (hats[:, live].T @ (weight * expression.residual))
     basis = pursuit.port.basis
     if basis is None:
         raise ValueError("a port without a curve has no hats")

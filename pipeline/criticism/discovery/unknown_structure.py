@@ -23,10 +23,10 @@ from pipeline.records.diagnosis import UnknownStructure
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class RankedInput:
     """A port with the deviance it removes less its penalty, in sample and held out.
 
-    `left` [R] is the residual after it, `step` [k] the model's constants and its coefficients,
+    `residual` [R] is the residual after it, `step` [k] the model's constants and its coefficients,
     `place` where it stands in the list of ports.
 
     Attributes
@@ -37,7 +37,7 @@ class Found:
         Fall of the deviance less its penalty.
     held
         The same, held out.
-    left
+    residual
         Residual after it [R].
     step
         The model's constants and its coefficients [k].
@@ -49,7 +49,7 @@ class Found:
     port: Port
     gain: float
     held: float
-    left: Array
+    residual: Array
     step: Array
     place: int
 
@@ -103,7 +103,7 @@ def unknown_structure(
     # a drag over an inertia is a product: the expression is sought around the inertia found
     near = fit.moved(wide.columns[:model_size], best.step[:model_size])
     fine = linear_system(near, effect_columns(port.effect, near.model), wide)
-    weight = fine.weights(fine.reduced_chi2(best.left))
+    weight = fine.weights(fine.reduced_chi2(best.residual))
     pursuit = Pursuit(fine, model_size, port, weight)
     sketch = describe(pursuit, expression(pursuit), best.port, others, signals, name)
     return sketch, best.gain
@@ -123,7 +123,7 @@ def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
 
 def _ranked(
     before: LinearSystem, hooks: Sequence[str], in_parts: bool
-) -> tuple[list[Found], LinearSystem]:
+) -> tuple[list[RankedInput], LinearSystem]:
     """Every port that is worth its penalty and helps where it was not fitted, the best first."""
     fit = before.fit
     offered = ports(fit.model.machine, fit.policy.discovery, hooks)
@@ -156,7 +156,7 @@ def _ranked(
         held = reference - _held_out(wide, chosen, after, ridge, units)
         if held > least:
             ranked.append(
-                Found(port, gain, held, after, _ridge_step(wide, chosen, after, ridge), place)
+                RankedInput(port, gain, held, after, _ridge_step(wide, chosen, after, ridge), place)
             )
     return sorted(ranked, key=lambda f: (-f.held, f.port.effect.name)), wide
 
@@ -172,7 +172,7 @@ def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fit: Fit) -> Arra
     return (fit.policy.discovery.prior_size * np.array(scales)) ** -2.0
 
 
-def _simplest(candidates: Sequence[Found], policy: Policy) -> Found:
+def _simplest(candidates: Sequence[RankedInput], policy: Policy) -> RankedInput:
     """Of the ports that do about as well as the best, the one of fewest variables.
 
     Of several that the data do not discriminate it is the one listed first, the commonest in

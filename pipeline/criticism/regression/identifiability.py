@@ -46,7 +46,7 @@ class Known:
 
     Attributes
     ----------
-    found
+    identified
         What rows and priors determine.
     steps
         How far the parameters move without each capture that can be left out [K, own].
@@ -59,7 +59,7 @@ class Known:
 
     """
 
-    found: Identified
+    identified: Identified
     steps: Array
     rest: Array
     form_error_factor: Array
@@ -92,12 +92,12 @@ class Known:
         Efron and Stein, Ann. Statist. 9(3), 1981, 586, doi:10.1214/aos/1176345462.
 
         """
-        noise = self.found.u_of_bent(gradient) if bent else self.found.u_of(gradient)
+        noise = self.identified.u_of_bent(gradient) if bent else self.identified.u_of(gradient)
         count, moves = len(self.steps), self.steps @ gradient
         between = 0.0
         if count > 1:
             between = math.sqrt((count - 1) * float(np.var(moves)))
-        pull = self.found.root @ (self.found.root.T @ gradient)
+        pull = self.identified.root @ (self.identified.root.T @ gradient)
         form = float(np.linalg.norm(self.form_error_factor @ pull))
         return math.hypot(max(noise, between), float(self.rest @ gradient), form)
 
@@ -230,7 +230,7 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
     sure_of = _reported(system, held)
     u = dict(zip((c.name for c in own), sure_of.u.tolist(), strict=True))
     beyond = _beyond(sure_of.u, _of_handbooks(system), fit.policy.fit)
-    determined = within(beyond, sure_of.found.sizes)
+    determined = within(beyond, sure_of.identified.sizes)
     sized = dict(zip(u, determined.tolist(), strict=True))
     limits, stated = limits_of(model), model.stated()
     made = {}
@@ -355,7 +355,7 @@ def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCom
     fit, policy = system.fit, system.policy.fit
     names = [c.name for c in system.columns[: system.model_columns.size]]
     sure_of = _reported(system, held)
-    identified = sure_of.found
+    identified = sure_of.identified
     values = np.array([fit.values[name] for name in names])
     physical = {**dict.fromkeys(PHYSICAL), **fit.model.parameters()}
     observed = np.any(system.matrix[:, : len(names)] != 0.0, axis=0)
@@ -410,7 +410,7 @@ def _named(system: LinearSystem, sure_of: Known) -> dict[KnownCombination, Array
         is determined alone.
 
     """
-    fit, identified = system.fit, sure_of.found
+    fit, identified = system.fit, sure_of.identified
     names = [c.name for c in system.columns[: system.model_columns.size]]
     # central differences in sizes of the parameters: their own error is the square of that share
     steps = dict(zip(names, (1e-4 * identified.sizes).tolist(), strict=True))

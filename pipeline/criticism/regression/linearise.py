@@ -148,7 +148,10 @@ def linearise(
     noise, scale = floor.noise_and_scale(group[valid], sampler.reading_error(floor.near, valid))
     row_weight = 1.0 / scale
     kept = _weak_columns(segment, sampler, columns, valid)
-    both = np.column_stack([projected(segment, sampler.here)[valid], *kept]) * row_weight[:, None]
+    both = (
+        np.column_stack([projected(segment, sampler.base_residual)[valid], *kept])
+        * row_weight[:, None]
+    )
     absorb(both, offsets(segment, valid, row_weight, model.policy.noise_floors))
     unit = reported_unit(segment, values) / (row_weight * window_gain(segment))
     noise_ratio = noise * row_weight
@@ -186,7 +189,7 @@ def trial_residuals(
     _, _, valid, _ = row_index(segment)
     sampler = _sampler(segment, model, values)
     sampled = (
-        sampler.there(effect, model.with_effects(effect), {**sampler.values, **moved})
+        sampler.residual_with(effect, model.with_effects(effect), {**sampler.values, **moved})
         for effect, moved in trials
     )
     rows = np.stack([projected(segment, one)[valid] for one in sampled], axis=1)
@@ -318,7 +321,7 @@ class _Sampler:
         self.paced: dict[float, Array] = {}
         self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
-        self.here = measured(segment, segment.recorded, model, values) - self.start
+        self.base_residual = measured(segment, segment.recorded, model, values) - self.start
         # a hook's own column does without the small terms between samples
         self.quiet = {**values, "j_kgm2": 0.0, **dict.fromkeys(RIPPLES + TORQUE_RIPPLES, 0.0)}
 
@@ -360,7 +363,7 @@ class _Sampler:
             step = min(step, _FINE * self.values[column.name])
         moved = {**self.values, column.name: self.values[column.name] + step}
         if column.name in _OF_SENSORS:
-            return (self._residual(self.model, moved) - self.here) / step
+            return (self._residual(self.model, moved) - self.base_residual) / step
         x = replace(self.x, base=moved)
         pieces = self.pieces
         if column.name == "b_nm_s_rad":
@@ -399,7 +402,7 @@ class _Sampler:
             LATE_VOLTAGE,
             *UNLOGGED_K,
         ):
-            return (self._residual(self.model, moved) - self.here) / column.step
+            return (self._residual(self.model, moved) - self.base_residual) / column.step
         after = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(after - self.start) / column.step
 
@@ -411,17 +414,19 @@ class _Sampler:
         if effect.clock is not None:
             gains = [clock_gain(self.recorder, model, values) for values in (start, moved)]
             return self._along_time(column.step) * (gains[1] - gains[0]) / column.step
-        change: Array = (self.there(effect, model, moved) - self.here) / column.step
+        change: Array = (
+            self.residual_with(effect, model, moved) - self.base_residual
+        ) / column.step
         return change if np.any(change) else None
 
     def _along_time(self, step: float) -> Array:
         """d(residual)/d(gain of the clock) [C, n], once for all candidates that turn on it."""
         if step not in self.paced:
             moved = {**self.values, "gain_clock": self.values["gain_clock"] + step}
-            self.paced[step] = (self._residual(self.model, moved) - self.here) / step
+            self.paced[step] = (self._residual(self.model, moved) - self.base_residual) / step
         return self.paced[step]
 
-    def there(self, effect: Effect, model: Model, moved: dict[str, float]) -> Array:
+    def residual_with(self, effect: Effect, model: Model, moved: dict[str, float]) -> Array:
         """The residual where an effect has moved. An error of a voltage or a torque leaves the
         machine's state, and what its hooks gave, as they are.
         """

@@ -85,7 +85,7 @@ class Part:
 
     Attributes
     ----------
-    left
+    residual
         Residual of a signal [n, its unit].
     theta_rad
         Angle of the shaft [n].
@@ -96,7 +96,7 @@ class Part:
 
     """
 
-    left: Array
+    residual: Array
     theta_rad: Array
     weight: Array
     current: Array
@@ -145,7 +145,7 @@ class Part:
             One row a carrier.
 
         """
-        carried = np.stack(self.carriers) * self.left
+        carried = np.stack(self.carriers) * self.residual
         sums = [carried @ np.exp(-1j * order * self.theta_rad) for order in orders.tolist()]
         return np.array(sums).T
 
@@ -166,7 +166,7 @@ class Part:
 
         """
         turn = np.exp(-1j * step * self.theta_rad)
-        carried = np.stack(self.carriers) * self.left + 0j
+        carried = np.stack(self.carriers) * self.residual + 0j
         sums = np.empty((2, count), dtype=np.complex128)
         for place in range(count):
             carried *= turn
@@ -192,8 +192,8 @@ class Part:
         sizes = np.stack([np.ones(turn.size), self.current, np.abs(self.current)])
         waves = np.concatenate([sizes * turn.real, sizes * turn.imag])
         weighted = self.weight * waves
-        best = np.linalg.lstsq(weighted @ waves.T, weighted @ self.left, rcond=1e-9)[0]
-        return replace(self, left=self.left - best @ waves)
+        best = np.linalg.lstsq(weighted @ waves.T, weighted @ self.residual, rcond=1e-9)[0]
+        return replace(self, residual=self.residual - best @ waves)
 
 
 @dataclass(frozen=True, slots=True)

@@ -200,12 +200,12 @@ def _refit_best(
 
 @dataclass(frozen=True, slots=True)
 class _Baseline:
-    """The fit without a candidate, as the candidate is judged against it: with the effects `found`
+    """The fit without a candidate, as the candidate is judged against it: with the effects `added`
     so far, what it predicts of captures held out, its `shrunk` floors and `doubts` of form [G].
     """
 
     wide: LinearSystem
-    found: Sequence[Effect]
+    added: Sequence[Effect]
     held: HeldOut
     shrunk: Array
     doubt: Array
@@ -219,7 +219,7 @@ class _Baseline:
     def is_improved_by(self, tried: LinearSystem, score: Score) -> bool:
         """Whether a candidate predicts captures held out better, and mends more than it spoils."""
         wide, policy = self.wide, self.wide.policy.selection
-        same_hook = _same_hook(score.candidate.effect, self.found)
+        same_hook = _same_hook(score.candidate.effect, self.added)
         doubts = _doubt(wide, same_hook), self.doubt
         below = policy.same_hook_penalties if same_hook else policy.held_out_penalties
         promised = policy.held_out_penalties * score.penalty, below * score.penalty
@@ -309,8 +309,8 @@ def _doubt(wide: LinearSystem, added: Sequence[Effect]) -> Array:
     noise = np.bincount(wide.group, wide.row_weight**-2, len(wide.labels)) / np.maximum(
         wide.counts, 1.0
     )
-    residual: Array = noise / np.maximum(noise + wrong**2, 1e-300)
-    return residual
+    factors: Array = noise / np.maximum(noise + wrong**2, 1e-300)
+    return factors
 
 
 def _holds(

@@ -161,7 +161,7 @@ class _Response:
     """How window means of recorded less simulated move with the recording, to first order."""
 
     batch: Batch
-    found: Mapping[str, Array]
+    path: Mapping[str, Array]
     jacobian: Jacobian
     settled: NDArray[np.bool_]
     names: tuple[str, ...]
@@ -172,11 +172,11 @@ class _Response:
         """Changes [W] by what is added to recorded signals, and to each window's equations."""
         batch, recorded = self.batch, self.batch.segment.recorded
         other = {name: column + added.get(name, 0.0) for name, column in recorded.items()}
-        moved, _ = settle(batch, self.jacobian, self.found, other, 1, extra)
+        moved, _ = settle(batch, self.jacobian, self.path, other, 1, extra)
         changes = {}
         for name in self.names:
             after = _signal(batch, other, name) - _signal(batch, moved, name)
-            before = _signal(batch, recorded, name) - _signal(batch, self.found, name)
+            before = _signal(batch, recorded, name) - _signal(batch, self.path, name)
             changes[name] = _means((after - before)[self.settled])
         return changes
 

@@ -93,7 +93,7 @@ class Solved:
     """The fit of the rows, their noise [w, V] and the delay about which they were linearised."""
 
     rows: Rows
-    found: LinearFit
+    fit: LinearFit
     sigma: Array
     delay_s: float
 
@@ -175,7 +175,7 @@ def _solve(parts: Sequence[Part], columns: Sequence[int]) -> Solved | str:
         return str(solved[0])
     best = min(scored, key=lambda one: float(np.mean(np.log(one.sigma))))
     for _ in range(6):
-        delay = best.delay_s + float(best.found.coefficients[-1])
+        delay = best.delay_s + float(best.fit.coefficients[-1])
         nearer = _about(parts, columns, delay) if abs(delay) <= longest else ""
         if not isinstance(nearer, Solved) or abs(delay - best.delay_s) < 1e-6 * width:
             break
@@ -274,7 +274,7 @@ def _partitions(rows: Rows, paths: Sequence[str], weights: Array) -> list[Partit
 
 
 def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Estimate]:
-    rows, found = solved.rows, solved.found
+    rows, found = solved.rows, solved.fit
     used = [part.capture for part in parts]
     regression = Regression(rows.design, rows.voltage_v, solved.sigma, rows.cluster)
     deviation, dof = scatter(regression, found, policy().shaft_rows.overlap)
@@ -337,7 +337,7 @@ def _plots(parts: Sequence[Part], solved: Solved) -> tuple[Evidence, ...]:
     rows = solved.rows
     captures = [part.capture for part in parts]
     titles = ["Voltage by speed and acceleration"] * len(captures)
-    columns = rows.capture, rows.time_s, rows.voltage_v, rows.voltage_v - solved.found.residuals
+    columns = rows.capture, rows.time_s, rows.voltage_v, rows.voltage_v - solved.fit.residuals
     return tuple(METHOD.traces(captures, titles, "vq_v", columns, "window means"))
 
 

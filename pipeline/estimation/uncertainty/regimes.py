@@ -77,14 +77,14 @@ class Disagreement:
         The regimes that were compared.
     relative
         Coefficient of each regime over the common one [k].
-    found
+    between
         The test of their agreement.
 
     """
 
     partition: Partition
     relative: Array
-    found: Between
+    between: Between
 
     def part(self, source: str, value: float) -> Contribution:
         """The contribution of the regimes to the uncertainty of a constant.
@@ -102,7 +102,7 @@ class Disagreement:
             Type A, with the degrees of freedom of the scatter between regimes.
 
         """
-        return Contribution(f"{BETWEEN}{source}", self.found.sd * value, "A", self.found.dof)
+        return Contribution(f"{BETWEEN}{source}", self.between.sd * value, "A", self.between.dof)
 
     def words(self, what: str) -> str:
         """Which regimes differ, and by how much.
@@ -226,9 +226,9 @@ def disagreement(
     """
     weights = information(regression, column)
     tried = [_of_partition(regression, column, weights, p) for p in partitions(weights)]
-    found = [one for one in tried if one is not None]
-    beyond = [d for d in found if d.found.p_value * len(found) < level and d.found.sd > 0.0]
-    return max(beyond, key=lambda d: d.found.sd, default=None)
+    tested = [one for one in tried if one is not None]
+    beyond = [d for d in tested if d.between.p_value * len(tested) < level and d.between.sd > 0.0]
+    return max(beyond, key=lambda d: d.between.sd, default=None)
 
 
 def _of_partition(

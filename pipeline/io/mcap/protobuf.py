@@ -82,7 +82,7 @@ class ProtobufDecoder:
         pass_ = _Pass(batch.buffer, wanted)
         owner = np.arange(batch.start.size, dtype=np.int64)
         pass_.message(self.plan, "", batch.start, batch.start + batch.length, owner, owner.size)
-        return pass_.found
+        return pass_.leaves
 
     def _evenly(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf] | None:
         """The leaves of evenly spaced messages of one shape, copied by stride."""
@@ -120,7 +120,7 @@ class _Pass:
         self.buffer = buffer
         self.raw: Bytes = np.frombuffer(buffer, np.uint8)
         self.wanted = wanted
-        self.found: dict[str, Leaf] = {}
+        self.leaves: dict[str, Leaf] = {}
 
     def message(
         self,
@@ -149,11 +149,11 @@ class _Pass:
             if isinstance(part, Message):
                 self.nested(part, prefix, seen, rows, counts)
             elif not part.repeated:
-                self.found[prefix + part.name] = Leaf(
+                self.leaves[prefix + part.name] = Leaf(
                     self.singular(part, seen, rows, present), counts
                 )
             elif counts is None:
-                self.found[prefix + part.name] = self.repeated(part, seen, rows)
+                self.leaves[prefix + part.name] = self.repeated(part, seen, rows)
             else:
                 raise _bad(f"has the array {prefix + part.name!r} inside an array")
 

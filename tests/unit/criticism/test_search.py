@@ -28,7 +28,7 @@ def climbs(monkeypatch):
             return made.explained
 
         def large(self):
-            return ("large", *self.left)
+            return ("large", *self.remainders)
 
     def climbed(base, _):
         looked = base if isinstance(base, tuple) else "calm"
@@ -36,7 +36,7 @@ def climbs(monkeypatch):
         fit = Fit((), Model(machine(), ()), {}, (), {})
         step = SimpleNamespace(system=None, fit=fit)
         inside = SimpleNamespace(system=SimpleNamespace(fit=fit), hum=())
-        return Ladder(looked=looked, left=(looked,), steps=(step,), base=inside)
+        return Ladder(looked=looked, remainders=(looked,), steps=(step,), base=inside)
 
     def sketched(ladder, left, name, in_parts=False):
         what = ladder.looked, in_parts
