@@ -125,8 +125,8 @@ def test_a_part_is_rid_of_a_wave_of_one_size_or_as_the_current_or_its_size_goes(
     wave, other = size(current) * np.cos(16 * theta + 0.4), 0.01 * np.cos(17 * theta)
     part = Part(wave + other, theta, np.ones(theta.size), current)
     rid = part.without(16.0)
-    assert np.abs(rid.left - other).max() < 0.005
-    assert np.abs(part.left - other).max() > 0.9
+    assert np.abs(rid.residual - other).max() < 0.005
+    assert np.abs(part.residual - other).max() > 0.9
 
 
 @pytest.mark.parametrize("grows", ["never", "with the current", "with its size"])

@@ -95,7 +95,7 @@ def test_drift_is_looked_for_where_nothing_predicts_what_is_left(climbs):
     climbs.drifts = True
     found = end()
     assert found.ladder.looked == "calm"
-    assert found.left == ("large", "calm")
+    assert found.remainders == ("large", "calm")
     assert "drift" in found.notes[0]
     climbs.sketched = {((), False)}
     assert end().notes == ()
@@ -106,9 +106,9 @@ def test_a_sketch_held_out_in_parts_is_said_to_be_so(climbs):
     climbs.sketched = {((), True)}
     found = end()
     assert found.sketch is not None
-    assert (found.left, len(found.notes)) == (((),), 1)
+    assert (found.remainders, len(found.notes)) == (((),), 1)
     climbs.sketched = set()
-    assert (end().left, end().notes) == (("large", ()), ())
+    assert (end().remainders, end().notes) == (("large", ()), ())
 
 
 @pytest.mark.parametrize(("gain", "reported"), [(2.0, True), (0.5, False)])

@@ -68,7 +68,7 @@ def test_a_coefficient_of_each_regime_relative_to_the_common_one() -> None:
     assert found.relative == pytest.approx(np.array([1.0, 1.1]) / common, rel=5e-3)
     assert "half beyond chance" in found.words("it")
     part = found.part("x", 2.0)
-    assert part.u == pytest.approx(2.0 * found.found.sd)
+    assert part.u == pytest.approx(2.0 * found.between.sd)
     assert isinstance(part, Contribution)
     few = np.where(np.arange(120) < 19, 1, 0)
     assert _of_partition(made, 0, told, Partition("few", few, ("one", "other"))) is None
@@ -89,6 +89,6 @@ def test_what_regimes_say_has_no_unit(scale: float) -> None:
     assert one is not None
     assert same is not None
     assert same.relative == pytest.approx(one.relative)
-    assert 0.0 < one.found.p_value < 1.0
-    assert same.found.p_value == pytest.approx(one.found.p_value)
-    assert same.found.sd == pytest.approx(one.found.sd)
+    assert 0.0 < one.between.p_value < 1.0
+    assert same.between.p_value == pytest.approx(one.between.p_value)
+    assert same.between.sd == pytest.approx(one.between.sd)

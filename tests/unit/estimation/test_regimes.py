@@ -106,7 +106,7 @@ def test_a_slope_that_differs_is_found_with_its_size() -> None:
     assert found is not None
     common = float(np.linalg.lstsq(regression.design, regression.y, rcond=None)[0][0])
     assert found.relative * common == pytest.approx([1.0, 1.4], abs=0.05)
-    assert found.found.sd * common == pytest.approx(0.4 / math.sqrt(2.0), abs=0.04)
+    assert found.between.sd * common == pytest.approx(0.4 / math.sqrt(2.0), abs=0.04)
     assert found.part("x", 10.0).dof == 1
 
 
