@@ -93,8 +93,9 @@ _FIXED: dict[str, tuple[Requirement, ...]] = {
     "torque_table": _all("iq_a", "torque_shaft_nm"),
     "drive": (
         Requirement(
-            (DQ, ("vq_v", "iq_a"), ("iq_a",), ("vq_v",)),
-            "iq_a, with id_a, vd_v, vq_v where there; or vq_v alone",
+            (DQ, ("vq_v", "iq_a"), ("iq_a",), ("vq_v",), ("vdc_v", "idc_a", "torque_shaft_nm")),
+            "iq_a, with id_a, vd_v, vq_v where there; or vq_v alone; or vdc_v, idc_a and "
+            "torque_shaft_nm",
         ),
         _any("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad"),
     ),

@@ -234,6 +234,12 @@ def _remedy(test: str, there: frozenset[str]) -> str:
             "(`inspect ... column.NAME=iq_a`) and run with `constants={kt_peak_nm_a: 1}`; "
             "else record the current too"
         )
+    if test == "drive" and {"vdc_v", "idc_a"} <= there:
+        return (
+            "of the supply's power and a speed, what the road or the load takes is not known, and "
+            "nothing of the motor follows: add torque_shaft_nm, which gives the motor constant and "
+            "drag by the balance of power, or the phase current that the controller knows (iq_a)"
+        )
     return "record what is missing, or map it in conf/source"
 
 

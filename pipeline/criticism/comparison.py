@@ -23,7 +23,7 @@ from pipeline.criticism.regression.linear_system import LinearSystem, linear_sys
 from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.selection.missing_data import at_ambient, loaded, mixed, unused
+from pipeline.criticism.selection.missing_data import at_ambient, idle, loaded, mixed, unused
 from pipeline.criticism.selection.pruning import trimmed
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.validation.error_maps import all_maps
@@ -40,8 +40,6 @@ from pipeline.records.comparison import (
 )
 from pipeline.records.constants import Constants
 from pipeline.records.error_map import ErrorMap
-
-_IDLE = "no capture holds what an equation needs: record a torque map"
 
 
 def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Comparison:
@@ -76,7 +74,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     stated_model = model_of(model, machine)
     names = tuple(effect.name for effect in stated_model.effects)
     if not cut_segments:
-        return _nothing(campaign, model, names, *(mixed(campaign, machine) or (_IDLE,)))
+        return _nothing(campaign, model, names, *idle(campaign, machine))
     base = fit_of(cut_segments, stated_model)
     system = linear_system(trimmed(base.system, names).fit)
     held = leave_out(system)

@@ -30,7 +30,14 @@ from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import Ladder, SearchResult, search_ladder
 from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
-from pipeline.criticism.selection.missing_data import at_ambient, loaded, mixed, unexcited, unused
+from pipeline.criticism.selection.missing_data import (
+    at_ambient,
+    idle,
+    loaded,
+    mixed,
+    unexcited,
+    unused,
+)
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of, frame_notes
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
@@ -119,7 +126,9 @@ def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> BaseFit 
     if machine is None:
         return PAIRLESS
     cut_segments = segments(campaign, machine)
-    return fit_of(cut_segments, model_of(model, machine)) if _enough(cut_segments) else TOO_LITTLE
+    if _enough(cut_segments):
+        return fit_of(cut_segments, model_of(model, machine))
+    return TOO_LITTLE if cut_segments else "; ".join((TOO_LITTLE, *idle(campaign, machine)))
 
 
 def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagnosis, BaseFit]:

@@ -10,6 +10,7 @@ from pipeline.criticism.data.traces import with_values
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.policy import Policy
 from pipeline.numerics.integrals import trapezoid
+from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.weak_rows import smooth_speed, weak_rows
 from pipeline.records.capture import Capture
 
@@ -41,8 +42,29 @@ def settling_of(captures: Iterable[Capture], policy: Policy) -> tuple[float, flo
     return min(found)[1:] if found else None
 
 
+def unexplained_voltage(capture: Capture, policy: Policy) -> float | None:
+    """Power of a log's voltage that its motion does not explain, over what acceleration takes.
+
+    Parameters
+    ----------
+    capture
+        A drive log.
+    policy
+        Windows and delays.
+
+    Returns
+    -------
+    float or None
+        A torque that nothing recorded turns the shaft where it is large [1]; None where
+        `settling_of` says nothing of the log.
+
+    """
+    found = _of_log(capture, policy)
+    return None if found is None else found[0]
+
+
 def _of_log(recorded: Capture, policy: Policy) -> tuple[float, float, float] | None:
-    """Unexplained share of the voltage [1], time constant and delay [s] of one log."""
+    """Unexplained voltage over what acceleration takes, squared, time constant and delay [s]."""
     capture = with_values(recorded)
     if capture is None or capture.has("iq_a") or not capture.has("t_s", "vq_v"):
         return None
@@ -59,25 +81,34 @@ def _of_log(recorded: Capture, policy: Policy) -> tuple[float, float, float] | N
         speed = smooth_speed(t_s, theta, width / 8.0)
     except ValueError:
         return None
+    ends = zip(weak.starts, weak.starts + weak.sizes, strict=True)
+    slowest = np.array([np.abs(speed[first:last]).min() for first, last in ends])
+    turns = slowest > policy.cutting.slowest_share * float(np.abs(speed).max())
+    if np.count_nonzero(turns) < 2 * policy.cutting.load_windows:
+        return None
+    noise = [noise_about_cubics(t_s, one) for one in (volts, theta)]
     columns = [
         weak.integral(np.sign(speed)), weak.integral(theta, order=1), weak.integral(theta, order=2)
     ]  # fmt: skip
-    design = np.column_stack(columns)
+    design = np.column_stack(columns)[turns]
     best = (np.inf, 0.0, 0.0)
     longest = 5.0 * policy.priors.late_voltage_s
     for late_s in np.linspace(0.0, longest, max(2, round(4.0 * longest / width) + 1)).tolist():
-        target = weak.integral(np.interp(t_s - late_s, t_s, volts))
-        (_, k_speed, k_gain), left = _fitted(design, target)
+        target = weak.integral(np.interp(t_s - late_s, t_s, volts))[turns]
+        (_, k_speed, k_gain), power = _fitted(design, target)
+        own = np.hypot(noise[0] * weak.noise_gain(0), k_gain * noise[1] * weak.noise_gain(2))
+        power = max(power - target.size * float(own) ** 2, 0.0)
+        left = power / max(float(np.sum((k_gain * design[:, 2]) ** 2)), 1e-300)
         if k_speed > 0.0 and k_gain > 0.0:
             best = min(best, (left, float(k_gain / k_speed), late_s))
     return best if np.isfinite(best[0]) else None
 
 
 def _fitted(design: Array, target: Array) -> tuple[Array, float]:
-    """Coefficients [3], and the share of the target [w] that they leave."""
+    """Coefficients [3], and the power that they leave of the target [w]."""
     found = np.asarray(np.linalg.lstsq(design, target, rcond=None)[0], dtype=np.float64)
     left = target - design @ found
-    return found, float(left @ left) / max(float(target @ target), 1e-300)
+    return found, float(left @ left)
 
 
 def _period(t_s: Array) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, segment_of
+from pipeline.criticism.data.settling import unexplained_voltage
 from pipeline.criticism.data.traces import smoothed, window_of
 from pipeline.criticism.effect import Array, Machine, Operating, Values, between
 from pipeline.criticism.equation import (
@@ -41,7 +42,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     Returns
     -------
     Segment or None
-        None where another equation takes the log, and where the shaft does not turn.
+        None where another equation takes the log, where the shaft does not turn, and where a
+        torque that nothing recorded turns it.
 
     Notes
     -----
@@ -52,8 +54,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     """
     if any(capture.has(name) for name in ("iq_a", "id_a", "torque_shaft_nm")):
         return None
-    log = drive_log(capture, machine)
-    if log is None:
+    left, log = unexplained_voltage(capture, machine.policy), drive_log(capture, machine)
+    if log is None or (left is not None and left >= machine.policy.cutting.unexplained_share):
         return None
     policy, columns = machine.policy, log.columns
     speed = np.gradient(columns["theta_mech_rad"], log.period_s)

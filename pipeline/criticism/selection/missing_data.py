@@ -6,17 +6,18 @@ from collections.abc import Mapping, Sequence
 
 from pipeline.criticism.data.drive_log import drive_log
 from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.settling import unexplained_voltage
 from pipeline.criticism.data.traces import with_values
 from pipeline.criticism.data.unlogged_load import unexplained_share
 from pipeline.criticism.effect import Effect, Evidence, Machine
-from pipeline.criticism.library.equations import equation_of
+from pipeline.criticism.library.equations import equation_of, equations
 from pipeline.criticism.machine.model import UNLOGGED, Model
 from pipeline.criticism.residuals.segments import known_tests, mixed_setups
 from pipeline.criticism.selection.alternatives import detectable
 from pipeline.criticism.selection.score_test import Candidate
 from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.numerics.coast_setups import REMEDY, setup_words
-from pipeline.records.capture import Campaign
+from pipeline.records.capture import Campaign, Capture
 from pipeline.records.diagnosis import Unexcited
 
 
@@ -59,8 +60,49 @@ def unused(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str, ..
     return (f"not used, {words}: {', '.join(sorted(idle))}",) if idle else ()
 
 
+def idle(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
+    """Why no capture is used, and what each would need.
+
+    Parameters
+    ----------
+    campaign
+        All captures of one motor, none of which any equation took.
+    machine
+        Policy.
+
+    Returns
+    -------
+    tuple of str
+        One sentence a cause.
+
+    """
+    needs: dict[str, list[str]] = {}
+    for capture in campaign.captures:
+        needs.setdefault(_needs(capture), []).append(capture.path)
+    known = (*mixed(campaign, machine), *loaded(campaign, machine))
+    lacking = (f"{', '.join(sorted(paths))}: {words}" for words, paths in sorted(needs.items()))
+    return known or tuple(lacking)
+
+
+def _needs(capture: Capture) -> str:
+    """What the equation that a capture is nearest to needs of it."""
+    test = capture.meta.test
+    own = [one for one in equations().values() if test in one.tests]
+    if not own:
+        return f"no equation takes a {test}"
+    missing = [[n for n in one.columns if not capture.has(n)] for one in own]
+    fewest = min(map(len, missing))
+    if not fewest:
+        return (
+            f"the {test} has the columns of an equation, but too few even samples, or no motion "
+            "(theta_mech_rad, omega_mech_rad_s)"
+        )
+    ways = dict.fromkeys(" with ".join(names) for names in missing if len(names) == fewest)
+    return f"a {test} needs {' or '.join(ways)} as well"
+
+
 def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
-    """A note of the drives whose motion is not used, since an unrecorded torque turns the shaft.
+    """Notes of the drives whose motion is not used, since an unrecorded torque turns the shaft.
 
     Parameters
     ----------
@@ -70,22 +112,33 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
         Its orders of torque against angle.
 
     """
-    shares = {}
+    shares: dict[bool, dict[str, float]] = {True: {}, False: {}}
     for recorded in campaign.of("drive"):
         capture = None if recorded.has("torque_shaft_nm") else with_values(recorded)
-        log = drive_log(capture, machine) if capture and capture.has("t_s", "iq_a") else None
-        share = unexplained_share(log, machine) if log and log.angle else None
+        if capture is None or not capture.has("t_s"):
+            continue
+        share, current = None, capture.has("iq_a")
+        if current:
+            log = drive_log(capture, machine)
+            share = unexplained_share(log, machine) if log and log.angle else None
+        elif capture.has("vq_v"):
+            share = unexplained_voltage(capture, machine.policy)
         if share is not None and share >= machine.policy.cutting.unexplained_share:
-            shares[recorded.path] = share
-    if not shares:
-        return ()
-    where = ", ".join(f"{path} {100.0 * share:.2g} %" for path, share in sorted(shares.items()))
-    return (
-        "the motion of these drives gives no inertia and no friction, as a torque that "
+            shares[current][recorded.path] = share
+    where = {
+        current: ", ".join(f"{path} {100.0 * share:.2g} %" for path, share in sorted(own.items()))
+        for current, own in shares.items()
+    }
+    notes = {
+        True: "the motion of these drives gives no inertia and no friction, as a torque that "
         "nothing recorded turns the shaft (acceleration that does not follow the current over "
-        f"what does, squared): {where}; log torque_shaft_nm, or record with nothing coupled to "
-        "the shaft",
-    )
+        f"what does, squared): {where[True]}; log torque_shaft_nm, or record with nothing coupled "
+        "to the shaft",
+        False: "these drives without a current are not used, as a torque that nothing recorded "
+        "turns the shaft (voltage that follows neither speed nor acceleration over what the latter "
+        f"takes, squared): {where[False]}; log iq_a, or record with nothing coupled to the shaft",
+    }
+    return tuple(notes[current] for current, own in shares.items() if own)
 
 
 def at_ambient(cut_segments: Sequence[Segment], model: Model) -> tuple[str, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
@@ -108,3 +110,33 @@ def test_a_voltage_of_before_the_log_is_not_used() -> None:
     assert segment.kind == "driven"
     assert segment.weak is not None
     assert int(segment.weak.starts[0]) * segment.ts_s >= size.scales["late_s"] - segment.ts_s
+
+
+def test_a_load_that_nothing_recorded_is_named_and_no_effect_of_the_motor() -> None:
+    """What a load takes of the voltage follows neither speed nor acceleration."""
+    campaign = log(7, 0.0)
+    (one,) = campaign.captures
+    (table,) = one.tables
+    t_s, volts = (table[name].to_numpy() for name in ("t_s", "vq_v"))
+    pull = pl.Series("vq_v", volts + 0.8 * np.sin(3.0 * t_s))
+    loaded = replace(campaign, captures=(replace(one, tables=(table.with_columns(pull),)),))
+    found = compare(loaded, ModelSpec(), Constants({}))
+    assert found.errors == ()
+    assert "log iq_a" in found.notes[0]
+    told = diagnose(loaded, ModelSpec(), Constants({}))
+    assert told.verdict == "insufficient"
+    assert any("log iq_a" in note for note in told.notes)
+
+
+@pytest.mark.parametrize(
+    ("names", "needed"),
+    [(("theta_mech_rad",), "vq_v"), (("vq_v",), "theta_mech_rad, omega_mech_rad_s")],
+)
+def test_a_log_of_no_use_says_what_it_lacks(names: tuple[str, ...], needed: str) -> None:
+    """By its path, with the columns that the nearest equation has besides."""
+    campaign = log(8, 0.0)
+    (one,) = campaign.captures
+    tables = tuple(table.select(["t_s", *names]) for table in one.tables)
+    blind = replace(campaign, captures=(replace(one, tables=tables),))
+    found = compare(blind, ModelSpec(), Constants({}))
+    assert any("log.csv: " in note and needed in note for note in found.notes)
