@@ -80,7 +80,7 @@ def test_a_propeller_alone_shows_little_and_says_so() -> None:
             assert abs(one.number - true) < 2.0 * one.u, name
         else:
             assert EXPERIMENT in one.note
-    assert found["motor_constant_nm_sqrt_w"].u > 0.05 * KM
+    assert found["motor_constant_nm_sqrt_w"].u > 0.02 * KM
 
 
 def test_a_ride_says_what_would_determine_something() -> None:
