@@ -176,7 +176,9 @@ def finish(
     metadata = {key: value for key, value in settings.answers.items() if "." not in key}
     if unmapped:
         groups = _groups(unmapped)
-        names = name_patterns([one.file for one in unmapped], frozenset(settings.answers))
+        seen = [field.column for shape, _ in groups for field in shape.fields if field.column]
+        paths = [one.file for one in unmapped]
+        names = name_patterns(paths, frozenset(settings.answers), frozenset(seen))
         by_name = any("contract" in dict(one.report.metadata) for one in unmapped)
         text = map_text([shape for shape, _ in groups], names, metadata, by_name=by_name)
         if only is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -69,6 +70,8 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
     else:
         raw, source, verified = _read_csv(data, entry)
     frames = [frame for table in raw if (frame := _frame(table, source, meta)) is not None]
+    if source is not None:
+        frames = _with_columns(frames, source.columns_from_name(entry.path))
     if entry.form == "foreign":
         _once(frames)
     frames = _cut(frames, entry.part)
@@ -84,6 +87,13 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
 
 def _frame(table: RawTable, source: SourceMap | None, meta: CaptureMeta) -> pl.DataFrame | None:
     return to_frame(table, source, meta.pole_pairs)
+
+
+def _with_columns(frames: list[pl.DataFrame], stated: Mapping[str, float]) -> list[pl.DataFrame]:
+    """The frames, with columns of one number that none of them has beside the first."""
+    there = {name for frame in frames for name in frame.columns}
+    more = [pl.lit(value).alias(name) for name, value in stated.items() if name not in there]
+    return [frames[0].with_columns(more), *frames[1:]] if frames and more else frames
 
 
 def _once(frames: list[pl.DataFrame]) -> None:

@@ -81,7 +81,8 @@ class _Look:
         needs = bool(shape.streams) and (foreign or lacks)
         starter = ""
         if needs:
-            names = name_patterns([self.name], frozenset(self.answers))
+            seen = frozenset(field.column for field in shape.fields if field.column)
+            names = name_patterns([self.name], frozenset(self.answers), seen)
             given = {key: value for key, value in self.answers.items() if "." not in key}
             starter = map_text([shape], names, given, by_name=foreign)
         return InspectReport(

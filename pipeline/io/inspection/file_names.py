@@ -29,7 +29,15 @@ class NamePatterns:
     """Metadata that every name gives."""
 
 
-def name_patterns(paths: Sequence[str], stated: frozenset[str] = frozenset()) -> NamePatterns:
+_SPEED = re.compile(r"(?<![A-Za-z\d.])(-?\d{2,6})[_ ]?(rpm|RPM|Upm|upm|Umin|umin)(?![A-Za-z\d])")
+MOTION = frozenset({"omega_mech_rad_s", "theta_mech_rad", "theta_elec_rad"})
+
+
+def name_patterns(
+    paths: Sequence[str],
+    stated: frozenset[str] = frozenset(),
+    columns: frozenset[str] = MOTION,
+) -> NamePatterns:
     """The patterns that paths of one bench have in common.
 
     Parameters
@@ -38,6 +46,8 @@ def name_patterns(paths: Sequence[str], stated: frozenset[str] = frozenset()) ->
         Paths of files.
     stated
         Metadata keys that the files state themselves.
+    columns
+        Columns that the files hold; a speed in every name is one of them where none is a motion.
 
     Returns
     -------
@@ -63,6 +73,9 @@ def name_patterns(paths: Sequence[str], stated: frozenset[str] = frozenset()) ->
     if motor and "motor_id" not in stated:
         patterns.append(motor)
         keys.add("motor_id")
+    # where names state a direction beside it, the sign of the speed is not in its figures
+    if not columns & MOTION and not words_by_key["direction"] and all(map(_SPEED.search, paths)):
+        patterns.append(_SPEED.pattern.replace("(-?", "(?P<omega_mech_rad_s__rpm>-?"))
     for key, found in words_by_key.items():
         if not found or key in stated:
             continue

@@ -15,6 +15,7 @@ from pipeline.physics.glossary import COLUMNS
 
 _BRACKET = re.compile(r"^(.+?)\s*[(\[{<]\s*([^)\]}>]*?)\s*[)\]}>]\s*$")
 _AFTER = re.compile(r"^(.+?)(?:\s+/\s*|\s+in\s+|,\s+)(\S+(?:\s\S+)?)$")
+_CHANNEL = re.compile(r"^ch(?:annel)?\s?\d+[\s:_-]+(?=[^\s(\[])", re.IGNORECASE)
 _LEAST_STEM = 4
 _LETTERS = frozenset("acfhkv")
 """Ends of a name that are a phase as well as a unit: `current_a`."""
@@ -59,7 +60,8 @@ def read_label(name: str, unit_row: str | None = None) -> Label:
     """
     if last_part(name) in COLUMNS and not unit_row:
         return Label((last_part(name),), None, None, exact=True)
-    stem, text = _without_unit(name.strip(), unit_row)
+    # a recorder's own number of the channel says nothing of what it recorded
+    stem, text = _without_unit(_CHANNEL.sub("", name.strip()), unit_row)
     stem = last_part(stem.rstrip("."))
     dimensions = {unit for unit in FOREIGN_UNITS if text and known_unit(unit, text) is not None}
     found = tuple(c for c in _columns(stem) if not dimensions or COLUMNS[c].unit in dimensions)

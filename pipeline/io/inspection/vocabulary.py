@@ -93,6 +93,6 @@ TESTS: dict[str, str] = {
     "holding_current": "holding_current holding halten haltestrom maintien 保持",
     "flux_map": "flux_map fluxmap flusskennfeld 磁链图",
     "torque_table": "torque_table static statisch drehmomenttabelle 静态 静的 静特性 静トルク",
-    "drive": "drive fahrt betrieb zyklus log run conduite marche 运行 運転",
+    "drive": "drive sixstep six_step fahrt betrieb zyklus log run conduite marche 运行 運転",
 }
 DIRECTIONS = "cw ccw fwd rev forward reverse vor zurueck rueck links rechts vorwaerts rueckwaerts"

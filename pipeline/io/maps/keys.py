@@ -143,7 +143,9 @@ KEYS: tuple[Key, ...] = (
     Key(
         "file_names",
         "patterns",
-        "searched in the path of a file below the input folder; every named group is metadata",
+        "searched in the path of a file below the input folder; every named group is metadata, or "
+        "a column that is one number in the file: `(?P<omega_mech_rad_s__rpm>\\d+)rpm`, with "
+        "`__minus_rpm` where the name leaves out a minus",
         r"['(?P<motor_id>M\d+)_(?P<test>[A-Za-z]+)']",
     ),
     Key(

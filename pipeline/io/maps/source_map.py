@@ -11,11 +11,12 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Literal, get_args
 
 from pipeline.io.maps.section import Section
-from pipeline.io.maps.units import COUNTS, normal_unit
+from pipeline.io.maps.units import COUNTS, FOREIGN_UNITS, normal_unit, scale_to
 from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT, CsvDialect
 from pipeline.physics.glossary import COLUMNS
 from pipeline.records.errors import CaptureError, UsageError
+from pipeline.records.parse import number
 
 TimeFrom = Literal["field", "even", "log", "increment"]
 MessageForm = Literal["auto", "row", "block"]
@@ -245,9 +246,61 @@ class SourceMap:
         for pattern in self.file_names:
             match = re.search(pattern, path)
             for key, word in (match.groupdict() if match else {}).items():
-                if word:
+                if word and column_of(key) is None:
                     found.setdefault(key, values.get(key, {}).get(word, word))
         return found
+
+    def columns_from_name(self, path: str) -> dict[str, float]:
+        """Columns that are one number in the whole file, which its name states.
+
+        Parameters
+        ----------
+        path
+            Path of the file.
+
+        Returns
+        -------
+        dict of float
+            By column, in its own unit: of `wot_3000rpm.csv` 314.2 rad/s, by a group
+            `omega_mech_rad_s__rpm` around the figures.
+
+        """
+        found: dict[str, float] = {}
+        for pattern in self.file_names:
+            match = re.search(pattern, path)
+            for key, word in (match.groupdict() if match else {}).items():
+                meant, value = column_of(key), number(word.replace(",", ".")) if word else None
+                if meant is not None and value is not None:
+                    column, unit, sign = meant
+                    scale = scale_to(unit, COLUMNS[column].unit)
+                    found.setdefault(column, sign * value * scale.factor + scale.shift)
+        return found
+
+
+def column_of(group: str) -> tuple[str, str, float] | None:
+    """The column, unit and sign that a named group of a file name's pattern stands for.
+
+    Parameters
+    ----------
+    group
+        `COLUMN__UNIT`, or `COLUMN__minus_UNIT` where the name leaves out a minus.
+
+    Returns
+    -------
+    tuple or None
+        None of a group that is metadata.
+
+    Examples
+    --------
+    >>> column_of("omega_mech_rad_s__minus_rpm"), column_of("motor_id")
+    (('omega_mech_rad_s', 'rpm', -1.0), None)
+
+    """
+    column, _, unit = group.rpartition("__")
+    if column not in COLUMNS:
+        return None
+    minus = unit.startswith("minus_")
+    return column, unit.removeprefix("minus_"), -1.0 if minus else 1.0
 
 
 def _is_named(path: str, patterns: Iterable[str]) -> bool:
@@ -332,8 +385,8 @@ def parse_source_file(data: bytes, name: str) -> dict[str, SourceMap]:
     if not isinstance(variants, list) or not variants:
         raise UsageError(f"source map {name}: variants: is no list", "write `- recognise: ...`")
     found = {}
-    for number, variant in enumerate(variants, 1):
-        label = f"{name}/{number}"
+    for place, variant in enumerate(variants, 1):
+        label = f"{name}/{place}"
         if not isinstance(variant, dict):
             raise UsageError(f"source map {label}: is no map of keys", "write `key: value` lines")
         found[label] = _parsed(laid_over(plain, variant), label)
@@ -509,6 +562,11 @@ def _file_names(section: Section) -> tuple[str, ...]:
         if not re.compile(pattern).groupindex:
             remedy = "write `(?P<motor_id>...)` around what is metadata"
             raise section.fault("file_names", f"{pattern!r} has no named group", remedy)
+        for column, unit, _ in filter(None, map(column_of, re.compile(pattern).groupindex)):
+            known = FOREIGN_UNITS.get(COLUMNS[column].unit, {})
+            if normal_unit(unit) not in known:
+                remedy = f"write one of {', '.join(n for n in known if n.isidentifier())}"
+                raise section.fault("file_names", f"{unit!r} is no unit of {column}", remedy)
     return patterns
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from pipeline.io.inspection.file_names import name_patterns
 from pipeline.io.inspection.labels import read_label
 from pipeline.io.inspection.proposals import propose
 from pipeline.io.inspection.starter_map import header_pattern
-from pipeline.io.maps.source_map import SourceMap, parse_source_file
+from pipeline.io.maps.source_map import SourceMap, parse_source_file, parse_source_map
 from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import UsageError
 
@@ -331,3 +332,47 @@ def test_a_form_without_a_suffix_of_its_own_is_known_by_its_map(
     told = capsys.readouterr().out
     assert "1 file read by the source map moteus_ld" in told
     assert "no table of numbers: other.json" in told
+
+
+def test_a_speed_in_every_name_is_a_column_of_one_number() -> None:
+    """Where the files hold no motion, and no word beside the figures says which sense it is."""
+    names = ["E7_wot_-2000rpm.csv", "E7_wot_1000rpm.csv", "E7_wot_12000 rpm.csv"]
+    found = name_patterns(names, columns=frozenset({"iq_a"}))
+    source = SourceMap("x", file_names=found.patterns)
+    speeds = [source.columns_from_name(name)["omega_mech_rad_s"] for name in names]
+    assert speeds == pytest.approx([n * math.pi / 30.0 for n in (-2000.0, 1000.0, 12000.0)])
+    assert "omega_mech_rad_s__rpm" not in source.metadata_for(names[0])
+    held = [
+        (names, frozenset({"theta_mech_rad"})),
+        ([*names, "E7_wot.csv"], frozenset({"iq_a"})),
+        ([*names, "E7_rev_900rpm.csv"], frozenset({"iq_a"})),
+    ]
+    for paths, columns in held:
+        patterns = name_patterns(paths, columns=columns).patterns
+        assert not any("omega_mech_rad_s" in pattern for pattern in patterns)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "value"),
+    [
+        (r"(?P<omega_mech_rad_s__minus_rpm>\d+)rpm", -30.0 * math.pi),
+        (r"at(?P<temp_winding_degc__degC>\d+)", 85.0),
+    ],
+)
+def test_other_columns_and_a_minus_that_the_name_leaves_out(pattern: str, value: float) -> None:
+    found = SourceMap("x", file_names=(pattern,)).columns_from_name("rev_900rpm_at85.csv")
+    assert list(found.values()) == pytest.approx([value])
+
+
+def test_a_unit_that_the_column_cannot_have_is_refused() -> None:
+    with pytest.raises(UsageError, match="'kg' is no unit of omega_mech_rad_s"):
+        parse_source_map(
+            b"file_names: ['(?P<omega_mech_rad_s__kg>.)']\nrecognise: {files: ['*']}", "m"
+        )
+
+
+def test_a_channel_number_says_nothing_of_what_it_recorded() -> None:
+    assert read_label("CH3 Uab [V]").columns == ("vab_v",)
+    assert read_label("Channel 2: ia (A)").columns == ("ia_a",)
+    assert read_label("CH1").columns == read_label("CH2").columns == ()
+    assert name_patterns(["BL42_sixstep_1.csv"]).values["test"] == {"sixstep": "drive"}
