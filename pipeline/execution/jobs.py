@@ -78,6 +78,25 @@ class MotorJob:
 
 
 @dataclass(frozen=True, slots=True)
+class ModelTest:
+    """The residual test of a motor's job, for a worker that would be idle beside its fits.
+
+    Its verdict is kept where the job finds it. Nothing depends on it but the time.
+    """
+
+    job: MotorJob
+
+    @property
+    def name(self) -> str:
+        """What the task works on."""
+        return f"the residual test of {self.job.name}"
+
+    def without(self, path: str, reason: str) -> ModelTest:
+        """The task with a file refused for a reason."""
+        return replace(self, job=self.job.without(path, reason))
+
+
+@dataclass(frozen=True, slots=True)
 class MotorResult:
     """The result of a job: findings, files (none if no capture was usable) and times [s].
 

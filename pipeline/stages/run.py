@@ -17,7 +17,7 @@ from pipeline.execution.caches.keys import batch_parts, key_of, motor_parts
 from pipeline.execution.caches.run_cache import Batch, RunCache
 from pipeline.execution.caches.stamp import configuration_digest
 from pipeline.execution.caches.versions import RUN, tools
-from pipeline.execution.jobs import MotorJob, MotorResult
+from pipeline.execution.jobs import ModelTest, MotorJob, MotorResult
 from pipeline.execution.outputs.publishing import (
     fleet_of,
     other_motors,
@@ -109,17 +109,20 @@ def main(settings: RunSettings) -> Outcome:
     return replace(outcome, result=[sheet.document() for sheet in read_datasheets(output)])
 
 
-def process_motor(job: MotorJob) -> MotorResult:
+def process_motor(job: MotorJob | ModelTest) -> MotorResult | None:
     """One motor, in a worker: what it needs is imported there and not in the driver.
 
     Parameters
     ----------
     job
-        What to do with one motor, and how.
+        What to do with one motor, and how; or its residual test alone, beside it.
 
     """
     from pipeline.stages.steps import motor
 
+    if isinstance(job, ModelTest):
+        motor.test_model(job.job)
+        return None
     return motor.process_motor(job)
 
 
@@ -375,14 +378,29 @@ def _process(
         if job.key is not None and (done := cache.finished(job.motor_id, job.key)) is not None:
             ends[number] = MotorResult(job.motor_id, done, {})
     due = [number for number, end in enumerate(ends) if end is None]
-    with progress([_size(settings, jobs[number]) for number in due]) as bar:
-        found = workers.map_tasks(
-            process_motor, [jobs[number] for number in due], lambda at, _: bar.advance(at)
-        )
-    for number, end in zip(due, found, strict=True):
+    motors = [jobs[number] for number in due]
+    beside = _tests_beside(settings, motors, workers.count)
+
+    def advance(at: int, _: MotorResult | None) -> None:
+        if at < len(due):
+            bar.advance(at)
+
+    with progress([_size(settings, job) for job in motors]) as bar:
+        found = workers.map_tasks(process_motor, [*motors, *beside], advance)
+    for number, end in zip(due, found, strict=False):
         ends[number] = end
     died = tuple(end for end in ends if isinstance(end, MachineError))
     return [end for end in ends if isinstance(end, MotorResult)], died
+
+
+def _tests_beside(
+    settings: RunSettings, motors: Sequence[MotorJob], workers: int
+) -> list[ModelTest]:
+    """Residual tests for the workers that would be idle; a motor finds its own in the cache."""
+    tested = settings.residual_test and settings.diagnose != "true" and settings.cache
+    if not tested or settings.executor != "local":
+        return []
+    return [ModelTest(job) for job in motors[: max(0, workers - len(motors))]]
 
 
 def _order(finding: Finding) -> tuple[str, str, str, tuple[int, int]]:

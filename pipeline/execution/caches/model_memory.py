@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from pipeline.execution.caches.keys import key_of, model_parts
@@ -10,6 +11,7 @@ from pipeline.execution.jobs import MotorJob
 from pipeline.execution.tasks.work import Stamp
 from pipeline.io.storage.checksummed import keep_checksummed, read_checksummed
 from pipeline.io.storage.code_version import closure_digest, libraries_version
+from pipeline.io.storage.locks import one_at_a_time
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.model_verdict import ModelVerdict
@@ -28,6 +30,10 @@ class ModelMemory:
         self._campaign = stamp.campaign
         self._search = job.diagnose != "false"
         self._revoked = [revoked for revoked in job.revoked if revoked.version == stamp.version]
+
+    def one_at_a_time(self) -> AbstractContextManager[None]:
+        """Waits for the process that makes this motor's verdict, if there is one."""
+        return one_at_a_time(self._path.with_suffix(".lock"))
 
     def key(self, model: ModelSpec, start: Constants) -> str:
         """The key of everything that the verdict depends on.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from pipeline.estimation.registry import BROKEN
@@ -27,6 +28,9 @@ class Tested(NamedTuple):
 
 class Verdicts(Protocol):
     """A cache of verdicts, by a key of everything that they depend on."""
+
+    def one_at_a_time(self) -> AbstractContextManager[None]:
+        """Waits for the process that makes this motor's verdict, if there is one."""
 
     def key(self, model: ModelSpec, start: Constants) -> str:
         """The key of a model that is compared with the captures from these constants.
@@ -102,11 +106,14 @@ def judged_model(
 
     try:
         start = start_constants(campaign, constants)
-        key = "" if memory is None else memory.key(model, start)
-        if memory is not None and diagnose != "true" and (known := memory.recall(key)) is not None:
-            return Tested(known)
-        found, document = model_verdict(campaign, model, start, search=diagnose != "false")
-        if memory is not None:
+        if memory is None:
+            found, document = model_verdict(campaign, model, start, search=diagnose != "false")
+            return Tested(found, (), document if diagnose == "true" else None)
+        key = memory.key(model, start)
+        with memory.one_at_a_time():
+            if diagnose != "true" and (known := memory.recall(key)) is not None:
+                return Tested(known)
+            found, document = model_verdict(campaign, model, start, search=diagnose != "false")
             memory.keep(key, found)
     except (*BROKEN, MemoryError) as error:
         message = f"the residual test broke on these captures: {type(error).__name__}: {error}"

@@ -8,6 +8,13 @@ from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 
 
+def starts_from_fits(campaign: Campaign) -> bool:
+    """Whether criticism needs constants that estimators fit: neither nameplate nor spin gives the
+    pole pairs.
+    """
+    return campaign.nameplate("pole_pairs") is None and counted_pole_pairs(campaign) is None
+
+
 def start_constants(campaign: Campaign, fitted: Constants | None = None) -> Constants:
     """The constants from which criticism starts.
 
@@ -21,6 +28,6 @@ def start_constants(campaign: Campaign, fitted: Constants | None = None) -> Cons
         Constants that were fitted before; None to fit them now.
 
     """
-    if campaign.nameplate("pole_pairs") is not None or counted_pole_pairs(campaign) is not None:
+    if not starts_from_fits(campaign):
         return Constants()
     return fit_all(campaign, {})[0] if fitted is None else fitted

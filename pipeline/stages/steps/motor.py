@@ -15,8 +15,11 @@ from pipeline.execution.caches.run_cache import note_motor
 from pipeline.execution.caches.stamp import stamp_of
 from pipeline.execution.jobs import Files, Finished, MotorJob, MotorResult
 from pipeline.execution.tasks import work
+from pipeline.execution.tasks.model_tests import judged_model
+from pipeline.execution.tasks.start import starts_from_fits
 from pipeline.io.storage.publish import canonical_json, together
 from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Datasheet, Superseded
 from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.evidence import Evidence
@@ -43,6 +46,19 @@ def process_motor(job: MotorJob) -> MotorResult:
     if job.key is not None and not job.refused:
         note_motor(Path(job.output), job.motor_id, job.key, finished)
     return MotorResult(job.motor_id, finished, watch.seconds, lasting=not job.refused)
+
+
+def test_model(job: MotorJob) -> None:
+    """Makes the residual test of a motor beside its fits, where it does not start from them.
+
+    The verdict is kept for `process_motor`, which waits for it.
+    """
+    captures, _ = work.read(job, Stopwatch())
+    campaign = Campaign(job.motor_id, captures, job.constants)
+    if not captures or starts_from_fits(campaign):
+        return
+    verdicts = ModelMemory(job, stamp_of(job, campaign))
+    judged_model(campaign, job.model, Constants(), verdicts, job.diagnose)
 
 
 def _finish(job: MotorJob, watch: Stopwatch) -> Finished:

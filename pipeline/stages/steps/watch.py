@@ -23,7 +23,7 @@ from pipeline.records.outcome import Outcome
 from pipeline.report.text.waiting import waiting
 from pipeline.settings import RunSettings
 
-LOOK_EVERY_S = 0.5
+LOOK_EVERY_S = 0.2
 """Between two looks at the folder; ten times the time of a look where that is more."""
 RETRY_S = 30.0
 """Until a pass is tried again that failed for the machine's sake, such as a full disk."""

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,6 +24,8 @@ from pipeline.records.errors import UsageError
 from pipeline.records.estimate import Estimate
 from pipeline.records.ledger import Revocation
 from pipeline.records.model_verdict import Excess, ModelVerdict
+from pipeline.settings import RunSettings
+from pipeline.stages import run
 
 CAMPAIGN = Campaign("m", (Capture("a.csv", "0", "verified", CaptureMeta("m", "drive"), ()),))
 FOUND = ModelVerdict(
@@ -114,3 +120,66 @@ def test_switched_off_is_not_tested(made: list[ModelSpec]) -> None:
         (),
         [],
     )
+
+
+def test_two_that_need_a_verdict_at_once_make_it_once(
+    job: MotorJob, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A worker makes the test beside the motor's fits; the motor waits for it and takes it over."""
+    begun, made = threading.Event(), []
+
+    def verdict(*_: object, **__: object) -> tuple[ModelVerdict, Diagnosis]:
+        made.append(threading.current_thread().name)
+        begun.set()
+        time.sleep(0.2)
+        return FOUND, DIAGNOSIS
+
+    monkeypatch.setattr(adequacy, "model_verdict", verdict)
+
+    def tested() -> ModelVerdict:
+        memory = ModelMemory(job, Stamp("v", ("r",), "c" * 64, "0.1.0", "", ["m", "r"]))
+        return judged_model(CAMPAIGN, ModelSpec(), KNOWN, memory).verdict
+
+    with ThreadPoolExecutor(1, "beside") as pool:
+        beside = pool.submit(tested)
+        assert begun.wait(10.0)
+        assert tested() == beside.result() == FOUND
+    assert made == ["beside_0"]
+
+
+def test_a_verdict_whose_maker_broke_is_made_by_the_motor(
+    job: MotorJob, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> ModelVerdict:
+        raise ValueError("odd data")
+
+    memory = ModelMemory(job, Stamp("v", ("r",), "c" * 64, "0.1.0", "", ["m", "r"]))
+    with monkeypatch.context() as patch:
+        patch.setattr(adequacy, "model_verdict", broken)
+        assert judged_model(CAMPAIGN, ModelSpec(), KNOWN, memory).findings
+    monkeypatch.setattr(adequacy, "model_verdict", lambda *_, **__: (FOUND, DIAGNOSIS))
+    assert judged_model(CAMPAIGN, ModelSpec(), KNOWN, memory).verdict == FOUND
+
+
+@pytest.mark.parametrize(
+    ("changes", "motors", "workers", "beside"),
+    [
+        ({}, 1, 2, 1),
+        ({}, 1, 8, 1),
+        ({}, 2, 3, 1),
+        ({}, 2, 2, 0),
+        ({}, 5, 2, 0),
+        ({"diagnose": "true"}, 1, 2, 0),
+        ({"residual_test": False}, 1, 2, 0),
+        ({"cache": False}, 1, 2, 0),
+        ({"executor": "dask"}, 1, 2, 0),
+    ],
+)
+def test_only_a_worker_that_would_be_idle_makes_a_test_beside(
+    job: MotorJob, changes: dict[str, Any], motors: int, workers: int, beside: int
+) -> None:
+    jobs = [replace(job, motor_id=f"m{n}") for n in range(motors)]
+    found = run._tests_beside(replace(RunSettings(), **changes), jobs, workers)
+    assert [one.job.motor_id for one in found] == [f"m{n}" for n in range(beside)]
+    assert all(one.name == f"the residual test of {one.job.name}" for one in found)
+    assert all(one.without("a.csv", "slow").job.refused == (("a.csv", "slow"),) for one in found)
