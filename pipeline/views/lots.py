@@ -152,12 +152,11 @@ def _weight(constant: ConstantResult) -> tuple[int, float, str]:
 
 def _row(constant: ConstantResult, shared: int) -> ConstantRow:
     before, after = mean_of(constant, "baseline"), mean_of(constant, "candidate")
-    tested = constant.test.status == "evaluated"
     return ConstantRow(
         name=constant.name,
         symbol=symbol(constant.name),
         words=constant_words(constant.name) if constant.words == constant.name else constant.words,
-        verdict=constant.verdict.replace("_", " "),
+        verdict=constant.verdict.replace("_", " ").lower(),
         tone=TONES.get(constant.verdict, "none"),
         mark=MARKS.get(constant.verdict, NONE),
         why=constant.why,
@@ -167,9 +166,7 @@ def _row(constant: ConstantResult, shared: int) -> ConstantRow:
         after=NONE if after is None else quantity(after, constant.unit),
         change=change_text(constant) or NONE,
         change_sort=repr(constant.effect.relative or 0.0),
-        p_value=p_text(constant.test.p_holm)
-        if tested
-        else constant.test.status.replace("_", " ").lower(),
+        p_value=p_text(constant.test.p_holm),
         same=constant.equivalence.status.replace("_", " "),
         power=NONE if constant.power.power is None else f"{100 * constant.power.power:.0f} %",
         cpk=NONE if constant.capability.cpk is None else f"{constant.capability.cpk:.2f}",

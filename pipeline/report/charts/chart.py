@@ -26,8 +26,8 @@ from pipeline.report.charts.ticks import x_ticks, y_ticks
 
 Array = NDArray[np.float64]
 WIDTH, TOP, LEFT, RIGHT, BOTTOM = 640.0, 24.0, 62.0, 14.0, 38.0
-MAIN, GAP, RESIDUAL, LABELS = 210.0, 34.0, 70.0, 88.0
-MOST_LABELS, LABEL_PITCH, LABEL_CHARS = 8, 13.0, 12
+MAIN, GAP, RESIDUAL, LABELS = 210.0, 34.0, 70.0, 124.0
+MOST_LABELS, LABEL_PITCH, LABEL_CHARS = 8, 16.0, 13
 FILES = frozenset({".mcap", ".csv", ".txt", ".tsv", ".log"})
 LINE_LIMIT = 600
 FEW_DOTS = 150

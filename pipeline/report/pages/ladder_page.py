@@ -142,7 +142,7 @@ def _ranked(ranked: RankedEffect) -> dict[str, str]:
         "effect": ranked.effect,
         "score": f"{ranked.score:.4g}".replace("-", MINUS),
         "drop": f"{100.0 * ranked.held_out_drop:.0f} %" if ranked.held_out_drop else "–",
-        "p_value": f"{ranked.p_value:.2g}",
+        "p_value": f"{ranked.p_value:.2g}" if ranked.p_value else "< 1e−300",
         "confused_with": ", ".join(ranked.confused_with),
         "explanation": ranked.explanation,
         "experiment": ranked.experiment,
