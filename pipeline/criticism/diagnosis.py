@@ -185,7 +185,7 @@ def _notes(
 ) -> tuple[str, ...]:
     """What a reader of the diagnosis has to know besides: data, frame, hum, combinations."""
     ladder, last = end.ladder, end.ladder.steps[-1].system
-    stateless = verdict == "unknown" and end.sketch is None and end.change is None
+    stateless = verdict == "unknown" and not (end.sketch or end.change or end.freed)
     return (
         *unused(campaign, last.segments),
         *loaded(campaign, machine),
@@ -281,7 +281,7 @@ def _insufficient(
 
 def _verdict_of(end: SearchResult, unseen: Sequence[Unexcited]) -> Verdict:
     """What the end of the ladder says of the model; `unseen` are effects that nothing shows."""
-    if end.remainders and not end.ladder.explains(end.remainders):
+    if end.freed or (end.remainders and not end.ladder.explains(end.remainders)):
         return "unknown"
     if end.ladder.steps[-1].added:
         return "missing"

@@ -9,7 +9,7 @@ repeated with it in the model, and the last result is reported.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pipeline.criticism.discovery.changed_constants import Change, changed_constant
@@ -22,6 +22,7 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.segments import segments
+from pipeline.criticism.selection.changed_between import SHARES, free_tests
 from pipeline.criticism.selection.drift import drifting_segments
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.order_scan import orders_left
@@ -41,6 +42,17 @@ _ALONE = (
     "{} would help {} alone: predicted from the others, the other captures that it moves do not "
     "gain with it; record that test once more"
 )
+_SHARE_OF = {
+    "coast_dry_share": "dry friction",
+    "coast_viscous_share": "viscous friction",
+    "open_flux_share": "psi_wb",
+}
+"""What a share that is left free is of."""
+_LOOKS_ALIKE = {
+    "spin_down": "a part on the shaft or a clock that is off there",
+    "open_circuit": "a clock that is off there",
+}
+"""What else such a share may be."""
 _WITHIN = (
     "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
     "capture shows it: whatever changes as slowly looks the same; record that test once more"
@@ -110,6 +122,8 @@ class SearchResult:
         The unknown structure in that; None without one.
     change
         The constant that changed between captures; None without one.
+    freed
+        What says that friction or a magnet is another in one kind of test, one sentence each.
     notes
         Remarks, one sentence each.
 
@@ -119,6 +133,7 @@ class SearchResult:
     remainders: tuple[Remainder, ...]
     sketch: UnknownStructure | None
     change: Change | ChangeWithin | None
+    freed: tuple[str, ...]
     notes: tuple[str, ...]
 
 
@@ -175,9 +190,34 @@ def search_ladder(
         notes += [_WITHIN] if sketch else []
     change = None if ladder.explains(remainders) else _changed(ladder.steps[-1].system)
     if change is not None and (sketch is None or change.gain > gain):
-        return SearchResult(ladder, remainders or ladder.remainders, None, change, (change.words,))
-    notes += _beside(sketch, remainders)
-    return SearchResult(ladder, remainders, sketch, None, tuple(notes))
+        notes, sketch, remainders = [change.words], None, remainders or ladder.remainders
+    else:
+        notes, change = notes + _beside(sketch, remainders), None
+    freed = tuple(_freed(ladder.steps[-1].system))
+    return SearchResult(ladder, remainders, sketch, change, freed, (*freed, *notes))
+
+
+def _freed(system: LinearSystem) -> Iterator[str]:
+    """What the shares that a fit left free say, in a sentence, where they are large enough to
+    matter.
+    """
+    fit = system.fit
+    variance = system.covariance(system.model_columns).diagonal()
+    for test in free_tests(fit):
+        shares = {name: fit.values[name] for name in SHARES[test]}
+        if max(map(abs, shares.values())) < system.policy.discovery.changed_share:
+            continue
+        captures = ", ".join(sorted({s.capture for s in fit.segments if s.test == test}))
+        sizes = (
+            f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± "
+            f"{100.0 * math.sqrt(variance[system.place([name])[0]]):.1g} % "
+            f"{'higher' if share > 0 else 'lower'}"
+            for name, share in shares.items()
+        )
+        yield (
+            f"{' and '.join(sizes)} in {captures} than in the other captures: changed between "
+            f"them; {_LOOKS_ALIKE[test]} would look the same"
+        )
 
 
 def _changed(system: LinearSystem) -> Change | ChangeWithin | None:

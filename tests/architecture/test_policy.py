@@ -35,6 +35,7 @@ ARITHMETIC = {
     "machine/model.py": {"BASE", "_STEP"},  # a centre of ±1/12; a complex step
     "machine/two_masses.py": {"LINEAR_COUPLING"},  # sizes that an effect states for itself
     "regression/bounds.py": {"_AT"},  # rounding
+    "selection/changed_between.py": {"_FREE"},  # the whole of a share
     "regression/fit.py": {"_SEED"},
     "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart
     "regression/identifiability.py": {"_EDGE"},  # rounding

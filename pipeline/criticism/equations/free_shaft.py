@@ -23,7 +23,7 @@ from pipeline.criticism.data.traces import (
 )
 from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
-from pipeline.criticism.machine.model import Model, Pieces, clock_gain
+from pipeline.criticism.machine.model import COAST_SHARES, Model, Pieces, clock_gain
 from pipeline.criticism.signals.shaft import (
     net_torque,
     sensed_torque,
@@ -225,14 +225,26 @@ def predicted(
 
     Notes
     -----
-    −drags/J − d²θ/dt² of a coast; −drags − J d²θ/dt² where a transducer drives the shaft.
+    −drags/J − d²θ/dt² of a coast, each drag with the share by which it is not
+    that of other tests; −drags − J d²θ/dt² where a transducer drives the shaft.
 
     """
     torque = net_torque(x, pieces)
     if SPEED in segment.channels:
+        torque += _further_drag(segment, x, torque, values)
         stretch = 1.0 + clock_gain(RECORDER, model, values)
         return unexplained_acceleration(segment, x, torque, values, stretch)[None]
     return sensed_torque(segment, x, torque, model, values)[None]
+
+
+def _further_drag(segment: Segment, x: Operating, torque_nm: Array, values: Values) -> Array:
+    """What turns a coasting shaft [n, N·m] beyond the drags −`torque_nm` of other tests."""
+    if COAST_SHARES[0] not in segment.fixed:
+        return np.zeros_like(torque_nm)
+    dry, viscous = (values[name] for name in COAST_SHARES)
+    of_speed = values["b_nm_s_rad"] * x.omega_rad_s
+    further: Array = dry * (torque_nm + of_speed) - viscous * of_speed
+    return further
 
 
 EQUATION = Equation(

@@ -24,7 +24,7 @@ from pipeline.criticism.data.traces import (
 )
 from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
-from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.machine.model import OPEN_FLUX, Model, Pieces
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
 from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage
@@ -168,7 +168,8 @@ def predicted(
 
     Notes
     -----
-    v = dψ/dt + j ω_e ψ, over what the recorded voltage samples stand for.
+    v = (1 + s) (dψ/dt + j ω_e ψ), with the share s by which the magnet is not that of other
+    tests, over what the recorded voltage samples stand for.
 
     References
     ----------
@@ -178,6 +179,7 @@ def predicted(
     period = segment.ts_s
     omega = x.once(x.theta_rad, "pace", lambda: central(x.machine.pole_pairs * x.theta_rad, period))
     voltage = rotor_voltage(pieces, omega, period)
+    voltage *= 1.0 + segment.fixed.get(OPEN_FLUX, 0.0) * values[OPEN_FLUX]
     voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)
     return np.stack([voltage.real, voltage.imag])
 

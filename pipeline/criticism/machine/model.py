@@ -95,6 +95,13 @@ BASE: tuple[Constant, ...] = (
     Constant("late_speed_s", "s", "lateness of a speed that no angle is beside", hook="gain"),
     Constant("late_voltage_s", "s", "by how much motion follows a voltage late", hook="gain"),
     Constant("unsampled_share", "1", "change of flux that samples of a voltage miss", hook="gain"),
+    Constant("coast_dry_share", "1", "dry drags of coasts over others, less one", hook="gain"),
+    Constant(
+        "coast_viscous_share", "1", "viscous drag of coasts over others, less one", hook="gain"
+    ),
+    Constant(
+        "open_flux_share", "1", "magnet of open windings over that of others, less one", hook="gain"
+    ),
     Constant("unlogged_rest_k", "K", "the same of a winding in tests at rest", hook="gain"),
 )
 UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
@@ -107,6 +114,10 @@ LATE_VOLTAGE = "late_voltage_s"
 """Nuisance of a log of voltage and motion that two computers, or a filter, put on one clock."""
 UNSAMPLED = "unsampled_share"
 """Nuisance of a voltage that is logged at instants, of what happens within a row."""
+COAST_SHARES = ("coast_dry_share", "coast_viscous_share")
+"""Nuisances of a coast beside other tests with drags: friction repeats to some percent."""
+OPEN_FLUX = "open_flux_share"
+"""Nuisance of an open-circuit test beside other tests that turn: a magnet may have lost flux."""
 UNLOGGED_K = (*UNLOGGED.values(), UNLOGGED_AT_REST)
 _SHARED_PRIORS = {
     "zero_alpha_a": "zero_a",

@@ -321,6 +321,19 @@ class Priors:
         source="a sample before the current moves shows nothing; one at the jump of a loop that "
         "settles in a tenth of a row shows ten times the row's mean",
     )  # fmt: skip
+    coast_dry_share: float = chosen(
+        0.02, "1", "dry drags of coasts over those of other tests, less one",
+        why="seals and bearings that ran in between repeat to some percent",
+    )  # fmt: skip
+    coast_viscous_share: float = derived(
+        0.03, "1", "viscous drag of coasts over that of other tests, less one",
+        source="a bearing that is 1 K warmer: its rolling friction goes by the 0.6th power of the "
+        "viscosity (SKF, Rolling Bearings, 2018, ch. D), which falls by some 5 % a kelvin",
+    )  # fmt: skip
+    open_flux_share: float = derived(
+        5e-4, "1", "magnet flux of open-circuit tests over that of other tests, less one",
+        source="a magnet half a kelvin from where its thermometer is, at -0.1 % a kelvin",
+    )  # fmt: skip
     gain: float = chosen(
         0.01, "1", "gain of a sensor or instrument", why="an instrument of class 1"
     )

@@ -27,6 +27,10 @@ class Discovery:
         3, "1", "fewest captures that hold a constant which changed between some of them",
         why="of two that disagree nobody knows which one is odd",
     )  # fmt: skip
+    changed_share: float = chosen(
+        0.01, "1", "change of a magnet or of friction from which on it is no sound motor",
+        why="anybody would look into a magnet that lost 1 % of its flux",
+    )  # fmt: skip
     change_windows: int = chosen(
         4, "windows", "fewest windows before and after a change within a capture",
         why="what lasts for less is an event and no other value",

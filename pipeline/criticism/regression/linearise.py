@@ -16,8 +16,10 @@ from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.effect import Array, Complex, Effect, Machine, Operating, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import (
+    COAST_SHARES,
     LATE_SPEED,
     LATE_VOLTAGE,
+    OPEN_FLUX,
     STATE,
     UNLOGGED_K,
     UNSAMPLED,
@@ -282,7 +284,15 @@ def _restore(rows: Array, unknown: Sequence[Array]) -> None:
 
 _FINE = 1e-3
 """Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
-_OF_SOME_LOGS = ("unlogged_d_share", LATE_SPEED, LATE_VOLTAGE, UNSAMPLED, *UNLOGGED_K)
+_OF_SOME_LOGS = (
+    "unlogged_d_share",
+    LATE_SPEED,
+    LATE_VOLTAGE,
+    UNSAMPLED,
+    *COAST_SHARES,
+    OPEN_FLUX,
+    *UNLOGGED_K,
+)
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +13,23 @@ from pipeline.criticism.data.sensor_noise import is_rounded, rounding_step
 from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.effect import Machine
 from pipeline.criticism.equation import Equation
-from pipeline.criticism.library.equations import equations
-from pipeline.criticism.machine.model import LATE_SPEED, UNLOGGED, UNLOGGED_AT_REST
+from pipeline.criticism.library.equations import equation_of, equations
+from pipeline.criticism.machine.model import (
+    COAST_SHARES,
+    LATE_SPEED,
+    OPEN_FLUX,
+    UNLOGGED,
+    UNLOGGED_AT_REST,
+)
 from pipeline.numerics.coast_setups import Limits, Setup, coast_setups
 from pipeline.records.capture import Campaign, Capture
+
+_REPEATED = {
+    "spin_down": (COAST_SHARES, "b_nm_s_rad", {"torque_shaft_nm"}),
+    "open_circuit": ((OPEN_FLUX,), "psi_wb", {"vq_v", "torque_shaft_nm", "psi_d_wb"}),
+}
+"""Nuisances of a test whose machine may not be quite that of others; the constant they share and
+the signals of others that show it."""
 
 
 def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
@@ -49,7 +62,8 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
     kinds = {segment.kind for segment in made}
     # a table that other captures can predict is held out as a whole
     whole = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
-    return tuple(replace(s, blocks=None) if s.kind in whole else s for s in made)
+    made = [replace(s, blocks=None) if s.kind in whole else s for s in made]
+    return tuple(replace(s, fixed={**s.fixed, **_beside(s, made)}) for s in made)
 
 
 def mixed_setups(campaign: Campaign, machine: Machine) -> tuple[Setup, ...]:
@@ -88,6 +102,17 @@ def _cut(capture: Capture, machine: Machine) -> Iterator[Segment]:
         if segment is not None and (segment.weak is None or segment.weak.starts.size):
             lacks = {**_unlogged(segment, equation), **_late_speed(segment, capture)}
             yield replace(segment, fixed={**segment.fixed, **lacks})
+
+
+def _beside(segment: Segment, others: Sequence[Segment]) -> dict[str, float]:
+    """The nuisances of a coast or an open-circuit spin beside other tests of drags or magnet."""
+    shares, constant, signals = _REPEATED.get(segment.test, ((), "", set()))
+    shown = any(
+        constant in equation_of(other).observes.constants and not signals.isdisjoint(other.channels)
+        for other in others
+        if other.test != segment.test
+    )
+    return dict.fromkeys(shares, 1.0) if shown else {}
 
 
 def _unlogged(segment: Segment, equation: Equation) -> dict[str, float]:

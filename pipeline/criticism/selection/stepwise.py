@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -24,6 +24,7 @@ from pipeline.criticism.regression.identifiability import significantly_nonzero
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.regression.normal_equations import NormalEquations
+from pipeline.criticism.selection.changed_between import with_free_shares
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
@@ -81,6 +82,11 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
     tuple of LadderStep
         The first without any addition; `policy.selection.most_steps` at most.
 
+    Notes
+    -----
+    Shares of friction or magnet that explain as much as the best effect, within a `tie`, are left
+    free instead.
+
     """
     steps: list[LadderStep] = []
     policy = fit.policy.selection
@@ -98,8 +104,14 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         if len(steps) == policy.most_steps:
             break
         inside = {e.discriminator for e in fit.model.effects} - {None}
-        passing = [s for s in scores if s.passes and s.candidate.effect.discriminator not in inside]
+        couplings = bool(significant.any())
+        passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
         chosen = _chosen(wide, passing, fit.model.effects[base:])
+        free = with_free_shares(wide)
+        if free is not None and (chosen is None or free.deviance < chosen.deviance + policy.tie):
+            fit = free.fit
+            del steps[-1]
+            continue
         if chosen is None:
             break
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
@@ -111,6 +123,16 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         if tuple(e.name for e in found) in {r.added for r in steps}:
             break
     return tuple(steps)
+
+
+def _may_join(score: Score, inside: Set[object], couplings: bool) -> bool:
+    """Whether an effect may join those `inside`, of whose discriminators there is one each.
+
+    Couplings need a remainder that is reported: noise of an angle's sensor runs through a drive's
+    speed loop into the current, and so looks like a soft shaft in every capture.
+    """
+    effect = score.candidate.effect
+    return effect.discriminator is None or (couplings and effect.discriminator not in inside)
 
 
 def _floored_anew(fit: Fit) -> Fit:

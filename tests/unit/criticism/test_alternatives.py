@@ -21,7 +21,7 @@ def test_a_rival_is_told_where_the_captures_cannot_part_them():
     library = {**LIBRARY, "brake": twin}
 
     def drag(omega, _):
-        return 0.03 * omega * np.abs(omega) / 250.0**2
+        return 0.12 * omega * np.abs(omega) / 250.0**2
 
     segments = (with_drag(drag), with_drag(drag, 6))
     last = search(fitted(segments), library)[-1]
@@ -50,13 +50,13 @@ def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
 
     def look(wholes, q):
         assert set(q) == {"drag_nm"}
-        return None if told is None else Discrimination(told, {"drag_nm": (0.029, 0.001)})
+        return None if told is None else Discrimination(told, {"drag_nm": (0.116, 0.001)})
 
     windage = replace(LIBRARY["windage"], discriminator=look)
     library = {**LIBRARY, "windage": windage, "brake": replace(windage, name="brake")}
 
     def drag(omega, _):
-        return 0.03 * omega * np.abs(omega) / 250.0**2
+        return 0.12 * omega * np.abs(omega) / 250.0**2
 
     segments = (with_drag(drag), with_drag(drag, 6))
     last = search(fitted(segments), library)[-1]
@@ -68,4 +68,4 @@ def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
         assert set(others) == {"windage", "brake"} - {name}
         return
     assert (name, others) == (told, ())
-    assert last.fit.values[f"{told}.drag_nm"] == pytest.approx(0.03, rel=0.05)
+    assert last.fit.values[f"{told}.drag_nm"] == pytest.approx(0.12, rel=0.05)

@@ -102,14 +102,17 @@ def test_the_true_gain_undoes_a_wrong_clock_in_every_equation():
 
 
 @pytest.mark.slow
-def test_a_coast_on_a_fast_clock_is_no_compliance():
+@pytest.mark.parametrize(("factor", "verdict"), [(FAST, "adequate"), (1.0 / 1.08, "unknown")])
+def test_a_coast_on_a_fast_clock_is_no_compliance(factor, verdict):
+    """Its friction over inertia is another: by little friction is so too, by much it is told."""
     stems = ("resistance_ab", "lcr", "torque_map_fast", "drive_0")
     few = tuple(step for step in PLAN if step[0] in stems or step[1] == "spin_down")
-    found = recorded("gimbal-5208", Bench(), 3, FAST, {"spin_down"}, few)
+    found = recorded("gimbal-5208", Bench(), 3, factor, {"spin_down"}, few)
     result = diagnose(found, ModelSpec(), Constants())
-    assert result.missing == ("clock_scale",)
-    value, u, _ = result.ranking[0].parameters["gain"]
-    assert abs(value - (FAST - 1.0)) < 2.0 * u < 0.005
+    assert (result.verdict, result.missing) == (verdict, ())
+    assert any("or a clock that is off there" in note for note in result.notes) == (
+        verdict == "unknown"
+    )
 
 
 @pytest.mark.slow

@@ -20,7 +20,14 @@ def climbs(monkeypatch):
     them leave something that a state of the machine predicts, `drifts` gives a calmer one.
     """
     made = SimpleNamespace(
-        orders=[], seen=(), sketched=set(), gains={}, explained=False, drifts=False, change=None
+        orders=[],
+        seen=(),
+        sketched=set(),
+        gains={},
+        explained=False,
+        drifts=False,
+        change=None,
+        freed=(),
     )
 
     class Ladder(SimpleNamespace):
@@ -45,6 +52,7 @@ def climbs(monkeypatch):
     monkeypatch.setattr(search, "ladder_from", climbed)
     monkeypatch.setattr(search, "_sketched", sketched)
     monkeypatch.setattr(search, "_beside", lambda *_: [])
+    monkeypatch.setattr(search, "_freed", lambda _: made.freed)
     monkeypatch.setattr(search, "changed_constant", lambda _: made.change)
     monkeypatch.setattr(search, "changed_within", lambda _: None)
     monkeypatch.setattr(search, "segments", lambda _, of: of.load_orders)
