@@ -13,10 +13,12 @@ from pipeline.contracts.gates import missing_values
 from pipeline.contracts.protocol import warning
 from pipeline.contracts.registry import gates
 from pipeline.contracts.schemas import check_columns, check_metadata, check_tables
+from pipeline.numerics.alike import same_but_for_noise
 from pipeline.records.capture import Capture, Mask
 from pipeline.records.errors import CaptureError, merged
 from pipeline.records.finding import Finding
 
+TORQUE = "torque_shaft_nm"
 BROKEN = (ValueError, ArithmeticError, LookupError, TypeError, np.linalg.LinAlgError)
 
 
@@ -35,7 +37,8 @@ def validate(
     Returns
     -------
     capture
-        With the masks of the gates, without columns that hold no value; slow streams that were
+        With the masks of the gates, without columns that hold no value, and without a torque that
+        is the current in other units; slow streams that were
         written into a fast table have a table of their own.
     findings
         Warnings.
@@ -60,7 +63,8 @@ def validate(
     capture, twice = _rows_once(capture)
     check_tables(capture)
     capture, findings = _without_blanks(capture)
-    findings = [*unfilled, *twice, *findings]
+    capture, computed = _without_computed_torque(capture)
+    findings = [*unfilled, *twice, *findings, *computed]
     refusals: dict[str, CaptureError] = {}
     broken: list[CaptureError] = []
     for gate in gates():
@@ -128,6 +132,28 @@ def _rows_once(capture: Capture) -> tuple[Capture, list[Finding]]:
         findings.append(warning(capture, "repeated_rows", words, remedy, span))
         tables.append(table.filter(kept))
     return (replace(capture, tables=tuple(tables)) if findings else capture), findings
+
+
+def _without_computed_torque(capture: Capture) -> tuple[Capture, list[Finding]]:
+    """The drive without a torque that is its own current times a constant.
+
+    Motor controllers log such a torque. It is no load of the shaft: taken for one, a shaft that it
+    drives would have neither friction nor inertia.
+    """
+    if capture.meta.test != "drive" or not capture.has("iq_a", TORQUE):
+        return capture, []
+    data = capture.arrays("iq_a", TORQUE)
+    factor = same_but_for_noise(data[TORQUE], data["iq_a"])
+    if factor is None:
+        return capture, []
+    tables = tuple(t.drop(TORQUE, strict=False) for t in capture.tables)
+    words = f"{TORQUE} is {factor:.4g} N·m/A times iq_a and nothing else; set aside"
+    remedy = (
+        "leave it out of the source map: the drive computes it, and a transducer between motor and "
+        "load would show friction and acceleration"
+    )
+    kept = replace(capture, tables=tuple(t for t in tables if t.columns != ["t_s"]))
+    return kept, [warning(capture, "computed_torque", words, remedy)]
 
 
 def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:
