@@ -13,6 +13,9 @@ import pytest
 from scipy.special import bdtr
 
 from pipeline.criticism.comparison import compare
+from pipeline.criticism.diagnosis import diagnose
+from pipeline.crosscheck.plan import Aims, Known, make_plan
+from pipeline.crosscheck.registry import check_all, rules
 from pipeline.estimation.registry import fit_all
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
@@ -20,6 +23,7 @@ from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.design import Bench
 from pipeline.simulator.truth import truth
+from pipeline.stages.plan import ways_of
 from pipeline.stages.steps.campaigns import campaigns
 from tests.simulated import campaign_of, design
 
@@ -64,7 +68,8 @@ def compared(part: Campaign, true: Mapping[str, float]) -> Told:
         if one.value is not None and one.u is not None:
             yield name, abs(one.value - known[name]) <= REACH * one.u
     for both in result.combinations:
-        words = both.expression
+        # one that an equation names begins with its name
+        words = both.expression.rpartition(" = ")[2].replace("pole_pairs", repr(true["pole_pairs"]))
         for name in sorted(both.of, key=len, reverse=True):
             words = words.replace(name, repr(known[name]))
         yield both.expression, abs(both.value - eval(words)) <= REACH * both.u
@@ -137,3 +142,36 @@ def test_intervals_of_many_subsets_hold():
 @needs_p0
 def test_intervals_of_many_subsets_of_the_rig_hold():
     judged(of_the_rig(range(40)), 200)
+
+
+def says_nothing_false(parts: Iterator[tuple[Campaign, Mapping[str, float]]]) -> int:
+    """No effect is named, no remainder is unknown, and every refusal and plan has words.
+
+    Returns how many diagnoses had something to go by.
+    """
+    stood = 0
+    for part, _ in parts:
+        found = diagnose(part, ModelSpec(), Constants())
+        where = sorted((one.path, sorted(one.columns)) for one in part.captures)
+        assert found.missing == (), where
+        assert found.verdict in ("adequate", "insufficient"), where
+        assert found.ladder or any(len(note) > 40 for note in found.notes), where
+        stood += bool(found.ladder)
+        constants = fit_all(part, {})[0]
+        tests = frozenset(one.meta.test for one in part.captures)
+        known = Known(part.motor_id, constants.chosen(), check_all(constants, part, {}), tests)
+        ways = {rule.name: rule.tests for rule in rules()}
+        plan = make_plan(known, ways_of(), ways, Aims())
+        assert plan.steps or plan.beyond or constants.chosen(), where
+        assert all(step.experiments for step in plan.steps), where
+    return stood
+
+
+def test_diagnoses_and_plans_of_a_few_subsets_say_nothing_false():
+    assert says_nothing_false(of_the_simulator(range(4), QUICK)) >= 1
+
+
+@pytest.mark.slow
+@needs_p0
+def test_diagnoses_and_plans_of_many_subsets_of_the_rig_say_nothing_false():
+    assert says_nothing_false(of_the_rig(range(25))) >= 8

@@ -257,6 +257,9 @@ def drive(motor: Motor, rng: np.random.Generator) -> Capture:
     omega = 0.8 * motor.top_rad_s * np.sin(2.0 * np.pi * t / 2.0)
     iq = 0.2 * motor.rated_a * np.cos(2.0 * np.pi * t / 2.0) + 0.1 * motor.rated_a * np.sign(omega)
     columns = dq_columns(motor, rng, t, omega, np.zeros(t.size), iq)
+    # a transducer has the shaft's friction and inertia before it
+    rated_nm = 1.5 * motor.pole_pairs * motor.psi_wb * motor.rated_a
+    columns["torque_shaft_nm"] = columns["torque_shaft_nm"] - 0.05 * rated_nm * np.sign(omega)
     return capture_of("drive", columns, motor, voltage_kind="commanded", vdc_v=36.0)
 
 
