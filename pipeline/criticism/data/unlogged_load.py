@@ -50,7 +50,8 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
     Notes
     -----
     A regression of the angle's second derivative over windows on i_q, i_d i_q and di_q/dt, drag
-    against speed, a constant, and waves of the angle. A torque that no column has is left in the
+    against speed, a constant, waves of the angle, and the same times ω², as an encoder off its
+    centre or tilted adds them. A torque that no column has is left in the
     residual; where a speed loop works against it, the current goes with it and its coefficient is
     too small. So what is left, its noise taken out, over what the current makes bounds the
     relative error of 1/J. With the second derivative of i_q and the fourth of the angle it is that
@@ -70,7 +71,8 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
         return None
     weak = weak_rows(time, width)
     whole = weak.integral((~log.keep).astype(float)) == 0.0
-    driven, others = _columns(log, weak, machine)
+    omega = smooth_speed(time, theta, policy.load_window_s / 8)
+    driven, others = _columns(log, weak, machine, omega)
     most = np.count_nonzero(whole) // policy.load_windows - len(driven)
     chosen = [*driven]
     for group in others:
@@ -78,20 +80,33 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
             chosen += group
         elif group is others[0]:
             return None
-    columns = np.column_stack(chosen)[whole]
     target = weak.integral(theta, order=2)[whole]
     noise = log.sensors.noise["theta_mech_rad"] * weak.noise_gain(2)
-    coefficients, residual, rank = _regressed(columns, target, policy)
-    if len(chosen) + 2 <= most:
-        with_spring = np.column_stack([columns, np.column_stack(_spring(log, weak))[whole]])
-        sprung = _regressed(with_spring, target, policy)
-        of_current, of_bend, of_fourth = sprung[0][[0, -2, -1]].tolist()
-        if _two_masses(of_current, of_bend, of_fourth, policy):
-            coefficients, residual, rank = sprung
-    made = columns[:, : len(driven)] @ coefficients[: len(driven)]
-    power = float(residual @ residual) / (target.size - rank) - noise**2
-    share: float = max(power, 0.0) / max(float(np.mean(made**2)), 1e-300)
-    return share
+    spring, mounting = _spring(log, weak), _mounting(theta, omega, weak)
+    shares: list[float] = []
+    for more in ([], mounting):
+        if more and len(chosen) + len(more) > most:
+            break
+        columns = np.column_stack([*chosen, *more])[whole]
+        coefficients, residual, rank = _regressed(columns, target, policy)
+        if columns.shape[1] + len(spring) <= most:
+            with_spring = np.column_stack([columns, np.column_stack(spring)[whole]])
+            sprung = _regressed(with_spring, target, policy)
+            of_current, of_bend, of_fourth = sprung[0][[0, -2, -1]].tolist()
+            if _two_masses(of_current, of_bend, of_fourth, policy):
+                coefficients, residual, rank = sprung
+        made = columns[:, : len(driven)] @ coefficients[: len(driven)]
+        power = float(residual @ residual) / (target.size - rank) - noise**2
+        shares.append(max(power, 0.0) / max(float(np.mean(made**2)), 1e-300))
+    return min(shares)
+
+
+def _mounting(theta: Array, omega: Array, weak: WeakRows) -> list[Array]:
+    """Window means [w] of how an encoder off its centre, or tilted, seems to accelerate: ω² by the
+    angle and by twice the angle.
+    """
+    waves = [part(k * theta) for k in (1, 2) for part in (np.cos, np.sin)]
+    return [weak.integral(omega**2 * wave) for wave in waves]
 
 
 def _regressed(columns: Array, target: Array, policy: Cutting) -> tuple[Array, Array, int]:
@@ -121,14 +136,12 @@ def _two_masses(of_current: float, of_bend: float, of_fourth: float, policy: Cut
 
 
 def _columns(
-    log: DriveLog, weak: WeakRows, machine: Machine
+    log: DriveLog, weak: WeakRows, machine: Machine, omega: Array
 ) -> tuple[list[Array], list[list[Array]]]:
     """Window means [w] of what the current makes; and, in groups, of what else moves a shaft."""
     theta, q = log.columns["theta_mech_rad"], log.columns["iq_a"]
     policy = machine.policy.cutting
     knots = policy.drag_knots
-    time = log.period_s * np.arange(theta.size, dtype=float)
-    omega = smooth_speed(time, theta, policy.load_window_s / 8)
     pace, sense = np.abs(omega) / max(float(np.abs(omega).max()), 1e-300), np.sign(omega)
     driven = [weak.integral(q)]
     if "id_a" in log.columns:

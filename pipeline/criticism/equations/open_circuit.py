@@ -180,7 +180,8 @@ def predicted(
     omega = x.once(x.theta_rad, "pace", lambda: central(x.machine.pole_pairs * x.theta_rad, period))
     voltage = rotor_voltage(pieces, omega, period)
     voltage *= 1.0 + segment.fixed.get(OPEN_FLUX, 0.0) * values[OPEN_FLUX]
-    voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)
+    by_encoder = _VOLTAGE_FRAME not in segment.fixed
+    voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=by_encoder)
     return np.stack([voltage.real, voltage.imag])
 
 

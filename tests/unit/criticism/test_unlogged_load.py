@@ -92,6 +92,15 @@ def test_waves_of_the_angle_are_no_load_and_steps_in_time_are():
     assert unexplained_share(turned(load), MACHINE) > 4 * UNEXPLAINED
 
 
+def test_an_encoder_off_its_centre_is_no_load():
+    """Its error once a turn accelerates by the square of the speed, as no torque's wave does."""
+    log = turned(lambda i, *_: 50.0 * i + 20.0)
+    theta = log.columns["theta_mech_rad"]
+    assert np.ptp(theta) > 20.0
+    wobble = {**log.columns, "theta_mech_rad": theta + 0.01 * np.sin(theta + 0.3)}
+    assert unexplained_share(replace(log, columns=wobble), MACHINE) < UNEXPLAINED
+
+
 def pulsating(i: float, _: float, t: float) -> float:
     return 50.0 * (i + 0.5 * np.sin(70.0 * t))
 
