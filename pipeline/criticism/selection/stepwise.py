@@ -85,7 +85,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
     Notes
     -----
     Shares of friction or magnet that explain as much as the best effect, within a `tie`, are left
-    free instead.
+    free instead; what full logs show of that effect counts for it.
 
     """
     steps: list[LadderStep] = []
@@ -108,7 +108,9 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
         chosen = _chosen(wide, passing, fit.model.effects[base:])
         free = with_free_shares(wide)
-        if free is not None and (chosen is None or free.deviance < chosen.deviance + policy.tie):
+        if free is not None and (
+            chosen is None or free.deviance < _with_full_logs(chosen) + policy.tie
+        ):
             fit = free.fit
             del steps[-1]
             continue
@@ -123,6 +125,16 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         if tuple(e.name for e in found) in {r.added for r in steps}:
             break
     return tuple(steps)
+
+
+def _with_full_logs(system: LinearSystem) -> float:
+    """The deviance of a fit, less what full logs say of its newest effect, which is in no row: the
+    square of a twist or gap over its uncertainty.
+    """
+    effect = system.fit.model.effects[-1]
+    shapes = [p for p in effect.parameters_of(system.fit.machine) if p.u > 0.0 and not p.amplitude]
+    told = [(system.fit.size(effect, p) / p.u) ** 2 for p in shapes]
+    return system.deviance - max(told, default=0.0)
 
 
 def _may_join(score: Score, inside: Set[object], couplings: bool) -> bool:
