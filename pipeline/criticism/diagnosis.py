@@ -11,12 +11,14 @@ from scipy.special import gammaincc
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.design.experiments import separations
+from pipeline.criticism.discovery.changed_constants import Change
 from pipeline.criticism.effect import Effect, Machine
 from pipeline.criticism.ladder import parameters_of, step_record
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import UNLOGGED
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import (
@@ -195,6 +197,7 @@ def _notes(
         *hum_notes(ladder.base.hum),
         *frame_notes(last.segments),
         *end.notes,
+        *_warmth(end),
         *_together(together, ladder.steps[-1].added),
         *(note for note in ladder.cut.values() if note),
         *_rests_on_one(ladder),
@@ -277,6 +280,32 @@ def _insufficient(
         asked=model.effects,
         policy=policy_digest(policy_of(model.policy)),
     )
+
+
+def _warmth(end: SearchResult) -> tuple[str, ...]:
+    """A note where a constant that differs between captures is as another temperature makes it:
+    where none of those with the other value records the temperature that the constant goes with.
+    """
+    change, last = end.change, end.ladder.steps[-1].system
+    if not isinstance(change, Change) or end.freed or not change.value:
+        return ()
+    for effect in last.fit.model.effects:
+        signals = [name for name in effect.signals if name in UNLOGGED]
+        parameters = effect.parameters_of(last.fit.machine)
+        goes_with = {"drop": "r_ohm", "flux": "psi_wb"}.get(effect.hook)
+        if len(parameters) != 1 or not signals or goes_with != change.name:
+            continue
+        logged = {s.capture for s in last.segments if signals[0] in s.recorded}
+        coefficient = last.fit.values[f"{effect.name}.{parameters[0].name}"]
+        if logged.intersection(change.captures) or not coefficient:
+            continue
+        warmer = change.difference / change.value / coefficient
+        if abs(warmer) < 5.0 * last.policy.priors.unlogged_k:
+            return (
+                f"that is as {warmer:+.0f} K of {signals[0]} would make it, which none of these "
+                "captures records: log it",
+            )
+    return ()
 
 
 def _verdict_of(end: SearchResult, unseen: Sequence[Unexcited]) -> Verdict:

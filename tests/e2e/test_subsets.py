@@ -144,6 +144,24 @@ def test_intervals_of_many_subsets_of_the_rig_hold():
     judged(of_the_rig(range(40)), 200)
 
 
+def some_captures(draws: range) -> Iterator[tuple[Campaign, Mapping]]:
+    """Subsets of captures of the rig, and in every second one no voltages or no torque.
+
+    Columns whose loss hides a state of the machine stay: of a warm winding without thermometer, a
+    field current that is not logged and a lagging speed in place of an angle `diagnose` says that
+    it does not know what is left, which is so.
+    """
+    whole = campaigns(str(P0))[0][0]
+    true = json.loads((P0 / "truth.json").read_bytes())["constants"]
+    for seed in draws:
+        rng = np.random.default_rng(seed)
+        captures = [one for one in whole.captures if rng.random() < 0.5]
+        lost = [{"vd_v", "vq_v"}, {"torque_shaft_nm"}, set(), set()][seed % 4]
+        tables = [tuple(t.drop(lost, strict=False) for t in one.tables) for one in captures]
+        cut = [replace(c, tables=t) for c, t in zip(captures, tables, strict=True)]
+        yield replace(whole, captures=tuple(cut)), true
+
+
 def says_nothing_false(parts: Iterator[tuple[Campaign, Mapping[str, float]]]) -> int:
     """No effect is named, no remainder is unknown, and every refusal and plan has words.
 
@@ -174,4 +192,23 @@ def test_diagnoses_and_plans_of_a_few_subsets_say_nothing_false():
 @pytest.mark.slow
 @needs_p0
 def test_diagnoses_and_plans_of_many_subsets_of_the_rig_say_nothing_false():
-    assert says_nothing_false(of_the_rig(range(25))) >= 8
+    assert says_nothing_false(some_captures(range(20))) >= 8
+
+
+@pytest.mark.slow
+@needs_p0
+def test_a_warm_winding_without_a_thermometer_says_so():
+    """One resistance of the rig was recorded at 65 °C: without that column, R seems to change."""
+    whole = campaigns(str(P0))[0][0]
+    kept = ("drive_0", "drive_1", "resistance", "cogging_cw")
+    captures = [one for one in whole.captures if one.path.startswith(kept)]
+    blind = [
+        replace(
+            one,
+            tables=tuple(t.drop("temp_winding_degc", strict=False) for t in one.tables),
+        )
+        for one in captures
+    ]
+    found = diagnose(replace(whole, captures=tuple(blind)), ModelSpec(), Constants())
+    (note,) = [one for one in found.notes if "log it" in one]
+    assert "+40 K of temp_winding_degc" in note
