@@ -58,6 +58,18 @@ KEY_CONSTANTS = (
     "j_rotor_kgm2",
     "torque_coulomb_nm",
 )
+PARTIAL_CONSTANTS = (
+    "coast_coulomb_rad_s2",
+    "coast_viscous_1_s",
+    "ks_v",
+    "kv_v_s_rad",
+    "ka_v_s2_rad",
+    "cogging_amplitude_a",
+    "holding_friction_a",
+    "motor_constant_nm_sqrt_w",
+    "kt_from_ke_nm_a",
+)
+"""What logs of a part of a motor give, in a batch that has none of `KEY_CONSTANTS`."""
 _SYMBOLS: dict[str, tuple[str, str]] = {
     "r_phase_ohm": ("R", "phase"),
     "r_ll_ohm": ("R", "ll"),
@@ -86,6 +98,13 @@ _SYMBOLS: dict[str, tuple[str, str]] = {
     "j_rotor_kgm2": ("J", ""),
     "torque_coulomb_nm": ("T", "C"),
     "b_visc_nm_s_rad": ("B", ""),
+    "coast_coulomb_rad_s2": ("T", "C over J"),
+    "coast_viscous_1_s": ("B", "over J"),
+    "ks_v": ("k", "S"),
+    "kv_v_s_rad": ("k", "V"),
+    "ka_v_s2_rad": ("k", "A"),
+    "cogging_amplitude_a": ("I", "cog"),
+    "holding_friction_a": ("I", "friction"),
     "tau_elec_s": ("τ", "e"),
     "tau_mech_s": ("τ", "m"),
     "rth_winding_k_w": ("R", "th"),

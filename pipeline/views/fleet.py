@@ -12,7 +12,7 @@ from pipeline.records.current_status import CurrentStatus, current_status
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import MODEL_REASON, number
-from pipeline.views.constants import KEY_CONSTANTS, constant_words, symbol
+from pipeline.views.constants import KEY_CONSTANTS, PARTIAL_CONSTANTS, constant_words, symbol
 from pipeline.views.model_words import ModelWords, model_words
 from pipeline.views.names import quantity_words
 from pipeline.views.reasons import Reason, shared_reasons
@@ -82,11 +82,7 @@ def fleet_view(
     """
     sheets = sorted(datasheets, key=lambda sheet: sheet.motor_id)
     now = [(statuses or {}).get(sheet.motor_id, current_status(sheet)) for sheet in sheets]
-    columns = tuple(
-        Column(name, symbol(name), constant_words(name), scale)
-        for name in KEY_CONSTANTS
-        if (scale := _scale(name, sheets)) is not None
-    )
+    columns = _columns(KEY_CONSTANTS, sheets) or _columns(PARTIAL_CONSTANTS, sheets)
     reasons = shared_reasons(
         (sheet.motor_id, kind_of_reason(sheet, reason))
         for sheet, current in zip(sheets, now, strict=True)
@@ -98,6 +94,15 @@ def fleet_view(
         tuple(_row(*one, columns, reasons) for one in zip(sheets, now, strict=True)),
         reasons,
         tuple((status, counts[status]) for status in STATUS_ORDER if counts[status]),
+    )
+
+
+def _columns(names: Sequence[str], sheets: Sequence[Datasheet]) -> tuple[Column, ...]:
+    """A column for each of some constants that any motor has."""
+    return tuple(
+        Column(name, symbol(name), constant_words(name), scale)
+        for name in names
+        if (scale := _scale(name, sheets)) is not None
     )
 
 

@@ -25,12 +25,12 @@ from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.text.console import nothing_usable, summary
 from pipeline.report.text.next_command import next_command
 from pipeline.settings import RunSettings
-from pipeline.views.constants import KEY_CONSTANTS
+from pipeline.views.constants import KEY_CONSTANTS, PARTIAL_CONSTANTS
 
 MANIFEST = "outputs.json"
 INPUT, OUTPUT = "\ue000", "\ue001"
 """Placeholders for the names of the folders; no file may have such a name."""
-OF_BATCH = frozenset(KEY_CONSTANTS)
+OF_BATCH = frozenset((*KEY_CONSTANTS, *PARTIAL_CONSTANTS))
 """Constants that the page and the summary of the batch show."""
 MOST_NAMED = 5
 """Most names of removed files in a note; datasheets come first."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 import polars as pl
 import pytest
 
+from pipeline.execution.outputs.publishing import OF_BATCH
 from pipeline.records.datasheet import AWAITS_APPROVAL, Datasheet
 from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.estimate import not_identifiable
@@ -184,3 +185,15 @@ def test_the_next_command_is_what_most_motors_need() -> None:
     lacking = replace(fine, why=(AWAITS_APPROVAL, "missing: ld_h (record current steps)"))
     assert next_command([lacking, refused], "in", "out") == "plan motor=fine output=out"
     assert next_command([], "in", "out") == ""
+
+
+def test_a_batch_of_partial_logs_shows_what_they_give() -> None:
+    """KS and its like stand in the table where no motor has one of the usual constants."""
+    whole = make_datasheet("a")
+    value = next(one for one in whole.constants.values() if one.known)
+    ks = replace(value, name="ks_v", unit="V")
+    partial = replace(whole, constants={"ks_v": ks})
+    assert [column.name for column in fleet_view([partial]).columns] == ["ks_v"]
+    both = replace(whole, constants={**whole.constants, "ks_v": ks})
+    assert "ks_v" not in [column.name for column in fleet_view([both, partial]).columns]
+    assert {"ks_v", "coast_coulomb_rad_s2", "cogging_amplitude_a"} <= OF_BATCH
