@@ -53,7 +53,7 @@ class Settings:
 
 @dataclass(kw_only=True)
 class ReadingSettings(Settings):
-    """Keys of every command that reads strangers' files."""
+    """Keys of every command that reads foreign files."""
 
     read_seconds: float = key(
         60.0, "longest time for reading one file, and 1 s more a MB", result=False
@@ -261,7 +261,7 @@ class RegressSettings(Settings):
     )
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
     diagnoses: str = key(
-        "auto", "folders of diagnoses, parted by commas; auto is diagnosis/ in output and beside"
+        "auto", "folders of diagnoses, separated by commas; auto is diagnosis/ in output and beside"
     )
     lint: bool = key(False, "only check the limits file, and say what is wrong with it")
 
@@ -291,7 +291,7 @@ class SimulateSettings(Settings):
     output: str = key("", "folder to write to", result=False, place=True)
     motor: str = key("gimbal-5208", "design of conf/motor/")
     effects: str = key("", "[name, name=size, name.parameter=value, ...]; a name alone is typical")
-    outside: str | None = key(None, "a term of nobody's library on top: eddy_brake, contact, ...")
+    outside: str | None = key(None, "a term of no library on top: eddy_brake, contact, ...")
     seed: int = key(1, "of every random draw")
     motor_id: str | None = key(None, "serial number; the design and the seed without it")
     lot: str = key("A", "lot")

@@ -222,7 +222,7 @@ def _from_three_pairs(given: Given, pairs: tuple[str, ...]) -> Answer:
         )
     ratio = found.high_h / found.low_h
     angle = math.degrees(found.theta_low_rad)
-    words = "L_d with interior magnets; the back-EMF or an alignment tells which is which"
+    words = "L_d with interior magnets; the back-EMF or an alignment shows which is which"
     lines = [
         Line("l_low_h", found.low_h, "H", "(m − A)/2, m mean, A = √(⅔·Σ(L−m)²)", words),
         Line("l_high_h", found.high_h, "H", "(m + A)/2", "L_q with interior magnets"),

@@ -45,7 +45,7 @@ class Flags:
 
 
 def split_flags(arguments: Sequence[str]) -> tuple[Flags, list[str]]:
-    """Parts flags from the other words, wherever they stand.
+    """Separates flags from the other words, wherever they stand.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the captures of one motor say together: contradictions, and regions nobody covered."""
+"""What the captures of one motor say together: contradictions, and regions that none covers."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def _cogging_directions(campaign: Campaign) -> list[Finding]:
             captures[0].path,
             "warning",
             "direction_coverage",
-            "the slow turn goes one way only: friction cannot be told from cogging",
+            "the slow turn goes one way only: friction cannot be separated from cogging",
             "record the same turn the other way",
         )
     ]

@@ -65,7 +65,7 @@ def model_verdict(
     A residual of group g (signal, capture, order a turn) counts by the root of χ²_g/n_g over the
     noise floor of `noise_floors.noise_floor`. A group is over the floor by the rule of
     `goodness.remainder`: chance passes it as seldom as five standard deviations, the variance is
-    twice the floor's, and the size is one that somebody would act on.
+    twice the floor's, and the size matters in use.
 
     """
     base = base_fit(campaign, model, start)

@@ -367,7 +367,9 @@ def _loss(last: LinearSystem, effect: Effect, dof: int) -> float:
 def _passed_over(
     steps: Sequence[LadderStep], name: str, added: Sequence[str]
 ) -> tuple[Candidate, ...]:
-    """Candidates that promised as much as an effect on the step before it was added."""
+    """Candidates whose predicted gain was close to that of an effect on the step before it was
+    added.
+    """
     policy = steps[0].fit.policy.selection
     before = [step for step in steps if name not in step.added][-1]
     falls = {score.candidate.effect.name: score.fall for score in before.scores}

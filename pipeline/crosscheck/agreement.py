@@ -4,7 +4,7 @@ For each quantity, readings x_i of single captures have the covariance C of thei
 instruments that captures share are common and cancel in every difference, and the independent
 spread of the method. Of one motor, chi2 = r' C^-1 r with r = x - mean (generalised least squares)
 is chi-square distributed with n - 1 degrees of freedom [1]. Where it is too large, the readings
-are parted at the gap that leaves least chi-square in both parts, again and again until each part
+are split at the gap that leaves least chi-square in both parts, again and again until each part
 agrees in itself.
 
 Parts are reported only where they can be another motor's: the gap between them is wider than the
@@ -68,7 +68,7 @@ def disagreements(readings: Iterable[Reading]) -> tuple[Disagreement, ...]:
     -----
     With the covariance C of the readings x and their generalised mean m, χ² = (x − m)' C⁻¹ (x − m)
     has n − 1 degrees of freedom. Where its p-value is below `AgreementPolicy.level`, the readings
-    are parted in two at the gap that leaves least χ² in both parts, again and again until each part
+    are split in two at the gap that leaves least χ² in both parts, again and again until each part
     agrees in itself. Parts that are wider than the gap between them are a drift, not two motors.
 
     References

@@ -1,7 +1,7 @@
 """How a measured ratio is judged: an allowance for the model, and both uncertainties.
 
 A deviation passes up to `allowance + 2 u`, is marginal up to `allowance + 3 u` and fails beyond.
-The allowance is what the comparison itself cannot promise (a small-signal inductance against a
+The allowance is the systematic error of the comparison itself (a small-signal inductance against a
 step, say); u is the standard uncertainty of the ratio with shared gains cancelled. Where 2 u
 exceeds `resolution` times the allowance a pass would mean nothing and the check is not evaluated.
 A suspect is named only where the ratio's coverage interval holds its number: no allowance widens
@@ -95,7 +95,7 @@ def judge_deviation(deviation: float, u: float, allowance: float) -> CheckStatus
     u
         Its standard uncertainty [same unit].
     allowance
-        What the comparison itself cannot promise [same unit].
+        Systematic error of the comparison itself [same unit].
 
     Returns
     -------
@@ -139,7 +139,7 @@ def judge_ratio(
     ratio
         What was measured [1].
     allowance
-        What the comparison cannot promise [1].
+        Systematic error of the comparison [1].
     meaning
         What the ratio is of, in words; the interval is appended, with its coverage factor.
     quantity

@@ -142,7 +142,7 @@ class Plan:
             )
         lines = head
         if self.steps:
-            lines.append(f"{self.motor_id}: what to record next, the most telling first")
+            lines.append(f"{self.motor_id}: what to record next, the most informative first")
         for number, step in enumerate(self.steps, 1):
             again = ", again" if step.again else ""
             lines += ["", f"{number}. {step.test}{again}: {TESTS.get(step.test, '')}"]
@@ -436,13 +436,13 @@ def _checks_in_doubt(
 
 
 def _settled_in(meaning: str, known: Known) -> bool:
-    """Whether a reason speaks of a constant that was looked for and is not there."""
+    """Whether a reason names a constant that was looked for and is not there."""
     named = set(re.findall(r"\w+", meaning)) & set(known.constants)
     return any(known.constants[name].settled for name in named)
 
 
 def _tests_named(meaning: str, known: Known, ways: tuple[Way, ...]) -> frozenset[str]:
-    """Tests not yet recorded that a reason speaks of, by name or through a missing constant."""
+    """Tests not yet recorded that a reason names, directly or through a missing constant."""
     words = set(re.findall(r"\w+", meaning))
     named = (words & set(TESTS)) - known.tests
     for constant in sorted(words & set(CONSTANTS)):

@@ -56,8 +56,8 @@ class Estimator:
     either
         Those of `uses` of which one is enough.
     aids
-        Those of `uses` that refine the result and are not needed; a plan asks nobody to record them
-        for that.
+        Those of `uses` that refine the result and are not needed; a plan does not propose to record
+        them for that.
     rank
         Preference among estimators of one constant; the lowest is published.
     terms

@@ -1,6 +1,6 @@
 """The words by which versions are chosen: `lot:2026-W*,station:bench-1`.
 
-A selector is a list of terms parted by commas. A term is `field:value` or `field=value`; a value
+A selector is a list of terms separated by commas. A term is `field:value` or `field=value`; a value
 alone belongs to the field before it. Values of one field are alternatives, different fields must
 all hold: `lot:A,B,station:S1` is lot A or B on station S1. `*` and `?` stand for any text and any
 character, and a value in quotes is taken as it stands, commas and all. A first value without field

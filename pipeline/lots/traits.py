@@ -251,7 +251,7 @@ def _kind(verdict: Verdict, more: int, *, gone: bool) -> str:
     if verdict == "fail":
         return "new in this lot"
     if verdict == "undecided":
-        return "in this lot, and too few motors to tell"
+        return "in this lot, and too few motors to decide"
     if more == 0:
         return "as before"
     chance = ", which may be chance" if verdict == "pass" else ""

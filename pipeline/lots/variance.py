@@ -82,7 +82,7 @@ def variance_components(
     u_a: Sequence[float],
     biases: Sequence[float],
 ) -> tuple[Component, ...]:
-    """The spread of motors parted into lot, station, motor and capture.
+    """The spread of motors by lot, station, motor and capture.
 
     Parameters
     ----------

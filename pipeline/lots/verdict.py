@@ -4,7 +4,7 @@ Three questions, each with its own evidence:
 
 1. Is every motor within its limits? Guard-banded decisions; needs no history.
 2. Is the lot the same as the baseline? Equivalence of means within a margin (TOST); needs no
-   history either, since it speaks of these two groups alone.
+   history either, since it concerns these two groups alone.
 3. Is the lot beyond the scatter of lots? The lot-level test; needs `min_lots` baseline lots, and
    is INSUFFICIENT_HISTORY below.
 

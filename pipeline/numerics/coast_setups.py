@@ -94,7 +94,7 @@ class Setup:
 
 
 def coast_setups(captures: Sequence[Capture], limits: Limits) -> tuple[Setup, ...]:
-    """The files of coasts, parted where they slow down too differently to be of one set-up.
+    """The files of coasts, grouped where they slow down too differently to be of one set-up.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
 """Which numbers the data determine, and which only together.
 
-A least squares problem with whitened rows A [n, p], the priors that are honest among them, knows a
-function g of the parameters where its gradient has no part along the directions that A sends to
-nothing; its variance is then gᵀ (AᵀA)⁺ g, whichever generalised inverse is taken [1]. Along such a
-direction every value fits as well, and what a minimum-norm solution makes of it is a number of the
-algorithm. A number may also be known, but not to its own size: its likelihood then has no end on a
-logarithmic scale [2].
+A least squares problem with whitened rows A [n, p], the priors that are measurements among them,
+knows a function g of the parameters where its gradient has no part along the directions that A
+sends to nothing; its variance is then gᵀ (AᵀA)⁺ g, whichever generalised inverse is taken [1].
+Along such a direction every value fits as well, and what a minimum-norm solution makes of it is a
+number of the algorithm. A number may also be known, but not to its own size: its likelihood then
+has no end on a logarithmic scale [2].
 
 The columns of A are scaled to unit length, whose singular values are Belsley's condition indices
 [3], so that units do not matter; and A is decomposed, not AᵀA, which would lose half of the digits.

@@ -1,4 +1,4 @@
-"""Linear and nonlinear least squares with honest standard errors.
+"""Linear and nonlinear least squares with standard errors that hold for correlated residuals.
 
 Residuals of a bench are often correlated (filters, drift, quantisation), which a plain covariance
 ignores: `autocorrelation_time` says how many samples count as one.

@@ -1,4 +1,4 @@
-"""Harmonics of a quantity against shaft angle: which orders a turn are there, and how surely.
+"""Harmonics of a quantity against shaft angle: which orders a turn are there, with what confidence.
 
 Every turn of every pass is a replicate. What repeats from turn to turn is signal, what differs is
 noise; the noise spectrum is averaged over neighbouring orders only, so coloured (autocorrelated)

@@ -1,4 +1,4 @@
-"""Torque, parted losses and efficiency of operating points."""
+"""Torque, losses by kind and efficiency of operating points."""
 
 from __future__ import annotations
 

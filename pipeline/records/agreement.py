@@ -15,7 +15,7 @@ class Reading:
     """One quantity of the motor from one capture alone.
 
     `value` is positive [unit]; the parts of `budget` that other captures share have sources of
-    one name. `u_rel_model` is what the method cannot promise from one capture to the next, as a
+    one name. `u_rel_model` is the systematic error of the method from one capture to the next, as a
     relative standard uncertainty. Readings of different ways may differ by a convention.
 
     Attributes

@@ -55,7 +55,7 @@ class ModelSpec:
 @dataclass(frozen=True, slots=True)
 class ModelParameter(PlainRecord):
     """One fitted parameter with its standard uncertainty [unit]; both are None where the captures
-    and the station's priors do not determine it. `stated`: nothing but what somebody states does.
+    and the station's priors do not determine it. `stated`: only a stated value does.
 
     Attributes
     ----------

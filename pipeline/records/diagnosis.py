@@ -197,7 +197,7 @@ class StepRecord(PlainRecord):
 @dataclass(frozen=True, slots=True)
 class Remainder(PlainRecord):
     """One place where error over the noise floor is left: χ²/n, its size [unit of signal], and
-    whether that is as much as anybody would act on.
+    whether that matters in use.
     """
 
     capture: str

@@ -1,4 +1,4 @@
-"""Numbers and texts out of strangers' files: the one place where such bytes are converted.
+"""Numbers and texts of untrusted files: the one place where such bytes are converted.
 
 Python's own conversions raise five kinds of errors on text that no bench writes (5,000 digits,
 half a surrogate pair, 200,000 brackets) and take some that nobody means (`1_000`, `nan`, Arabic

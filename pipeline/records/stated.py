@@ -1,4 +1,4 @@
-"""Constants that somebody states: of a nameplate, a maker's datasheet, another bench."""
+"""Constants that are stated: on a nameplate, a maker's datasheet, another bench."""
 
 from __future__ import annotations
 

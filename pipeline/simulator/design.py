@@ -28,7 +28,7 @@ EXTRA_VARIABLES = (
 
 @dataclass(frozen=True, slots=True)
 class Extra:
-    """A term that is in nobody's library: `signal += table(variable) * times`.
+    """A term that is in no library: `signal += table(variable) * times`.
 
     `x`, `y` [n each] tabulate the term, linear between points and constant outside; an angle is
     taken modulo one turn. `signal` is `torque` [N·m] on the rotor, or `vd`, `vq` [V] taken from

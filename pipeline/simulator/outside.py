@@ -1,4 +1,4 @@
-"""Effects that are in nobody's library, to test that an unknown is called unknown."""
+"""Effects that are in no library, to test that an unknown is called unknown."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _trapezoid(motor: Motor, size: float) -> Motor:
 
 
 def _hot_spot(motor: Motor, size: float) -> Motor:
-    """The winding thermometer sits nearer the iron than the copper it speaks for."""
+    """The winding thermometer sits nearer the iron than the copper."""
     return replace(motor, thermometer_share=1.0 - 0.3 * size)
 
 

@@ -202,7 +202,7 @@ def _capture(error: SignalError) -> CaptureRow:
 
 
 def _places(result: Comparison) -> list[str]:
-    """Variables that an error surely depends on, and the cell of speed and current it is in; of
+    """Variables that an error depends on, and the cell of speed and current it is in; of
     signals that are over their noise floor in some capture, since below it there is no failure.
     """
     lines = []
@@ -213,7 +213,7 @@ def _places(result: Comparison) -> list[str]:
         depends = [f"{d.variable} ({100 * d.explained:.0f} %)" for d in sure[:4]]
         worst = next((_worst(m) for m in result.maps if m.signal == signal and m.y is not None), "")
         if depends or worst:
-            lines.append(f"{signal} depends on {', '.join(depends) or 'nothing surely'}{worst}")
+            lines.append(f"{signal} depends on {', '.join(depends) or 'nothing known'}{worst}")
     return lines
 
 

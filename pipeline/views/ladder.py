@@ -121,7 +121,7 @@ def headline(result: Diagnosis) -> str:
     names = [ranked[name].headline or name for name in result.missing if name in ranked]
     found = f"{sentence(_listed(names))}. {_fall(result)}" if names else ""
     if result.verdict == "insufficient":
-        return "The captures cannot tell; what to record is named below."
+        return "The captures do not decide it; what to record is named below."
     if result.verdict == "unknown":
         one = result.unknown
         shown = "" if one is None else f": {quantity_words(one.signal)} depends on "

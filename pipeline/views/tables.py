@@ -126,7 +126,7 @@ def found_estimates(sheet: Datasheet) -> list[Estimate]:
 def fleet_files(frames: Sequence[pl.DataFrame]) -> dict[str, bytes]:
     """`fleet.csv` and `fleet.parquet` of some motors' constants; equal tables give equal bytes.
 
-    A list of captures is one text in CSV, its paths parted by semicolons.
+    A list of captures is one text in CSV, its paths separated by semicolons.
 
     Parameters
     ----------

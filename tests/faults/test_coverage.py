@@ -138,7 +138,7 @@ def test_half_a_turn(rng: np.random.Generator) -> None:
 
 
 def test_one_way_holding_current(rng: np.random.Generator) -> None:
-    """Warned: without the way back friction cannot be told from cogging."""
+    """Warned: without the way back friction cannot be separated from cogging."""
     capture = with_rows(holding_current(MOTOR, rng), np.arange(6000) < 3000)
     assert warned(capture)[1].code == "angle_coverage"
 

@@ -55,7 +55,7 @@ def _both_directions(capture: Capture, options: Mapping[str, float]) -> Passed:
     back, forth = -travel[travel < 0.0].sum(), travel[travel > 0.0].sum()
     if min(back, forth) >= options["return_share"] * max(back, forth):
         return passed
-    words = "the angles were passed in one direction only: friction cannot be told from cogging"
+    words = "angles were passed in one direction only: friction cannot be separated from cogging"
     remedy = "hold the same angles on the way back as well"
     return Passed(findings=(*passed.findings, warning(capture, CODE, words, remedy)))
 

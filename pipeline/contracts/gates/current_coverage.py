@@ -52,7 +52,7 @@ def _resistance(capture: Capture, options: Mapping[str, float]) -> Passed:
         )
     spread = max(np.percentile(v, 95) - np.percentile(v, 5) for v in flows)
     if all(spread <= max(times * noise_of(v), 0.05 * np.abs(v).max()) for v in flows):
-        words = "all current is at one level: the offset of the leads cannot be told from R"
+        words = "all current is at one level: the offset of the leads cannot be separated from R"
         remedy = "record at least two levels, best of both signs"
         return Passed(findings=(warning(capture, CODE, words, remedy),))
     return Passed()

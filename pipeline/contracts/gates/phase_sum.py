@@ -30,7 +30,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     -----
     The statistic is `sum_share` [1]. It warns above `warn_share`, or `coverage` times the stated
     relative uncertainty of the gain where that is more, for three independent gains of u leave a
-    sum of about u; it refuses above `refuse_share`. Gains for which nobody vouches explain nothing
+    sum of about u; it refuses above `refuse_share`. Gains of unstated uncertainty explain nothing
     here, though budgets take them as 1 %: five times that would pass one sensor that is 8 % off
     without a word.
 

@@ -23,7 +23,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     dynamometer holds the speed, and the torque is the current's alone. In a drive log inertia and
     friction take their share, and a shaft that carries nothing shows the transducer's drift: there
     a curve of second order in time is taken off, and the torque must also fall by `least_share` [1]
-    of what the voltage at speed promises an ampere, Kt = 1.5 v_q/ω.
+    of the torque per ampere that follows from the voltage at speed, Kt = 1.5 v_q/ω.
 
     """
     drive = capture.meta.test == "drive"
@@ -75,7 +75,7 @@ GATE = Gate(
     {
         # A healthy map correlates near +1; -0.5 over 100 blocks is five standard deviations from 0.
         "correlation": 0.5,
-        # In sound logs under load it rises by a third and more of what the voltage promises.
+        # In sound logs under load it rises by a third and more of what follows from the voltage.
         "least_share": 0.2,
     },
 )

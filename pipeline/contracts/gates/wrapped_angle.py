@@ -18,7 +18,7 @@ ANGLES = ("theta_mech_rad", "theta_elec_rad")
 GAP = 2.0
 REMEDY = (
     "count the turns on, as numpy.unwrap does, before the file is written, or log the angle "
-    "unwrapped; keep the column, for much is told by the angle alone"
+    "unwrapped; keep the column, for much follows from the angle alone"
 )
 
 

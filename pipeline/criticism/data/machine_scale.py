@@ -34,7 +34,7 @@ _LINES_A = ("ia_a", "ib_a", "ic_a")
 
 
 PAIRLESS = (
-    "nothing tells the pole pairs, without which no speed means anything to the winding: record an "
+    "nothing gives the pole pairs, without which no speed means anything to the winding: record an "
     "open circuit spin with line voltages and angle, or state pole_pairs in the captures"
 )
 

@@ -1,4 +1,4 @@
-"""Constants that somebody states of a motor, as priors of the model's parameters."""
+"""Constants that are stated of a motor, as priors of the model's parameters."""
 
 from __future__ import annotations
 

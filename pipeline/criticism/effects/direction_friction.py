@@ -17,7 +17,7 @@ def _torque(x: Operating, q: Values) -> Array:
 EFFECT = Effect(
     name="direction_friction",
     words="drag (T_c + coulomb) sign(ω) forwards, (T_c - coulomb) sign(ω) backwards; the viscous "
-    "part likewise, told at the highest speed",
+    "part likewise, reported at the highest speed",
     signature="drag against speed that is no odd function",
     tests=("spin_down", "drive", "holding_current"),
     experiment="coasts, or free motion, in both senses at several speeds",

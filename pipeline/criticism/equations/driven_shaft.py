@@ -30,7 +30,7 @@ VOLTAGE, RECORDER = "vq_v", "log"
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Voltage and angle where the shaft surely turns, and its voltage is on record.
+    """Voltage and angle where the shaft certainly turns, and its voltage is on record.
 
     Parameters
     ----------

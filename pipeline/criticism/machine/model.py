@@ -204,7 +204,7 @@ class Model:
         return own | self.stated()
 
     def stated(self) -> dict[str, tuple[float, float]]:
-        """What somebody states of the model's own parameters: value and standard uncertainty."""
+        """What is stated of the model's own parameters: value and standard uncertainty."""
         known = {*PHYSICAL, *self.parameters()}
         return {name: both for name, both in self.machine.stated.items() if name in known}
 

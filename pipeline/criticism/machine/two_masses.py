@@ -342,7 +342,7 @@ def _law(logs: Sequence[FullLog], between: bool, share: float) -> Law | None:
 
 
 def _discriminated(law: Law, log: FullLog, part: float) -> Discrimination | None:
-    """The form that a law surely has, `part` of the twist in it; a gap with its own numbers."""
+    """The form of a law if it is significant, `part` of the twist in it; a gap with its numbers."""
     machine = log.x.machine
     policy = machine.policy.torsion
     gap, u_gap = law.gap_rad / part, law.u_gap_rad / part
@@ -357,9 +357,9 @@ def _discriminated(law: Law, log: FullLog, part: float) -> Discrimination | None
 
 
 def _in_coupling(law: Law, log: FullLog, near_kgm2: float) -> Discrimination | None:
-    """The form that a law surely has where the transducer stands in the coupling, with the spring's
-    numbers and the share of the inertia behind it, as no twist is in the equations there; None
-    without a far inertia.
+    """The form of a law if it is significant, where the transducer stands in the coupling, with the
+    spring's numbers and the share of the inertia behind it, as no twist is in the equations there;
+    None without a far inertia.
     """
     policy = log.x.machine.policy.torsion
     found = _discriminated(law, log, 1.0)

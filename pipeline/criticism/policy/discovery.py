@@ -25,11 +25,11 @@ class Discovery:
     )  # fmt: skip
     change_captures: int = chosen(
         3, "1", "fewest captures that hold a constant which changed between some of them",
-        why="of two that disagree nobody knows which one is odd",
+        why="of two that disagree either may be the odd one",
     )  # fmt: skip
     changed_share: float = chosen(
         0.01, "1", "change of a magnet or of friction from which on it is no sound motor",
-        why="anybody would look into a magnet that lost 1 % of its flux",
+        why="a magnet that lost 1 % of its flux is a fault",
     )  # fmt: skip
     change_windows: int = chosen(
         4, "windows", "fewest windows before and after a change within a capture",
@@ -133,5 +133,5 @@ class Discovery:
     )  # fmt: skip
     negligible_share: float = chosen(
         0.01, "1", "negligible size of a parameter in the written effect, over the value found",
-        why="a hundredth of a drag is nobody's concern",
+        why="a hundredth of a drag is negligible",
     )  # fmt: skip

@@ -20,7 +20,7 @@ class Torsion:
         why="lower, and blocks in which the gap is open count as closed",
     )  # fmt: skip
     noise_share: float = chosen(
-        0.08, "1", "what surely is a torque, as a share of the torque's scatter, at the most",
+        0.08, "1", "what is certainly a torque, as a share of the torque's scatter, at the most",
         why="with a larger one few blocks are closed",
     )  # fmt: skip
     window_s: float = chosen(
@@ -35,7 +35,7 @@ class Torsion:
         why="a parabola and three columns leave little of fewer",
     )  # fmt: skip
     torque_range: float = chosen(
-        10.0, "1", "range of the torque in a window over what surely is a torque",
+        10.0, "1", "range of the torque in a window over what is certainly a torque",
         why="under an even torque a twist is a constant",
     )  # fmt: skip
     torque_moves: float = chosen(

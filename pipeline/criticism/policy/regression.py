@@ -35,7 +35,7 @@ class GaussNewton:
         source="a twelfth of `selection.tie`",
     )  # fmt: skip
     kept_share: float = chosen(
-        0.9, "1", "share of its promise that a step must keep for its columns to stay",
+        0.9, "1", "share of its predicted fall that a step must reach for its columns to stay",
         why="at 1 columns are made anew at every step; much lower, and stale ones gain little",
     )  # fmt: skip
     pinned: float = chosen(
@@ -179,11 +179,11 @@ class Goodness:
         why="3e-7: thousands of groups are looked at",
     )  # fmt: skip
     material: float = chosen(
-        5e-4, "machine scales", "error that matters", why="nobody acts on a smaller one"
+        5e-4, "machine scales", "error that matters", why="a smaller one is negligible in use"
     )
     material_bench: float = chosen(
         1e-2, "1", "error that matters of a bench meter, as a share of its largest reading",
-        why="nobody acts on a smaller one",
+        why="a smaller one is negligible in use",
     )  # fmt: skip
     material_reading: float = chosen(
         5e-3, "1", "error that matters of a log's voltage, as a share of its largest one",

@@ -139,7 +139,7 @@ class Selection:
     little_share: float = chosen(
         0.01, "1",
         "share of the held-out error that a further effect must take while anything is left",
-        why="a hundredth is nobody's concern",
+        why="a hundredth is negligible",
     )  # fmt: skip
     drift_size: float = chosen(
         4.0, "standard deviations of noise", "drift of a sensor at a capture's end",

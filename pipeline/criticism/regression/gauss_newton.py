@@ -70,7 +70,7 @@ def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
     Notes
     -----
     A step that makes the deviance worse is shortened. Columns stay as they are while steps do about
-    what they promise (chord method); a fit is at its end where columns made anew promise nothing.
+    what they predict (chord method); a fit has converged where new columns predict no fall.
 
     References
     ----------
@@ -100,7 +100,7 @@ def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
 
 def _tried(system: LinearSystem, step: Array, halvings: int) -> tuple[LinearSystem, float]:
     """The system after a step, shortened until it does no harm, with the columns of the start; and
-    the fall of deviance that these columns promised.
+    the fall of deviance that these columns predicted.
     """
     policy = system.policy.fit
     for _ in range(halvings):

@@ -414,7 +414,7 @@ def _highest_by_chance(n: float, sigmas: float) -> float:
 
 
 def material_size(segment: Segment, channel: str, fit: Fit, large: bool = False) -> float:
-    """Error below which nobody would act.
+    """Error that is negligible in use.
 
     Parameters
     ----------

@@ -252,8 +252,8 @@ def reading_error(
     5e-5 of the reading in a window, since no sensor is more linear, and for what happens between
     samples a part of the machine's own scale: 1e-4 under a drive, 2e-5 on a bench. Then what a
     drive's log may have besides: jumps of the voltage, a speed of a period ago, lines of the
-    encoder, friction at standstill. An effect that hides in this is nobody's concern, and smaller
-    structure names nothing.
+    encoder, friction at standstill. An effect below this is negligible, and smaller structure names
+    nothing.
 
     """
     weak, policy = segment.weak, model.policy.noise_floors

@@ -1,4 +1,4 @@
-"""Terms inside an effect: those that the captures do not pay for are left out.
+"""Terms inside an effect: those that the captures do not support are left out.
 
 Reference: Schwarz, Ann. Stat. 6 (1978), the penalty of a parameter.
 """
@@ -103,7 +103,7 @@ def _parameters(fit: Fit, effect: Effect, terms: Sequence[int]) -> tuple[str, ..
 
 
 def _spare(system: LinearSystem, effect: Effect, penalty: float) -> tuple[int, ...]:
-    """The optional terms that do not pay to first order, the cheapest first."""
+    """The optional terms that are not worth their penalty to first order, the worst first."""
     parameters = effect.parameters_of(system.fit.machine)
     removable = sorted({p.optional for p in parameters} - {0})
     known = system.normal_equations()

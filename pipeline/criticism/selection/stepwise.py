@@ -179,7 +179,8 @@ def _chosen(
     """The fit with the best candidate of the first few; of the next few, if none of these keeps its
     predicted fall and differs significantly from zero.
 
-    That fit is finished with columns of its own, and without terms that do not pay.
+    That fit is finished with columns of its own, and without terms that are not worth their
+    penalty.
     """
     policy = wide.policy.selection
     for first in range(0, min(len(passing), policy.refit_rounds * policy.refits), policy.refits):

@@ -45,7 +45,7 @@ def truncated(
     `guess_share`, where they do not explain it, unless the step cleared a signal of all waves of
     the angle; 3. came after the first effect and lowered the held-out error by less than
     `little_share`. A step stays that takes most of what its own side, winding or shaft, misses in
-    captures held out: a misfit of the other side is no evidence against it.
+    captures held out: a residual of the other side is no evidence against it.
 
     """
     policy = steps[0].fit.policy.selection
@@ -102,8 +102,8 @@ def contradiction(step: LadderStep) -> str:
 def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:
     """Whether some signal had waves of the angle over its floor before a step, and none after it.
 
-    Cogging is no guess where it takes every wave there was in a torque, however much a drag of
-    nobody's library leaves at order zero, or another capture in a voltage.
+    Cogging is no guess where it takes every wave there was in a torque, however much a drag of no
+    library leaves at order zero, or another capture in a voltage.
     """
     return bool(_waved(before) - _waved(after))
 

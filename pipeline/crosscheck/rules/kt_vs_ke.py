@@ -1,4 +1,4 @@
-"""Measured torque constant against the one that the back-EMF promises."""
+"""Measured torque constant against the one that follows from the back-EMF."""
 
 from __future__ import annotations
 

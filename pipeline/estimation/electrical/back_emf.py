@@ -259,7 +259,7 @@ def _stretches(spin: Spin, change: float) -> tuple[list[Stretch], int]:
 
 
 def _unbroken(t_s: Array, vector: Complex, moving: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Runs of moving rows, parted where rows are missing for more than half a cycle.
+    """Runs of moving rows, split where rows are missing for more than half a cycle.
 
     Across such a gap the phase cannot be unwrapped. Half a cycle is seen by nine tenths of the
     advances from row to row.
@@ -280,7 +280,7 @@ def _unbroken(t_s: Array, vector: Complex, moving: NDArray[np.bool_]) -> list[tu
 
 
 def _one_way(phase: Array) -> list[tuple[int, int]]:
-    """Rows start..stop that part a phase [n] wherever it turns back by a cycle or more."""
+    """Rows start..stop that split a phase [n] wherever it turns back by a cycle or more."""
     open_pieces, found = [(0, phase.size)], []
     while open_pieces:
         start, stop = open_pieces.pop()

@@ -1,4 +1,4 @@
-"""The fit of the step model to all captures, with as much saturation as the data pay for."""
+"""The fit of the step model to all captures, with as many saturation terms as the data support."""
 
 from __future__ import annotations
 
@@ -75,11 +75,11 @@ class Solution:
 
 
 def solve(model: StepModel, axes: Sequence[str]) -> Solution:
-    """Adds saturation terms while they pay, then drops those that no longer do.
+    """Adds saturation terms that lower the BIC, then drops those that no longer do.
 
-    A term pays where it lowers the weighted sum of squares by more than log n (BIC). Terms are
-    proposed by the score of the present fit under white noise, one an axis and round, and judged
-    after a fit with them by their own standard error, which counts correlated residuals.
+    A term lowers the BIC where it lowers the weighted sum of squares by more than log n (BIC).
+    Terms are proposed by the score of the present fit under white noise, one an axis and round, and
+    judged after a fit with them by their own standard error, which counts correlated residuals.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Ld and Lq near zero current from voltage steps on a locked rotor, saturation parted off."""
+"""Ld and Lq near zero current from voltage steps on a locked rotor, with saturation separated."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def along_ramp(shared: Array, cos_g: float, current_a: Array) -> Array:
 def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """Least squares of the simulated current on the measured one, all captures together.
 
-    Saturation terms come in where the Bayesian information criterion pays for them; what the
+    Saturation terms enter where they lower the Bayesian information criterion; what the
     rejected ones would still change is in the uncertainty.
     Gains scale v and i, and L with v/i. References: Schwarz, Ann. Statist. 6(2), 1978 (BIC);
     Hoeting et al., Statist. Sci. 14(4), 1999, eq. 5 (variance between models).

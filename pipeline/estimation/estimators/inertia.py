@@ -96,7 +96,7 @@ class Torque:
 
 @dataclass(frozen=True, slots=True)
 class Doubts:
-    """What speaks against the law: the acceleration's `share` that the torque does not explain,
+    """What contradicts the law: the acceleration's `share` that the torque does not explain,
     and where regimes differ in J, T_c/J, B/J.
     """
 
@@ -226,7 +226,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
     found = drag_of(rows, acceleration(rows, driving), nuisances, options["level"])
     if not torque_is_separable(found.design, found.sigma):
-        note = f"the drive's torque cannot be told from its friction; {EXPERIMENT}"
+        note = f"the drive's torque cannot be separated from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     strange = _share_of_no_torque(rows, found)
     if strange > policy().drag.loaded_share and not _load_logged(rows):

@@ -184,7 +184,7 @@ def _over_angle(table: Table, options: Mapping[str, float]) -> Found | None:
         model, fit = np.array([mean, a, b]), free
         note = f"theta_elec_deg is off by {shift:.1f} deg, found from the table itself"
         if abs(shift) > policy().meter_table.exchanged_deg:
-            note += "; the axes are told apart by that zero alone and may be exchanged"
+            note += "; the axes are distinguished by that zero alone and may be exchanged"
     else:
         fit = linear_fit(design[:, :2], table.l_h[known])
         mean, signed = (float(c) for c in fit.coefficients)
@@ -234,11 +234,11 @@ def _at_unknown_angle(table: Table) -> Found | None:
             values[name] = (float(np.mean(means)), math.hypot(spread, half), float(count - 1))
     note = ""
     if unparted:
-        note = "the three pairs differ by noise alone: Ld and Lq are not told apart"
+        note = "the three pairs differ by noise alone: Ld and Lq cannot be distinguished"
     elif not all(has_angle):
         note = (
             "rotor angle unknown: the low inductance is taken as d, as with interior magnets; "
-            "a back-EMF or an alignment would tell"
+            "a back-EMF or an alignment would show it"
         )
     if len(first) == 1:
         note = "; ".join(n for n in (note, "one position: scatter unknown") if n)

@@ -1,4 +1,4 @@
-"""What a torque per ampere at standstill owes to the angle at which the rotor is held."""
+"""Error of a torque per ampere at standstill from the angle at which the rotor is held."""
 
 from __future__ import annotations
 
@@ -112,5 +112,5 @@ def standstill_words(points: Sequence[Point], found: Sequence[Point]) -> str:
         return f"{count} points at standstill left out"
     return (
         f"{count} points at standstill: torque ripple is that of their angle, and static friction "
-        "is not told from torque"
+        "cannot be separated from torque"
     )

@@ -43,7 +43,7 @@ class ShaftRows:
         "is a Stribeck's excess to lose, half of it nothing",
     )  # fmt: skip
     resolved_periods: float = calibrated(
-        2.0, "samples", "shortest time constant that is parted from a delay",
+        2.0, "samples", "shortest time constant that can be separated from a delay",
         by=TRIED,
         on="simulated logs of voltage and angle: at one sample and less kA came out up to ten "
         "times too large, at two and more its intervals held",

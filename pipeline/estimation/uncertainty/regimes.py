@@ -31,7 +31,7 @@ class Partition:
     Attributes
     ----------
     name
-        What the rows are parted by.
+        What the rows are grouped by.
     labels
         Number of each row's regime [n]; −1 for a row of none.
     names
@@ -130,7 +130,7 @@ def halves(
     name
         Of the partition.
     values
-        By which the rows are parted [n].
+        By which the rows are grouped [n].
     low, high
         Names of the two regimes.
     information
@@ -158,7 +158,7 @@ def signs(name: str, values: Array, low: str, high: str, among: NDArray[np.bool_
     name
         Of the partition.
     values
-        By which the rows are parted [n]; 0 counts as negative.
+        By which the rows are grouped [n]; 0 counts as negative.
     low, high
         Names of the two regimes.
     among

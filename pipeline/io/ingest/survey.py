@@ -493,7 +493,7 @@ def _text_head(data: bytes, named: bool) -> tuple[dict[str, str], str]:
 
 
 def _sidecar(path: str, there: frozenset[str]) -> str | None:
-    """The file beside that speaks of a file: NAME.meta.yaml for NAME.csv, or NAME.csv.meta.yaml."""
+    """The sidecar of a file: NAME.meta.yaml for NAME.csv, or NAME.csv.meta.yaml."""
     stem = PurePosixPath(path).with_suffix("").as_posix()
     return next((c for c in (path + SIDECAR_SUFFIX, stem + SIDECAR_SUFFIX) if c in there), None)
 

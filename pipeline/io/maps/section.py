@@ -1,4 +1,4 @@
-"""A YAML map read key by key: every key has a kind, and a key nobody asked for is an error."""
+"""A YAML map read key by key: every key has a kind, and an unknown key is an error."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _MAX_PATTERN = 500
 
 
 class Section:
-    """One map of the YAML, read key by key; a key nobody asked for is an error."""
+    """One map of the YAML, read key by key; an unknown key is an error."""
 
     def __init__(self, source: str, where: str, plain: Any) -> None:
         self.source = source
@@ -54,7 +54,7 @@ class Section:
         return self.remaining.pop(key, None)
 
     def close(self) -> None:
-        """Raises UsageError for a key that nobody asked for."""
+        """Raises UsageError for an unknown key."""
         for key in self.remaining:
             near = difflib.get_close_matches(key, self.known_keys, 1)
             hint = (

@@ -1,6 +1,6 @@
 """A ros2msg schema parsed into a layout of fields.
 
-Reference: https://mcap.dev/spec/registry (ros2msg: concatenated definitions, parted by lines of
+Reference: https://mcap.dev/spec/registry (ros2msg: concatenated definitions, separated by lines of
 80 `=` and `MSG: package/Type`) and https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html.
 """
 

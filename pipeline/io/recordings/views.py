@@ -1,4 +1,4 @@
-"""Views that several workspaces share: curves, bars, maps, pages, and the colours they speak in."""
+"""Views that several workspaces share: curves, bars, maps, pages, and their colours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The viewer as a web page on loopback that speaks to this machine alone.
+"""The viewer as a web page on loopback that serves this machine alone.
 
 The page that comes with the viewer sends usage statistics, asks for newer versions and loads fonts
 from elsewhere. It is handed on with a content security policy under which the browser refuses all

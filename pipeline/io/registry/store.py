@@ -124,7 +124,7 @@ class Registry:
         return self._settled(sheets, before, added)
 
     def _withdraw(self, prepared: Iterable[Key]) -> None:
-        """Takes away the pending files whose rows surely are not in the table."""
+        """Takes away the pending files whose rows are certainly not in the table."""
         with suppress(PipelineError):
             known = {event.key for event in self._table.events() or ()}
             for key in set(prepared) - known:

@@ -1,4 +1,4 @@
-"""YAML from strangers: text, lists and maps only, no tags, no aliases, small and shallow.
+"""YAML from untrusted files: text, lists and maps only, no tags, no aliases, small and shallow.
 
 Every scalar stays the text that was written, so a serial number 000123 or a `no` keeps its form;
 who needs a number converts it and says so.

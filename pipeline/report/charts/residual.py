@@ -52,7 +52,7 @@ def residual_of(series: Series) -> Array:
 def residual_scale(series: Iterable[Series]) -> ResidualScale | None:
     """Scatter of the residuals of several series, each in order of x; None without any fit.
 
-    The noise is the root of half the mean squared difference of neighbours, which a smooth misfit
+    The noise is the root of half the mean squared difference of neighbours, which a smooth residual
     hardly moves. Reference: J. von Neumann, R. H. Kent, H. R. Bellinson, B. I. Hart, "The mean
     square successive difference", Ann. Math. Statist. 12 (1941) 153-162.
 

@@ -14,7 +14,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 def render(template: str, **values: Any) -> str:
-    """HTML text of a template; a value that the template names and nobody gave is an error.
+    """HTML text of a template; a value that the template names and that is not given is an error.
 
     The indentation of the templates is not part of it.
 

@@ -10,7 +10,7 @@ from pipeline.records.policy import Entry, Number, entries
 
 _HEAD = """# Constants of judgement
 
-Thresholds, shares and factors that somebody has set, with unit, meaning and origin: *derived* from
+Thresholds, shares and factors with unit, meaning and origin: *derived* from
 something else, *calibrated* by a command on data, or *chosen*. To override some of them:
 
     python -m pipeline diagnose policy.selection.tie=9.0 ...
