@@ -10,6 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from pipeline.__main__ import main
 
 ROOT = Path(__file__).parents[2]
@@ -104,3 +106,24 @@ def test_auto_release_needs_every_condition(bench: Path, tmp_path: Path) -> None
     assert part["status"] == "provisional"
     assert any("kt_peak_nm_a" in reason for reason in part["why"])
     assert part["version"] != whole["version"]
+
+
+@pytest.mark.slow
+def test_a_diagnosis_is_the_same_on_one_core_and_on_two(tmp_path: Path) -> None:
+    """A second process shares the work on segments; which segments never depends on the clock."""
+    cores = os.sched_getaffinity(0)
+    if len(cores) < 2:
+        pytest.skip("needs two cores")
+    words = ["diagnose", f"input={ROOT / 'data' / 'demo'}", "motor=G52-0603"]
+    texts = []
+    for allowed in ({min(cores)}, cores):
+        output = tmp_path / str(len(allowed))
+        subprocess.run(
+            [sys.executable, "-m", "pipeline", *words, f"output={output}"],
+            cwd=ROOT,
+            check=False,
+            capture_output=True,
+            preexec_fn=lambda allowed=allowed: os.sched_setaffinity(0, allowed),
+        )
+        texts.append((output / "diagnosis" / "G52-0603.json").read_bytes())
+    assert texts[0] == texts[1]

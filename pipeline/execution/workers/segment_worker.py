@@ -7,9 +7,8 @@ use 1.4 cores. Segments are sent once. A task is a few kilobytes, its result a f
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import Any
 
@@ -31,17 +30,16 @@ class SegmentWorker:
 
     def __init__(self, executor: Executor | None) -> None:
         self._executor = executor
-        # keeps a reference, so that no other segment gets the same id
-        self._sent: dict[int, Segment] = {}
-        self._cost_s: dict[int, float] = {}
+        # keeps references, so that no other segment gets the same id
+        self._placed: tuple[dict[int, Segment], dict[int, Segment]] = {}, {}
 
     @contextmanager
     def campaign(self) -> Iterator[None]:
         """Shares the work on one campaign's segments inside the block, then drops the segments."""
         with done_by(self.share):
             yield
-        self._sent.clear()
-        self._cost_s.clear()
+        for segments in self._placed:
+            segments.clear()
         if self._executor is not None:
             self._executor.submit(_forget)
 
@@ -49,6 +47,10 @@ class SegmentWorker:
         self, work: Work, segments: Sequence[Segment], arguments: Sequence[tuple[Any, ...]]
     ) -> tuple[Any, ...]:
         """`work(segment, *arguments)` of every segment, in order; the worker does half of them.
+
+        A segment stays with the process that it was first given to. A process keeps what it has
+        computed of a segment, and the last bits of a result depend on what was kept. So they are
+        the same with and without a worker, however fast either is.
 
         Parameters
         ----------
@@ -60,40 +62,34 @@ class SegmentWorker:
             Further arguments for each segment.
 
         """
-        if self._executor is None or len(segments) < 2:
+        if self._executor is None:
             return by_threads(work, segments, arguments)
-        local, remote = halves(self._costs(segments))
+        new = self._place(segments)
+        remote = [n for n, segment in enumerate(segments) if id(segment) in self._placed[1]]
+        local = [n for n in range(len(segments)) if n not in remote]
+        keys, given = [id(segments[n]) for n in remote], [arguments[n] for n in remote]
         try:
-            given = [segments[n] for n in remote], [arguments[n] for n in remote]
-            future = self._submit(self._executor, work, *given)
-            done = {n: _timed(work, segments[n], arguments[n]) for n in local}
+            future = self._executor.submit(_map, new, keys, work, given)
+            done = {n: work(segments[n], *arguments[n]) for n in local}
             done |= dict(zip(remote, future.result(), strict=True))
         except Exception as error:  # noqa: BLE001 - an error of the work itself is raised again here
             _log.info("work on segments is no longer shared: %s", error)
             self._executor = None
             return by_threads(work, segments, arguments)
-        for n, (_, seconds) in done.items():
-            key = id(segments[n])
-            self._cost_s[key] = self._cost_s.get(key, 0.0) + seconds
-        return tuple(done[n][0] for n in range(len(segments)))
+        return tuple(done[n] for n in range(len(segments)))
 
-    def _costs(self, segments: Sequence[Segment]) -> list[float]:
-        """The cost of each segment: the time spent on it so far, else its number of samples."""
-        spent_s = [self._cost_s.get(id(segment), 0.0) for segment in segments]
-        return spent_s if all(spent_s) else [float(segment.size) for segment in segments]
-
-    def _submit(
-        self,
-        executor: Executor,
-        work: Work,
-        segments: Sequence[Segment],
-        arguments: Sequence[tuple[Any, ...]],
-    ) -> Future[list[tuple[Any, float]]]:
-        new = {id(segment): segment for segment in segments if id(segment) not in self._sent}
-        keys = [id(segment) for segment in segments]
-        future = executor.submit(_map_timed, new, keys, work, arguments)
-        self._sent |= new
-        return future
+    def _place(self, segments: Sequence[Segment]) -> dict[int, Segment]:
+        """Gives new segments to either process, the largest first; those that the worker gets."""
+        local, remote = self._placed
+        loads = [sum(segment.size for segment in one.values()) for one in self._placed]
+        new = [s for s in segments if id(s) not in local and id(s) not in remote]
+        sent: dict[int, Segment] = {}
+        for segment in sorted(new, key=lambda one: -one.size):
+            lighter = int(loads[1] < loads[0])
+            loads[lighter] += segment.size
+            (sent if lighter else local)[id(segment)] = segment
+        remote.update(sent)
+        return sent
 
 
 @contextmanager
@@ -114,24 +110,6 @@ def segment_worker(effects_path: str | None) -> Iterator[SegmentWorker]:
         yield SegmentWorker(pool.executor)
 
 
-def halves(sizes: Sequence[float]) -> tuple[list[int], list[int]]:
-    """Indices in two shares of about equal total size; the largest is assigned first.
-
-    Parameters
-    ----------
-    sizes
-        Size of each item.
-
-    """
-    shares: tuple[list[int], list[int]] = [], []
-    loads = [0.0, 0.0]
-    for n in sorted(range(len(sizes)), key=lambda n: -sizes[n]):
-        lighter = int(loads[1] < loads[0])
-        shares[lighter].append(n)
-        loads[lighter] += sizes[n]
-    return shares
-
-
 def _forget() -> None:
     _SEGMENTS.clear()
 
@@ -143,15 +121,8 @@ def _load_effects(effects_path: str | None) -> None:
     effects(effects_path)
 
 
-def _map_timed(
+def _map(
     new: dict[int, Segment], keys: list[int], work: Work, arguments: Sequence[tuple[Any, ...]]
-) -> list[tuple[Any, float]]:
+) -> list[Any]:
     _SEGMENTS.update(new)
-    return [_timed(work, _SEGMENTS[key], given) for key, given in zip(keys, arguments, strict=True)]
-
-
-def _timed(work: Work, segment: Segment, arguments: tuple[Any, ...]) -> tuple[Any, float]:
-    """The result of work on a segment, and its processor time [s]."""
-    begun_s = time.thread_time()
-    result = work(segment, *arguments)
-    return result, time.thread_time() - begun_s
+    return [work(_SEGMENTS[key], *given) for key, given in zip(keys, arguments, strict=True)]

@@ -202,7 +202,7 @@ def test_equal_inductances_at_an_unknown_angle_are_not_parted_by_their_noise(see
     assert found["ld_h"].number == found["lq_h"].number == pytest.approx(2e-4, rel=1e-3)
     assert near(found["ld_h"], 2e-4, 2.0)
     assert found["ld_h"].u_a < 1e-6
-    assert "not told apart" in found["ld_h"].note
+    assert "cannot be distinguished" in found["ld_h"].note
 
 
 def test_a_small_saliency_beyond_the_noise_is_told():

@@ -133,7 +133,7 @@ def test_positions_scatter_and_noise_alone_makes_no_swing() -> None:
     assert "scatter unknown" not in ld.note
     alike = estimates(lcr.ESTIMATOR, three_pairs(theta, 2e-3, 2e-3, noise=1e-5))
     assert alike["ld_h"].number == alike["lq_h"].number == pytest.approx(2e-3, rel=0.01)
-    assert "not told apart" in alike["ld_h"].note
+    assert "cannot be distinguished" in alike["ld_h"].note
     for ratio, noise_alone in ((3.9, True), (4.1, False)):
         swings = ratio + np.array([-1.0, 0.0, 1.0])
         assert lcr._swing_of_noise(swings) is noise_alone

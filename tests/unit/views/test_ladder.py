@@ -44,7 +44,7 @@ def test_other_verdicts_in_words() -> None:
     )
     adequate = replace(make_diagnosis(), verdict="adequate", missing=())
     assert "to 0.41 noise floors; nothing is missing" in headline(adequate)
-    assert "cannot tell" in headline(replace(adequate, verdict="insufficient", ladder=()))
+    assert "do not decide it" in headline(replace(adequate, verdict="insufficient", ladder=()))
 
 
 def test_the_commands_name_folder_motor_and_all_effects() -> None:
