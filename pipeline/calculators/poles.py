@@ -18,9 +18,9 @@ def _pole_pairs(given: Given) -> Answer | None:
         Line("poles", 2 * number, "1", "2·p", "magnets around the rotor"),
     ]
     if given.has("speed_ratio"):
-        told = _whole(given, number / given.one("speed_ratio"), 1.0)
+        stated = _whole(given, number / given.one("speed_ratio"), 1.0)
         words = "pole pairs the drive was told"
-        lines.append(Line("told", told, "1", "p/(reported/true speed)", words))
+        lines.append(Line("told", stated, "1", "p/(reported/true speed)", words))
     elif given.has("told"):
         ratio = number / given.one("told")
         words = "reported speed over true speed, as ω = ω_elec/told"

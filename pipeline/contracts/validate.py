@@ -83,8 +83,8 @@ def validate(
     if refusals or broken:
         raise merged(_causes_first(refusals) or broken)
     settings = {**missing_values.GATE.settings(), **options.get(missing_values.NAME, {})}
-    parted = _streams_split(capture, settings["dense_share"])
-    return parted.with_masks(*masks), tuple(findings)
+    split = _streams_split(capture, settings["dense_share"])
+    return split.with_masks(*masks), tuple(findings)
 
 
 def _causes_first(refusals: Mapping[str, CaptureError]) -> list[CaptureError]:

@@ -74,7 +74,7 @@ _ALONE = (
     "with it; record that test once more"
 )
 _AGAINST = "captures contradict it: see the note"
-_GUESS = "takes some of what is left, but too little to be named beside what nothing explains"
+_UNSUPPORTED = "takes some of what is left, but too little to be named beside what nothing explains"
 
 
 def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:
@@ -185,7 +185,7 @@ def _notes(
     verdict: Verdict,
     together: Sequence[KnownCombination],
 ) -> tuple[str, ...]:
-    """What a reader of the diagnosis has to know besides: data, frame, hum, combinations."""
+    """What a reader of the diagnosis has to know as well: data, frame, hum, combinations."""
     ladder, last = end.ladder, end.ladder.steps[-1].system
     stateless = verdict == "unknown" and not (end.sketch or end.change or end.freed)
     return (
@@ -324,7 +324,7 @@ def _ranking(
     last = ladder.steps[-1]
     ranked = [_found(ladder, last.fit.effect(name), offered, library) for name in last.added]
     others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]
-    reasons = {name: _AGAINST if note else _GUESS for name, note in ladder.cut.items()}
+    reasons = {name: _AGAINST if note else _UNSUPPORTED for name, note in ladder.cut.items()}
     others = [replace(r, shortfall=reasons.get(r.effect, r.shortfall)) for r in others]
     return tuple(ranked + sorted(others, key=lambda r: (-r.score, r.effect)))
 

@@ -47,7 +47,7 @@ class Channel:
         Whether it is reported times the inertia [N·m].
     offset
         What a sensor may be off by in a whole capture: a share of its noise, the zero of a bench
-        voltmeter besides, or nothing.
+        voltmeter as well, or nothing.
 
     """
 

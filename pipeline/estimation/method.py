@@ -228,7 +228,7 @@ def over_x(label: str, x: Array, measured: Array, fitted: Array) -> Series:
     Parameters
     ----------
     label
-        Tells series of one plot apart.
+        Distinguishes the series of one plot.
     x, measured, fitted : array [n]
         In the units of the plot's axes.
 

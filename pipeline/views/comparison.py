@@ -208,7 +208,7 @@ def _places(result: Comparison) -> list[str]:
     lines = []
     over = {e.signal for e in result.errors if e.kind == "equation" and ratio_of(e) > 1.0}
     for signal in dict.fromkeys(d.signal for d in result.where if d.signal in over):
-        sure = [d for d in result.where if d.signal == signal and _surely(d)]
+        sure = [d for d in result.where if d.signal == signal and _significant(d)]
         sure.sort(key=lambda d: -d.explained)
         depends = [f"{d.variable} ({100 * d.explained:.0f} %)" for d in sure[:4]]
         worst = next((_worst(m) for m in result.maps if m.signal == signal and m.y is not None), "")
@@ -217,7 +217,7 @@ def _places(result: Comparison) -> list[str]:
     return lines
 
 
-def _surely(dependence: Dependence) -> bool:
+def _significant(dependence: Dependence) -> bool:
     p_value = dependence.p_value
     return p_value is not None and p_value < SURE and dependence.explained >= SHARE
 

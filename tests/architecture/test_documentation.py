@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -191,3 +192,31 @@ def test_nearly_every_effect_has_a_picture() -> None:
     """The simulator has nine in ten effects at least."""
     drawn = [simulated(effect) for effect in all_effects()]
     assert sum(drawn) >= 0.9 * len(drawn)
+
+
+def names_and_prose(path: Path) -> Iterator[str]:
+    """What a module calls things, and its docstrings without code in backticks."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            yield node.name.replace("_", " ")
+        elif isinstance(node, ast.arg):
+            yield node.arg.replace("_", " ")
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id.replace("_", " ")
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef, ast.Module)):
+            yield CODE.sub("", ast.get_docstring(node) or "")
+
+
+def test_no_name_and_no_docstring_of_the_package_has_a_private_word() -> None:
+    """Fields of a policy are keys that people override, and keep their names."""
+    word = re.compile(rf"\b(?:{PRIVATE}|foreseen?|surely|parted|nought)\b", re.IGNORECASE)
+    ordinary = {"room", "rooms"}  # for a label, in memory
+    found = [
+        f"{path.relative_to(ROOT)}: {hit.group()}"
+        for path in sorted((ROOT / "pipeline").rglob("*.py"))
+        if path.parent.name != "policy"
+        for text in names_and_prose(path)
+        for hit in word.finditer(text)
+        if hit.group().lower() not in ordinary
+    ]
+    assert found == []

@@ -71,8 +71,8 @@ def levels_of(current: Array, least: float = 0.0) -> NDArray[np.int64]:
 
     """
     order = np.argsort(current, kind="stable")
-    parted = np.diff(current[order]) > _apart(current, least)
-    number = np.concatenate([[0], np.cumsum(parted)])
+    jumps = np.diff(current[order]) > _apart(current, least)
+    number = np.concatenate([[0], np.cumsum(jumps)])
     levels = np.empty(current.size, dtype=np.int64)
     levels[order] = number
     return levels

@@ -385,7 +385,7 @@ def shown(logs: Sequence[FullLog]) -> Shown | None:
     Returns
     -------
     Shown or None
-        None where no far inertia, or no twist nor gap, surely stands behind the transducer.
+        None where no far inertia, or no twist nor gap, is significant behind the transducer.
 
     Notes
     -----

@@ -91,7 +91,7 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     -----
     Noise is added to the recording and the residual computed again; the variance of the change is
     pooled over the windows. The noise is white, of each sensor's own level; an angle that is
-    rounded, and signals that are coarse, are rounded anew besides. The noise of an angle that was
+    rounded, and signals that are coarse, are rounded anew too. The noise of an angle that was
     smoothed is smoothed alike: what is slow in it stays as it was. What the smoothing changes in
     the residual counts too: it may have been noise or motion.
 
@@ -251,7 +251,7 @@ def reading_error(
     -----
     5e-5 of the reading in a window, since no sensor is more linear, and for what happens between
     samples a part of the machine's own scale: 1e-4 under a drive, 2e-5 on a bench. Then what a
-    drive's log may have besides: jumps of the voltage, a speed of a period ago, lines of the
+    drive's log may have as well: jumps of the voltage, a speed of a period ago, lines of the
     encoder, friction at standstill. An effect below this is negligible, and smaller structure names
     nothing.
 

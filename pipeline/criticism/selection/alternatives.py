@@ -103,8 +103,8 @@ def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str
         One remedy an alternative; the effect's own experiment where it has none.
 
     """
-    parted = [f"against {name}: {one}" for name, one in remedies(effect, confused, library).items()]
-    return "; ".join(parted) if parted else effect.experiment
+    tests = [f"against {name}: {one}" for name, one in remedies(effect, confused, library).items()]
+    return "; ".join(tests) if tests else effect.experiment
 
 
 def remedies(

@@ -26,7 +26,7 @@ from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.residual import disturbed
 from pipeline.records.diagnosis import Remainder
 
-_WANDERS = ("v", "i", "torque")
+_DRIFTING = ("v", "i", "torque")
 """Beginnings of the names of signals that drift: voltages, currents and torque."""
 
 
@@ -85,7 +85,7 @@ def with_drift(segment: Segment, model: Model, values: Values) -> Segment:
     made += [
         disturbed(segment, segment.weak, model, values, name, sigma * sines)
         for name, sigma in segment.sensors.noise.items()
-        if sigma > 0.0 and name.startswith(_WANDERS) and name in segment.recorded
+        if sigma > 0.0 and name.startswith(_DRIFTING) and name in segment.recorded
     ]
     return with_lines(segment, np.concatenate(made)) if made else segment
 

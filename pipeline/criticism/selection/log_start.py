@@ -2,7 +2,7 @@
 
 A transducer in a coupling reads what the motor's side passes on, and no twist is in that: to the
 windows the shaft is rigid there. A shaft that coasts carries the far part as well, so that its
-inertia contradicts that of the logs, and no tangent tells why. Of the logs as a whole the angle
+inertia contradicts that of the logs, and no linear step shows why. Of the logs as a whole the angle
 against the torque in the coupling gives the far inertia, the spring and the gap without a fit. Any
 effect with `shown` is tried from these.
 """

@@ -133,8 +133,8 @@ def _with_full_logs(system: LinearSystem) -> float:
     """
     effect = system.fit.model.effects[-1]
     shapes = [p for p in effect.parameters_of(system.fit.machine) if p.u > 0.0 and not p.amplitude]
-    told = [(system.fit.size(effect, p) / p.u) ** 2 for p in shapes]
-    return system.deviance - max(told, default=0.0)
+    significance = [(system.fit.size(effect, p) / p.u) ** 2 for p in shapes]
+    return system.deviance - max(significance, default=0.0)
 
 
 def _may_join(score: Score, inside: Set[object], couplings: bool) -> bool:

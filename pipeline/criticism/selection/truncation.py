@@ -102,7 +102,7 @@ def contradiction(step: LadderStep) -> str:
 def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:
     """Whether some signal had waves of the angle over its floor before a step, and none after it.
 
-    Cogging is no guess where it takes every wave there was in a torque, however much a drag of no
+    Cogging is supported where it takes every wave there was in a torque, however much a drag of no
     library leaves at order zero, or another capture in a voltage.
     """
     return bool(_waved(before) - _waved(after))
@@ -112,7 +112,7 @@ def _clears_its_side(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> bo
     """Whether the newest effect of two steps takes most of the held-out power over the floor of its
     own side, winding or shaft, while the other side misses as well.
 
-    A bump of friction is no guess where coasts and torques need it, whatever an inverter leaves in
+    A bump of friction is supported where coasts and torques need it, whatever an inverter leaves in
     the voltages. A capture that alone determines the effect is never held out, and shows nothing.
     """
     before, after = (step.system for step in steps)

@@ -140,7 +140,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     left; where that is a tenth of the power, one per cent of gain is a tenth of the losses.
     """
     del known
-    captures = [c for c in campaign.of("drive", "torque_map") if _tells(c)]
+    captures = [c for c in campaign.of("drive", "torque_map") if _usable(c)]
     parts = [one for n, c in enumerate(captures) if (one := _blocks(c, n)) is not None]
     if not parts:
         return METHOD.nothing(GIVES, f"no DC power beside torque and speed; {EXPERIMENT}")
@@ -155,7 +155,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     return Fit(estimates, _plots(captures, blocks, found))
 
 
-def _tells(capture: Capture) -> bool:
+def _usable(capture: Capture) -> bool:
     return capture.has(*COLUMNS) and _motion(capture) != ""
 
 

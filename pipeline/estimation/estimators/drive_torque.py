@@ -94,10 +94,10 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     are columns with noise of their own, which makes coefficients too small; how much is in u, and
     where it is a twentieth or more, as without a load that changes, nothing is determined.
     """
-    better = [c for c in campaign.of("torque_map", "torque_table") if _tells(c)]
+    better = [c for c in campaign.of("torque_map", "torque_table") if _usable(c)]
     if better:
         return METHOD.nothing(GIVES, f"{better[0].meta.test} tells it with less to assume")
-    drives = [c for c in campaign.of("drive") if _tells(c)]
+    drives = [c for c in campaign.of("drive") if _usable(c)]
     rows = shaft_rows(drives, {"windage": lambda x: x * np.abs(x)}) if drives else None
     if rows is None or rows.disjoint(DRIVE) < policy().drag.least_freedom + 4:
         return METHOD.nothing(GIVES, f"no drive with a torque transducer; {EXPERIMENT}")
@@ -140,7 +140,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     return Fit((estimate,), _plots(rows, found))
 
 
-def _tells(capture: Capture) -> bool:
+def _usable(capture: Capture) -> bool:
     return capture.has("iq_a", "torque_shaft_nm")
 
 

@@ -54,7 +54,7 @@ def snapshot(folder: Path) -> Snapshot:
 
 @dataclass(slots=True)
 class Arrivals:
-    """Tells when a folder has changed since it was last taken up, and is at rest again.
+    """Notices when a folder has changed since it was last taken up, and is at rest again.
 
     Parameters
     ----------

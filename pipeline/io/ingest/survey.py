@@ -1,7 +1,7 @@
 """Which files of a folder are captures, and what is stated of each: looked at once, not decoded.
 
-What is asked of one file (`Question`) and what is found (`Answer`) are plain data, so that a
-stranger's bytes can be parsed in another process than the one that puts the batch together.
+What is asked of one file (`Question`) and what is found (`Answer`) are plain data, so that
+untrusted bytes can be parsed in another process than the one that puts the batch together.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Captures of a folder as validated campaigns, one a motor; for compare, diagnose and plan.
 
-Strangers' files are parsed by workers under limits, as in a run, and never in the driver.
+Untrusted files are parsed by workers under limits, as in a run, and never in the driver.
 """
 
 from __future__ import annotations
