@@ -110,7 +110,7 @@ class Unthinned:
 
 
 class Kept(dict[Hashable, Any]):
-    """What was computed of a segment and may be asked for again; another process has its own."""
+    """Cache of what was computed of a segment; another process has its own."""
 
     def __reduce__(self) -> tuple[type[Kept], tuple[()]]:
         """Pickles as one that holds nothing."""
@@ -128,7 +128,7 @@ class Segment:
     kind
         Name of the equation (`equation.Equation`).
     ts_s
-        Period of the even clock.
+        Period of the even clock [s].
     recorded
         Columns [n] on that clock.
     channels
@@ -150,7 +150,7 @@ class Segment:
         Number of the part of a capture that each window [W] belongs to; parts are held out one by
         one where there is no other capture to predict it from.
     kept
-        What was computed of it and may be asked for again.
+        Cache of what was computed of it.
 
     """
 

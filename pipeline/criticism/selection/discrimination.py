@@ -1,4 +1,4 @@
-"""Effects that windows hardly part, discriminated on full drive logs."""
+"""Effects that windows cannot separate, discriminated on full drive logs."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def full_logs(fit: Fit, model: Model) -> list[FullLog]:
     fit
         The fit.
     model
-        What is said of the logs: that of the fit, or less.
+        The model of the logs: that of the fit, or one with fewer effects.
 
     """
     return [_whole(s, model, fit) for s in fit.segments if s.unthinned.columns is not None]
@@ -61,7 +61,7 @@ def _whole(segment: Segment, model: Model, fit: Fit) -> FullLog:
     full = replace(segment, recorded=signals, weak=None)
     x = operate(full, signals, model, values)
     drag = evaluate(model, x, values).drag_nm
-    shaft = _undone(measured(full, signals, model, values)[-1], model, values)
+    shaft = _true_torque(measured(full, signals, model, values)[-1], model, values)
     kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
     noise = segment.sensors.noise
     u_air_gap = kt * math.hypot(noise["id_a"], noise["iq_a"]) / math.sqrt(2.0)
@@ -70,7 +70,7 @@ def _whole(segment: Segment, model: Model, fit: Fit) -> FullLog:
     )
 
 
-def _undone(recorded: Array, model: Model, values: Values) -> Array:
+def _true_torque(recorded: Array, model: Model, values: Values) -> Array:
     """True shaft torque [n] behind a recorded one: gain and offset of the transducer taken out."""
     torque = recorded / (1.0 + values["gain_torque"])
     for effect in reversed(model.effects):
@@ -102,8 +102,7 @@ def sharing_discriminator(effect: Effect, library: Mapping[str, Effect]) -> tupl
 
 
 def settled(effect: Effect, discrimination: Discrimination) -> Effect:
-    """An effect with the shapes that full logs give, which no fit moves any more, and with their
-    amplitudes as priors.
+    """An effect with the shapes that full logs give, fixed, and their amplitudes as priors.
 
     Parameters
     ----------
@@ -125,8 +124,7 @@ def _known(p: Parameter, discrimination: Discrimination) -> Parameter:
 
 
 def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> LinearSystem:
-    """The fit with an effect exchanged for the one that full logs show, with the numbers that they
-    give.
+    """The fit with an effect replaced by the one that full logs show, with their numbers.
 
     Parameters
     ----------
@@ -151,14 +149,14 @@ def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> L
         *sharing_discriminator(effect, library),
     ):
         return system
-    truth = settled(library[discrimination.name], discrimination)
-    effects = tuple(truth if e.name == name else e for e in fit.model.effects)
+    shown = settled(library[discrimination.name], discrimination)
+    effects = tuple(shown if e.name == name else e for e in fit.model.effects)
     model = replace(fit.model, effects=effects)
     prefix = f"{name}."
-    values = fit.without(name).values | zero(truth, model)
-    for p in truth.parameters_of(model.machine):
+    values = fit.without(name).values | zero(shown, model)
+    for p in shown.parameters_of(model.machine):
         if prefix + p.name in fit.values:
-            values[f"{truth.name}.{p.name}"] = fit.values[prefix + p.name]
-    values |= {f"{truth.name}.{key}": value for key, (value, _) in discrimination.values.items()}
+            values[f"{shown.name}.{p.name}"] = fit.values[prefix + p.name]
+    values |= {f"{shown.name}.{key}": value for key, (value, _) in discrimination.values.items()}
     start = replace(fit, model=model, values=values).at({})
     return gauss_newton(start, before=system)
