@@ -92,7 +92,7 @@ def _as_json(command: Command, outcome: Outcome) -> Outcome:
     """The outcome with one JSON object for its text; errors stay on standard error as well."""
     import json
 
-    from pipeline.cli.plain import plain
+    from pipeline.cli.plain import finite
 
     document = {
         "schema": "outcome/1",
@@ -105,7 +105,7 @@ def _as_json(command: Command, outcome: Outcome) -> Outcome:
         "next": outcome.next or None,
         "seconds": dict(outcome.timings),
     }
-    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False, default=plain)
+    text = json.dumps(finite(document), indent=2, ensure_ascii=False, allow_nan=False)
     return replace(outcome, text=text, wrote="", next="", timings=())
 
 

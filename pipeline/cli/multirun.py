@@ -17,7 +17,7 @@ def sweep(command: Command, words: Sequence[str], run: Callable[[list[str]], Out
 
     `key=a,b` has two values; commas inside brackets, braces and quotes part none. Each run writes
     to a folder of its own under `output`: `multirun/model=a/`. The exit code is the one that the
-    contract puts first among those of the runs.
+    contract puts first among those of the runs. With `json=true` the text is one list of theirs.
 
     Parameters
     ----------
@@ -41,15 +41,17 @@ def sweep(command: Command, words: Sequence[str], run: Callable[[list[str]], Out
     runs = list(product(*choices))
     if len(runs) > MOST_RUNS:
         raise UsageError(f"--multirun: {len(runs)} runs", f"at most {MOST_RUNS}; sweep fewer keys")
+    as_json = "json=true" in words
     texts, errors, codes, results = [], [], [], []
     for combination in runs:
         name = ",".join(combination[number] for number in swept)
         outcome = run(_run_words(command, combination, name))
-        texts.append(f"[{name}]\n{outcome.text}".rstrip())
+        texts.append(outcome.text if as_json else f"[{name}]\n{outcome.text}".rstrip())
         errors += [f"[{name}] {line}" for line in outcome.errors]
         results.append({"words": name, "exit_code": outcome.exit_code, "result": outcome.result})
         codes.append(outcome.exit_code)
-    return Outcome(first_that_applies(*codes), "\n".join(texts), tuple(errors), result=results)
+    text = f"[{','.join(texts)}]" if as_json else "\n".join(texts)
+    return Outcome(first_that_applies(*codes), text, tuple(errors), result=results)
 
 
 def _run_words(command: Command, words: Sequence[str], name: str) -> list[str]:

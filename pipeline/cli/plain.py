@@ -2,11 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Set
 from dataclasses import fields, is_dataclass
 from datetime import date
 from pathlib import Path
 from typing import Any
+
+
+def finite(value: Any) -> Any:
+    """The value as plain data in which a number that is not finite is null, as in every output.
+
+    Parameters
+    ----------
+    value
+        Records, mappings and sequences of what `plain` takes.
+
+    Raises
+    ------
+    TypeError
+        Something in it has no form in JSON.
+
+    """
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, str | int):
+        return value
+    if isinstance(value, Mapping):
+        return {name: finite(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(one) for one in value]
+    return finite(plain(value))
 
 
 def plain(value: Any) -> Any:

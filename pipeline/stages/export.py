@@ -14,7 +14,7 @@ from pipeline.io.storage.publish import output_folder, write_whole
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.effect_table import EffectTables
-from pipeline.records.errors import UsageError
+from pipeline.records.errors import UsageError, meant
 from pipeline.records.ledger import Selection, Version, in_force
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
@@ -83,7 +83,7 @@ def _exporter(settings: ExportSettings) -> Exporter:
     known = exporters()
     if settings.format not in known:
         problem = f"no format {settings.format!r}" if settings.format else "format= is missing"
-        raise UsageError(f"export: {problem}", f"known are {', '.join(known)}")
+        raise UsageError(f"export: {problem}", meant(settings.format, known))
     if not settings.motor.strip():
         raise UsageError("export: motor= is missing", "name the motor by its serial number")
     return known[settings.format]

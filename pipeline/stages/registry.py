@@ -14,7 +14,7 @@ from pipeline.io.registry.store import Registry, one_of
 from pipeline.lots.selector import OF_CONTENT, known, parse_selector
 from pipeline.records.current_status import status_of
 from pipeline.records.difference import changes
-from pipeline.records.errors import PipelineError, UsageError
+from pipeline.records.errors import PipelineError, UsageError, meant
 from pipeline.records.ledger import Selection, Version, histories, in_force, newest, select
 from pipeline.records.naming import counted
 from pipeline.records.outcome import Outcome
@@ -48,7 +48,7 @@ def main(settings: RegistrySettings) -> Outcome:
     """
     if settings.action not in ACTIONS:
         problem = f"no action {settings.action!r}" if settings.action else "the action is missing"
-        raise UsageError(f"registry: {problem}", f"one of {', '.join(ACTIONS)}")
+        raise UsageError(f"registry: {problem}", meant(settings.action, ACTIONS))
     options = {name: str(value) for name, value in settings.registry_options.items()}
     return ACTIONS[settings.action](Registry(place_of(settings), options), settings)
 

@@ -5,6 +5,9 @@ winding, v = R i + L di/dt + K ω and T = K i. Its control is the q voltage v, p
 v i is 1.5 v_q i_q, so that the current is i = 1.5 i_q, R and L are those of a phase over 1.5 and
 K = p ψ. The d current is zero there, and reluctance torque with it.
 
+An actuator has one order of cogging: each further order is an actuator that has nothing else, after
+the motor, so that the motor's control stays the first.
+
 Friction is the joint's `frictionloss`, or the actuator's `lugre` where friction falls with speed or
 builds up over a travel. Drag that grows with speed is a polynomial of the joint's `damping`.
 """
@@ -25,6 +28,8 @@ PEAK_POWER = 1.5
 RIGID_RAD = 1e-4
 """Travel over which friction builds up where none was found: far below what a bench sees."""
 MASS_KG = 1e-3
+STIFF = "0.9999 0.9999 0.001 0.5 2"
+"""Impedance of dry friction; MuJoCo's default lets a shaft that reverses slip for 20 ms."""
 _SMALL = 0.01
 
 
@@ -58,11 +63,6 @@ def _shaft(source: Source) -> _Shaft:
     turned = source.tables("theta_mech_rad")
     shaft.waves = waves(turned)
     shaft.held += [table.effect for table in turned]
-    for wave in shaft.waves[1:]:
-        if wave.amplitude_nm > _SMALL * shaft.waves[0].amplitude_nm:
-            shaft.notes.append(
-                f"order {wave.order} a turn of {wave.amplitude_nm:.3g} N·m: cogging holds one order"
-            )
     travel = source.sizes().get("presliding", {}).get("travel_rad")
     if travel is not None and travel[0]:
         shaft.travel_rad = travel[0]
@@ -94,19 +94,25 @@ def render(source: Source, options: Options) -> str:
     for line in (*source.heading(), *(f"not in here: {line}" for line in omits(source))):
         root.append(Xml.Comment(f" {line.replace('--', ' ')} "))
     Xml.SubElement(root, "compiler", {"angle": "radian"})
-    step = number_option(options, "timestep_s") or 1e-4
-    Xml.SubElement(root, "option", {"timestep": repr(step), "integrator": "implicitfast"})
+    step = repr(_step_s(options))
+    Xml.SubElement(root, "option", {"timestep": step, "integrator": "implicitfast"})
     custom = Xml.SubElement(root, "custom")
     pairs = str(round(source.value("pole_pairs")))
     Xml.SubElement(custom, "numeric", {"name": "pole_pairs", "data": pairs})
-    _rotor(Xml.SubElement(root, "worldbody"), source, shaft)
-    motor = Xml.SubElement(Xml.SubElement(root, "actuator"), "dcmotor")
-    motor.attrib.update(_motor(source, shaft, options))
+    _rotor(Xml.SubElement(root, "worldbody"), source, shaft, options)
+    actuators = Xml.SubElement(root, "actuator")
+    Xml.SubElement(actuators, "dcmotor", _motor(source, shaft, options))
+    for wave in shaft.waves[1:]:
+        Xml.SubElement(actuators, "dcmotor", _further(wave, source))
     Xml.indent(root, " ")
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + Xml.tostring(root, "unicode") + "\n"
 
 
-def _rotor(world: Xml.Element, source: Source, shaft: _Shaft) -> None:
+def _step_s(options: Options) -> float:
+    return number_option(options, "timestep_s") or 1e-4
+
+
+def _rotor(world: Xml.Element, source: Source, shaft: _Shaft, options: Options) -> None:
     """A body without weight of its own; the inertia is the joint's armature."""
     body = Xml.SubElement(world, "body", {"name": "rotor", "gravcomp": "1"})
     drag = shaft.drag.copy()
@@ -119,6 +125,8 @@ def _rotor(world: Xml.Element, source: Source, shaft: _Shaft) -> None:
     dry = source.optional("torque_coulomb_nm")
     if dry is not None and not _bristles(shaft):
         joint["frictionloss"] = repr(dry.number)
+        joint["solreffriction"] = f"{2.0 * _step_s(options)!r} 1"
+        joint["solimpfriction"] = STIFF
     Xml.SubElement(body, "joint", joint)
     light = repr(1e-6 * source.value("j_rotor_kgm2"))
     own = {"pos": "0 0 0", "mass": repr(MASS_KG), "diaginertia": f"{light} {light} {light}"}
@@ -135,7 +143,7 @@ def _motor(source: Source, shaft: _Shaft, options: Options) -> dict[str, str]:
     found = {
         "name": "motor",
         "joint": "shaft",
-        "resistance": repr(source.value("r_phase_ohm") / PEAK_POWER),
+        "resistance": _resistance(source),
         "motorconst": f"{constant!r} {constant!r}",
         "inductance": f"{source.value('lq_h') / PEAK_POWER!r} 0",
     }
@@ -146,8 +154,7 @@ def _motor(source: Source, shaft: _Shaft, options: Options) -> dict[str, str]:
         ambient = number_option(options, "ambient_degc") or REFERENCE_DEGC
         found["thermal"] = f"{rth!r} {cth!r} 0 {alpha!r} {REFERENCE_DEGC!r} {ambient!r}"
     if shaft.waves:
-        wave = shaft.waves[0]
-        found["cogging"] = f"{wave.amplitude_nm!r} {wave.order} {wave.phase_rad!r}"
+        found["cogging"] = _cogging(shaft.waves[0])
     dry = source.optional("torque_coulomb_nm")
     if dry is not None and _bristles(shaft):
         bump = shaft.bump or Bump(0.0, 1.0, 0.0)
@@ -155,6 +162,27 @@ def _motor(source: Source, shaft: _Shaft, options: Options) -> dict[str, str]:
         most = dry.number + bump.excess_nm
         found["lugre"] = f"{stiff!r} 0 {dry.number!r} {most!r} {bump.speed_rad_s!r}"
     return found
+
+
+def _further(wave: Wave, source: Source) -> dict[str, str]:
+    """Attributes of a motor without winding or input that has a further order of the cogging."""
+    return {
+        "name": f"cogging_{wave.order}",
+        "joint": "shaft",
+        "resistance": _resistance(source),
+        "motorconst": "0 0",
+        "input": "none",
+        "cogging": _cogging(wave),
+    }
+
+
+def _resistance(source: Source) -> str:
+    """Of the winding; a further actuator carries no current, but MuJoCo asks for one."""
+    return repr(source.value("r_phase_ohm") / PEAK_POWER)
+
+
+def _cogging(wave: Wave) -> str:
+    return f"{wave.amplitude_nm!r} {wave.order} {wave.phase_rad!r}"
 
 
 def read(text: str) -> Values:

@@ -13,7 +13,7 @@ from pipeline.records.ledger import Version
 from pipeline.records.naming import counted
 from pipeline.views.model_words import model_words
 from pipeline.views.status_text import decision, when
-from pipeline.views.table_text import NONE, safe, table
+from pipeline.views.table_text import NONE, blocks, safe, table
 
 SHOWN_DIGITS = 12
 
@@ -21,17 +21,20 @@ SHOWN_DIGITS = 12
 def versions_table(versions: Sequence[Version]) -> str:
     """One line a version: motor, revision, status, lot, type, when, digest, last decision.
 
+    Where that is wider than the window, tables that all begin with motor and revision.
+
     Parameters
     ----------
     versions
         The versions.
 
     """
-    head = ("motor", "revision", "status", "lot", "type", "published", "version", "decided")
+    widest = max((len(safe(v.motor_id)) for v in versions), default=0)
+    own = "motor".ljust(widest) + "  revision"
+    head = (own, "status", "lot", "type", "published", "version", "decided")
     rows = [
         (
-            v.motor_id,
-            str(v.revision),
+            f"{safe(v.motor_id).ljust(widest)}  {v.revision:>8}",
             v.status,
             v.published.lot or NONE,
             v.published.motor_type or NONE,
@@ -41,7 +44,7 @@ def versions_table(versions: Sequence[Version]) -> str:
         )
         for v in versions
     ]
-    return table([head, *rows], right=(1,))
+    return "\n".join(blocks([head, *rows]))
 
 
 def in_force_table(versions: Sequence[tuple[str, Version | None, Version]]) -> str:
@@ -135,10 +138,11 @@ def difference_text(before: Version, after: Version, changes: Sequence[Change]) 
         )
         for change in changes
     ]
-    lines.append(table([head, *rows], right=(1, 2, 3, 4, 5)))
+    lines += blocks([head, *rows], right=(1, 2, 3, 4, 5))
     lines += [
         "",
-        "u: both uncertainties, root sum of squares; u_d: what one instrument adds to both cancels",
+        "u: both uncertainties, root sum of squares",
+        "u_d: the same where what one instrument adds to both cancels",
     ]
     return "\n".join(lines)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shlex
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ from pipeline.cli.commands import COMMANDS
 from pipeline.cli.completion import candidates
 from pipeline.cli.configuration import load_settings
 from pipeline.cli.flags import FLAGS, Flags, split_flags
+from pipeline.cli.plain import finite
 from pipeline.records.outcome import Outcome
 
 ROOT = Path(__file__).parents[3]
@@ -165,6 +167,20 @@ def test_json_holds_the_answer_and_the_exit_code(tmp_path: Path, capsys) -> None
     assert sorted(Path(p).name for p in made["result"][0]["captures"]) == sorted(
         p.name for p in (tmp_path / "sim").iterdir() if p.name != "truth.json"
     )
+
+
+def test_a_sweep_in_json_is_one_list(capsys) -> None:
+    found = json.loads(printed(capsys, "calc", "kv", "kv=340,350", "--multirun", "json=true"))
+    first, second = (one["result"]["lines"][0]["value"] for one in found)
+    assert first / second == pytest.approx(350 / 340)
+
+
+def test_a_number_that_is_not_finite_is_null_in_json() -> None:
+    """As in every output; degrees of freedom are infinite where they do not matter."""
+    given = {"a": (math.inf, math.nan, 1.5), "b": [Flags(cfg="job")], "c": {2}, "d": Path("x")}
+    found = finite(given)
+    assert found["a"] == [None, None, 1.5]
+    assert (found["b"][0]["cfg"], found["c"], found["d"]) == ("job", [2], "x")
 
 
 @pytest.mark.parametrize(

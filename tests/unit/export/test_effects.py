@@ -155,7 +155,9 @@ def test_mujoco_takes_friction_cogging_drag_and_travel() -> None:
     height, order, phase = map(float, motor["cogging"].split())
     assert (height, order, abs(phase)) == pytest.approx((0.002, 84.0, math.pi))
     assert len(joint["damping"].split()) == 3
-    assert "not in here: order 168 a turn of 0.0004 N·m" in text
+    (further,) = Xml.fromstring(text).findall("actuator/dcmotor")[1:]
+    height, order, _ = map(float, further.attrib["cogging"].split())
+    assert (height, order, further.attrib["input"]) == (pytest.approx(0.0004), 168.0, "none")
     assert "not in here: sample_delay" in text
     assert "not in here: stribeck: it" not in text
 

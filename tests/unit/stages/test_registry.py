@@ -56,6 +56,7 @@ def test_list(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert lines[-2] == "2 motors, 4 versions"
     assert lines[-1].endswith(f"registry show 00123 registry={place}")
     assert "\x1b" not in out
+    assert max(map(len, lines[:-1])) <= 80
     assert told(capsys, place, "list", "00123")[1].splitlines()[-2] == "1 motor, 1 version"
 
 
@@ -75,10 +76,12 @@ def test_diff_in_units_of_uncertainty(place: str, capsys: pytest.CaptureFixture[
     """10 mohm; u 0.5 mohm each, of which 0.4 mohm is one voltmeter's: 14.14 and 23.57."""
     code, out, _ = told(capsys, place, "diff", SERIAL, "from=1", "to=2")
     assert code == 0
-    (line,) = [line for line in out.splitlines() if line.startswith("r_phase_ohm")]
-    assert line.split()[-4:] == ["+10.0", "m\u03a9", "+14.14", "+23.57"]
-    (unknown,) = [line for line in out.splitlines() if line.startswith("j_rotor_kgm2")]
-    assert unknown.split()[1:] == ["-"] * 5
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= 80
+    words = [w for line in lines if line.startswith("r_phase_ohm") for w in line.split()[1:]]
+    assert words[-4:] == ["+10.0", "m\u03a9", "+14.14", "+23.57"]
+    unknown = [w for line in lines if line.startswith("j_rotor_kgm2") for w in line.split()[1:]]
+    assert unknown == ["-"] * 5
 
 
 def test_approve_revoke_and_at(place: str, capsys: pytest.CaptureFixture[str]) -> None:
