@@ -17,6 +17,7 @@ import pytest
 from pipeline.performance.derive import performance_of
 from pipeline.records.comparison_history import Earlier
 from pipeline.records.diagnosis import Diagnosis
+from pipeline.records.evidence import Evidence, Series
 from pipeline.records.performance import Operation, Performance
 from pipeline.report.pages.comparison_page import render_comparison
 from pipeline.report.pages.fleet_page import render_fleet
@@ -61,14 +62,23 @@ def long_ladder() -> Diagnosis:
     """Names of signals and effects as long as they come."""
     steps = [make_step(("dead_time",) * (n > 0), 0.5**n) for n in range(4)]
     longest = "temp_coefficient_of_something_torque_shaft_nm"
-    told = [replace(r, errors={**r.errors, longest: r.errors["vq_v"]}) for r in steps]
+    many = (longest, *(f"torque_{word}_nm" for word in ("one", "two", "three", "four", "five")))
+    told = [replace(r, errors={**r.errors, **dict.fromkeys(many, r.errors["vq_v"])}) for r in steps]
     return replace(make_diagnosis(LONG, unknown=True), ladder=tuple(told))
+
+
+def named_curves() -> Evidence:
+    """Curves that bear the names of files at their ends."""
+    x = np.linspace(0.0, 1.0, 9)
+    files = ("open_circuit_forward.mcap", "open_circuit_backward_warm.mcap", "open_circuit_w.mcap")
+    series = tuple(Series(f"G52/{name}", x, x + n, x + n) for n, name in enumerate(files))
+    return Evidence("open_circuit", "Back-EMF", "omega_mech_rad_s", "vab_v", "line", series, "")
 
 
 PAGES: dict[str, Callable[[], str]] = {
     "motor": lambda: render_motor(
         make_datasheet(LONG),
-        make_evidence(np.random.default_rng(2)),
+        (*make_evidence(np.random.default_rng(2)), named_curves()),
         FINDINGS,
         performance=make_performance(),
     ),
