@@ -122,7 +122,7 @@ def loupe_views(fits: Sequence[FitTrace]) -> tuple[ViewPlan, ...]:
     if not timed:
         return ()
     span_s = max(_span_s(fit.trace) for fit in timed)
-    around_s = _round_s(span_s / LOUPE_SHARE)
+    around_s = round_s(span_s / LOUPE_SHARE)
     first = timed[0].y_name
     own = [fit for fit in timed if fit.y_name == first and fit.title == timed[0].title]
     words = f"Loupe ±{quantity(around_s, 's', 2)} at the cursor"
@@ -322,8 +322,15 @@ def _span_s(trace: Trace) -> float:
     return float(index[-1] - index[0]) * 1e-9 if index.len() else 0.0
 
 
-def _round_s(around_s: float) -> float:
-    """The next 1, 2 or 5 times a power of ten."""
+def round_s(around_s: float) -> float:
+    """The next 1, 2 or 5 times a power of ten.
+
+    Parameters
+    ----------
+    around_s
+        A time, 0 or more.
+
+    """
     if around_s <= 0.0:
         return 1e-3
     decade = 10.0 ** math.floor(math.log10(around_s))

@@ -9,12 +9,14 @@ A recording holds, on the timeline `t` (duration), for every capture that was si
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
 
+from pipeline.io.recordings.capture_views import LOUPE_SHARE, round_s
 from pipeline.io.recordings.datasheet_page import plain
 from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
@@ -40,6 +42,7 @@ from pipeline.io.recordings.views import (
 )
 from pipeline.io.storage.publish import canonical_json
 from pipeline.numerics.thinning import line_points
+from pipeline.physics.notation import quantity
 from pipeline.records.comparison import Comparison, Trace
 from pipeline.views.comparison import KINDS, comparison_view
 from pipeline.views.names import with_unit
@@ -48,6 +51,8 @@ if TYPE_CHECKING:
     from rerun.blueprint import Blueprint
 
 MOST_POINTS = 4000
+MOST_LOUPES = 2
+"""Signals of a capture that have a loupe: those farthest over their noise floors."""
 
 
 def write_comparison_recording(result: Comparison, path: Path) -> None:
@@ -138,26 +143,56 @@ def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
         Path of the capture.
 
     """
+    own = (_views_of(trace) for trace in result.traces if trace.capture == capture)
+    return tuple(plan for both in own for plan in both)
+
+
+def _views_of(trace: Trace) -> tuple[ViewPlan, ViewPlan]:
+    """A signal, and its residual."""
+    entity = entity_of(trace)
+    words = f"{with_unit(trace.signal)}, model {KINDS[trace.kind]}"
+    lines = (
+        Line(entity, "measured", "measured", MEASURED, WIDE),
+        Line(entity, "model", "model", MODEL),
+    )
+    left = np.abs(trace.measured - trace.model)
+    reach = AIR * float(np.nanmax(left)) if np.isfinite(left).any() else 1.0
+    line = Line(entity, "residual", "measured − model", RESIDUAL)
+    residual = ViewPlan(f"{with_unit(trace.signal)}, left over", (line,), 1.0, reach or 1.0)
+    return ViewPlan(words, lines, 2.0), residual
+
+
+def loupes(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
+    """Views of one capture at the cursor: the signals that are farthest over their noise floors.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+    capture
+        Path of the capture.
+
+    """
+    ratios = {
+        (one.signal, one.kind): one.rmse / one.noise_floor
+        for one in result.errors
+        if one.capture == capture and one.noise_floor > 0.0
+    }
+    own = [trace for trace in result.traces if trace.capture == capture]
+    own.sort(key=lambda trace: -ratios.get((trace.signal, trace.kind), 0.0))
     plans: list[ViewPlan] = []
-    for trace in result.traces:
-        if trace.capture != capture:
-            continue
-        entity = entity_of(trace)
-        words = f"{with_unit(trace.signal)}, model {KINDS[trace.kind]}"
-        lines = (
-            Line(entity, "measured", "measured", MEASURED, WIDE),
-            Line(entity, "model", "model", MODEL),
-        )
-        plans.append(ViewPlan(words, lines, 2.0))
-        left = np.abs(trace.measured - trace.model)
-        reach = AIR * float(np.nanmax(left)) if np.isfinite(left).any() else 1.0
-        line = Line(entity, "residual", "measured − model", RESIDUAL)
-        plans.append(ViewPlan(f"{with_unit(trace.signal)}, left over", (line,), 1.0, reach or 1.0))
+    for trace in own[:MOST_LOUPES]:
+        around_s = round_s(float(np.ptp(trace.t_s)) / LOUPE_SHARE)
+        words = f"Loupe ±{quantity(around_s, 's', 2)}: "
+        signal, residual = _views_of(trace)
+        plans += [
+            replace(one, name=words + one.name, around_s=around_s) for one in (signal, residual)
+        ]
     return tuple(plans)
 
 
 def _layout(result: Comparison) -> Blueprint:
-    """A tab a capture, equations at the left, free runs at the right; errors in the last tab."""
+    """A tab a capture: equations, free runs, loupes at the cursor; errors in the last tab."""
     import rerun.blueprint as rrb
 
     tabs: list[Any] = []
@@ -168,7 +203,10 @@ def _layout(result: Comparison) -> Blueprint:
             mine = [p for p in plans if f"/{kind}/" in p.lines[0].entity]
             if mine:
                 sides.append(stacked(mine))
-        tabs.append(rrb.Horizontal(*sides, name=capture.rsplit("/", 1)[-1]))
+        shares = [1.6] * len(sides) + [1.0]
+        sides.append(stacked(loupes(result, capture)))
+        name = capture.rsplit("/", 1)[-1]
+        tabs.append(rrb.Horizontal(*sides, column_shares=shares, name=name))
     tabs.append(page_view("/sheet", "All errors"))
     return workspace(*tabs, timeline=TIME)
 

@@ -13,6 +13,7 @@ import pytest
 
 from pipeline.io.recordings.comparison import (
     entity_of,
+    loupes,
     planned,
     table_of,
     write_comparison_recording,
@@ -165,3 +166,14 @@ def test_every_planned_curve_of_a_comparison_is_in_its_data() -> None:
     views = planned(result, "a/drive 0.mcap")
     assert {(line.entity, line.component) for view in views for line in view.lines} == held
     assert [view.reach for view in views][1] == pytest.approx(0.011, rel=1e-3)
+
+
+def test_the_signal_farthest_over_its_floor_has_the_first_loupe_of_a_comparison() -> None:
+    """It shows a hundredth of the capture on each side of the cursor."""
+    views = loupes(make_comparison(), "a/drive 0.mcap")
+    assert [view.lines[0].entity.rsplit("/", 1)[-1] for view in views] == ["iq_a"] * 2 + [
+        "vq_v"
+    ] * 2
+    assert {view.around_s for view in views} == {5e-4}
+    assert views[0].name.startswith("Loupe ±500 µs: i_q [A]")
+    assert loupes(make_comparison(), "another.mcap") == ()
