@@ -167,27 +167,12 @@ def finish(
         Files that a map reads already.
 
     """
-    from pipeline.io.inspection.file_names import name_patterns
-    from pipeline.io.inspection.starter_map import map_text
-
     lines: list[str] = []
     text = ""
     asked: dict[str, str] = {}
     metadata = {key: value for key, value in settings.answers.items() if "." not in key}
     if unmapped:
-        groups = _groups(unmapped)
-        seen = [field.column for shape, _ in groups for field in shape.fields if field.column]
-        paths = [one.file for one in unmapped]
-        names = name_patterns(paths, frozenset(settings.answers), frozenset(seen))
-        by_name = any("contract" in dict(one.report.metadata) for one in unmapped)
-        text = map_text([shape for shape, _ in groups], names, metadata, by_name=by_name)
-        if only is None:
-            lines += _shape_lines(groups, names)
-        asked = _questions(groups, names, settings)
-        if asked:
-            lines += [_QUESTIONS, *(f"  {key}=  {words}" for key, words in asked.items())]
-        tasks = [PreviewTask(root, files[0], _read_limits(settings), text) for _, files in groups]
-        lines += [line for preview in in_workers(preview_of, tasks) for line in preview]
+        lines, text, asked = _drafted(settings, root, unmapped, metadata, listed=only is None)
     if metadata or settings.map or text:
         text = _with_known(known, settings.config_dir, metadata, text)
     if text and settings.map:
@@ -202,6 +187,33 @@ def finish(
     text = "\n".join([*lines, checked.text]) + "\n"
     result |= checked.result
     return Outcome(checked.exit_code, text, checked.errors, result=result)
+
+
+def _drafted(
+    settings: InspectSettings,
+    root: str,
+    unmapped: Sequence[Looked],
+    metadata: Mapping[str, str],
+    *,
+    listed: bool,
+) -> tuple[list[str], str, dict[str, str]]:
+    """Lines about files that no map reads, a source map for them, and what must be asked."""
+    from pipeline.io.inspection.file_names import name_patterns
+    from pipeline.io.inspection.starter_map import map_text
+
+    groups = _groups(unmapped)
+    seen = [field.column for shape, _ in groups for field in shape.fields if field.column]
+    paths = [one.file for one in unmapped]
+    names = name_patterns(paths, frozenset(settings.answers), frozenset(seen))
+    by_name = any("contract" in dict(one.report.metadata) for one in unmapped)
+    text = map_text([shape for shape, _ in groups], names, metadata, by_name=by_name)
+    lines = _shape_lines(groups, names) if listed else []
+    asked = _questions(groups, names, settings)
+    if asked:
+        lines += [_QUESTIONS, *(f"  {key}=  {words}" for key, words in asked.items())]
+    tasks = [PreviewTask(root, files[0], _read_limits(settings), text) for _, files in groups]
+    lines += [line for preview in in_workers(preview_of, tasks) for line in preview]
+    return lines, text, asked
 
 
 def _with_known(

@@ -324,14 +324,8 @@ def _estimates(
     shared = contributions(lambda shift: _moved(blocks, captures, chosen, shift), gains)
     values = _constants(found.coefficients)
     slopes = [-0.5 * float(values[0]) ** 3, 1.0, 1.0, 1.0]
-    share = float(np.sum(lost)) / max(float(np.sum(blocks.dc_w)), 1e-300)
-    notes = [
-        f"{lost.size} blocks, {100.0 * share:.2g} % of the power lost; iron loss counts as drag, "
-        "what the drive loses with its current as the winding's",
-        allowed_for(chosen),
-        unstated_note(captures, ("voltage", "current", "torque")),
-    ]
-    estimates = []
+    notes, estimates = _notes(captures, blocks, chosen), []
+    at = {"omega_mech_rad_s": float(np.max(np.abs(blocks.speed_rad_s)))}
     for k, name in enumerate(GIVES):
         u_scatter = abs(slopes[k]) * float(deviation[k])
         parts = [METHOD.scatter(name, u_scatter, float(dof[k])), *shared[k]]
@@ -349,9 +343,19 @@ def _estimates(
             estimates.append(METHOD.missing(name, note))
             continue
         notes_here = [one for one in (*words, *notes) if one]
-        at = {"omega_mech_rad_s": float(np.max(np.abs(blocks.speed_rad_s)))}
         estimates.append(METHOD.measured(name, float(values[k]), parts, captures, at, notes_here))
     return tuple(estimates)
+
+
+def _notes(captures: Sequence[Capture], blocks: Blocks, chosen: Sequence[str]) -> list[str]:
+    lost = blocks.dc_w - blocks.shaft_w
+    share = float(np.sum(lost)) / max(float(np.sum(blocks.dc_w)), 1e-300)
+    return [
+        f"{lost.size} blocks, {100.0 * share:.2g} % of the power lost; iron loss counts as drag, "
+        "what the drive loses with its current as the winding's",
+        allowed_for(chosen),
+        unstated_note(captures, ("voltage", "current", "torque")),
+    ]
 
 
 def _warm(capture: Capture) -> bool:

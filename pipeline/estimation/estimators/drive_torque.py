@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -33,7 +33,7 @@ from pipeline.estimation.uncertainty.instruments import (
     unstated_note,
 )
 from pipeline.estimation.uncertainty.nuisances import allowed_for
-from pipeline.estimation.uncertainty.regimes import Regression, disagreement, scatter
+from pipeline.estimation.uncertainty.regimes import Disagreement, Regression, disagreement, scatter
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns
 from pipeline.records.capture import Campaign, Capture
@@ -90,13 +90,13 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     """Kt by `torque` over the windows of all drives with a transducer.
 
     Not where a torque map or table gives it: at settled points nothing has to be known of the
-    motion. J and friction are for `inertia` to tell, with coasts beside. Current and acceleration
+    motion. J and friction are for `inertia` to give, with coasts beside. Current and acceleration
     are columns with noise of their own, which makes coefficients too small; how much is in u, and
     where it is a twentieth or more, as without a load that changes, nothing is determined.
     """
     better = [c for c in campaign.of("torque_map", "torque_table") if _usable(c)]
     if better:
-        return METHOD.nothing(GIVES, f"{better[0].meta.test} tells it with less to assume")
+        return METHOD.nothing(GIVES, f"{better[0].meta.test} gives it with fewer assumptions")
     drives = [c for c in campaign.of("drive") if _usable(c)]
     rows = shaft_rows(drives, {"windage": lambda x: x * np.abs(x)}) if drives else None
     if rows is None or rows.disjoint(DRIVE) < policy().drag.least_freedom + 4:
@@ -106,10 +106,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     pool = {name: column for name, column in pool.items() if np.ptp(column) > 0.0}
     pool |= {"offset": np.ones(rows.count)}
     base, even = torque(rows, alpha), np.ones(rows.count)
-    left = linear_fit(np.column_stack([base, *pool.values()]), rows.load_nm).residuals
-    tau = autocorrelation_time(left, policy().evidence.memory_rows)
-    most = policy().drag.most_nuisances
-    chosen = needed_columns(base, pool, rows.load_nm, even, options["level"], most, tau)
+    chosen = _nuisances(rows, base, pool, options["level"])
     design = np.column_stack([base, *(pool[name] for name in chosen)])
     found = linear_fit(design, rows.load_nm)
     if not found.full_rank:
@@ -128,16 +125,31 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         *_instruments(rows, alpha, chosen, pool),
     ]
     doubt = disagreement(regression, 0, partial(shaft_partitions, rows), options["level"])
-    words = [allowed_for(chosen)]
     if doubt is not None:
         parts.append(doubt.part(f"{METHOD.name}:kt", kt))
-        words.append(doubt.words("the torque constant"))
-    words += [f"{rows.count} windows", unlogged_note(rows.captures)]
-    words.append(unstated_note(rows.captures, ("current", "torque")))
+    notes = _notes(rows, chosen, doubt)
     at = {"iq_a": float(np.max(np.abs(rows.q_current_a))), "temp_magnet_degc": 25.0}
-    notes = [one for one in words if one]
     estimate: Estimate = METHOD.measured(GIVES[0], kt, parts, rows.captures, at, notes)
     return Fit((estimate,), _plots(rows, found))
+
+
+def _notes(rows: ShaftRows, chosen: Sequence[str], doubt: Disagreement | None) -> list[str]:
+    words = [
+        allowed_for(chosen),
+        doubt.words("the torque constant") if doubt is not None else "",
+        f"{rows.count} windows",
+        unlogged_note(rows.captures),
+        unstated_note(rows.captures, ("current", "torque")),
+    ]
+    return [one for one in words if one]
+
+
+def _nuisances(rows: ShaftRows, base: Array, pool: Mapping[str, Array], level: float) -> list[str]:
+    """Columns of the pool that the load needs beside those of `base` [w, k]."""
+    rest = linear_fit(np.column_stack([base, *pool.values()]), rows.load_nm).residuals
+    tau = autocorrelation_time(rest, policy().evidence.memory_rows)
+    most, even = policy().drag.most_nuisances, np.ones(rows.count)
+    return needed_columns(base, pool, rows.load_nm, even, level, most, tau)
 
 
 def _usable(capture: Capture) -> bool:
