@@ -19,7 +19,7 @@ from pipeline.lots.lot_test import detectable, power
 from pipeline.lots.outliers import critical_z, robust_z
 from pipeline.lots.sample import Value
 from pipeline.lots.variance import variance_components
-from pipeline.lots.verdict import judge
+from pipeline.lots.verdict import Answers, judge
 from pipeline.records.limits import ConstantLimits, Limits
 from pipeline.records.lot_constant import (
     Component,
@@ -92,9 +92,8 @@ def result(
     conform = conformity(made.held, candidate, found.corrected, mean, spread)
     test = _test(found, family, limits)
     same = _equivalence(found, made.held.margin, limits.alpha)
-    decided = judge(
-        made.limits, made.unit, found, conform, test, same, family.motor_p_holm, limits.alpha
-    )
+    answers = Answers(conform, test, same, family.motor_p_holm, limits.alpha)
+    decided = judge(made.limits, made.unit, found, answers)
     tolerance = made.held.tolerance
     return ConstantResult(
         name=made.limits.name,

@@ -47,16 +47,33 @@ class Judged(NamedTuple):
     why: str
 
 
-def judge(
-    limits: ConstantLimits,
-    unit: str,
-    assessment: Assessment,
-    conformity: Conformity,
-    test: LotTest,
-    same: Equivalence,
-    motor_p_holm: float | None,
-    alpha: float,
-) -> Judged:
+class Answers(NamedTuple):
+    """The answers to the three questions on one constant.
+
+    Attributes
+    ----------
+    conformity
+        Decisions on the candidate's motors.
+    lots
+        The lot-level test.
+    same
+        The test of equivalence.
+    motor_p_holm
+        P value of the motor-level test, adjusted for the number of constants; None where none was
+        made.
+    alpha
+        Level of the tests [1].
+
+    """
+
+    conformity: Conformity
+    lots: LotTest
+    same: Equivalence
+    motor_p_holm: float | None
+    alpha: float
+
+
+def judge(limits: ConstantLimits, unit: str, assessment: Assessment, answers: Answers) -> Judged:
     """The verdict on one constant, by the three questions of the module.
 
     Parameters
@@ -67,17 +84,8 @@ def judge(
         Of the constant.
     assessment
         Its values and their contrast.
-    conformity
-        Decisions on the candidate's motors.
-    test
-        The lot-level test.
-    same
-        The test of equivalence.
-    motor_p_holm
-        P value of the motor-level test, adjusted for the number of constants; None where none was
-        made.
-    alpha
-        Level of the tests [1].
+    answers
+        The answers to the three questions.
 
     Returns
     -------
@@ -88,26 +96,20 @@ def judge(
     if not assessment.candidate or not assessment.base:
         side = "candidate" if not assessment.candidate else "baseline"
         return Judged("not_evaluated", f"no motor of the {side} has it")
-    moved = _moved(assessment, unit)
+    moved, conformity = _moved(assessment, unit), answers.conformity
     if conformity.worst in ("fail", "conditional_fail"):
         return Judged("fail", f"{moved}: {_outside(conformity)}")
     if assessment.confounded:
         return Judged("CONFOUNDED", assessment.confounded)
-    changed = _changed(limits, unit, assessment, test, same, motor_p_holm, alpha, moved)
-    return changed or _not_failed(conformity, test, same, moved)
+    changed = _changed(limits, unit, assessment, answers)
+    return changed or _not_failed(conformity, answers.lots, answers.same, moved)
 
 
 def _changed(
-    limits: ConstantLimits,
-    unit: str,
-    assessment: Assessment,
-    test: LotTest,
-    same: Equivalence,
-    motor_p_holm: float | None,
-    alpha: float,
-    moved: str,
+    limits: ConstantLimits, unit: str, assessment: Assessment, answers: Answers
 ) -> Judged | None:
     """The verdict where a change is proven, else None."""
+    test, same, moved = answers.lots, answers.same, _moved(assessment, unit)
     if test.status == "evaluated":
         if not test.significant:
             return None
@@ -116,10 +118,10 @@ def _changed(
             return Judged("marginal", f"{words}, yet within the margin")
         small = ", although within the margin" if same.status == "equivalent" else ""
         return Judged("fail", words + small)
-    if not _beyond(assessment, same, motor_p_holm, alpha):
+    if not _beyond(assessment, same, answers.motor_p_holm, answers.alpha):
         return None
-    margin = quantity(same.margin or 0.0, unit, 3)
-    return Judged("fail", f"{moved}: beyond the margin of {margin}, p {_p(motor_p_holm)} by motors")
+    margin, p = quantity(same.margin or 0.0, unit, 3), _p(answers.motor_p_holm)
+    return Judged("fail", f"{moved}: beyond the margin of {margin}, p {p} by motors")
 
 
 def _not_failed(conformity: Conformity, test: LotTest, same: Equivalence, moved: str) -> Judged:

@@ -18,7 +18,7 @@ from pipeline.lots.limits_lint import _constant, _rules
 from pipeline.lots.lot_test import detectable, power
 from pipeline.lots.sample import Value, _to_reference, independent, lots_in_order, values_of
 from pipeline.lots.traits import Shown, _orders, _verdict, compare_traits, effects_shown
-from pipeline.lots.verdict import Judged, _changed, _not_failed, _p, judge, overall
+from pipeline.lots.verdict import Answers, Judged, _changed, _not_failed, _p, judge, overall
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import Term
 from pipeline.records.diagnosis_summary import DiagnosisSummary
@@ -370,8 +370,12 @@ SHIFTED = assess(
 FINE = Conformity((Count("pass", 2),), "pass", None, None, None)
 
 
+def answers(conformity):
+    return Answers(conformity, evaluated(), NOTHING, None, 0.01)
+
+
 def changed(limits, test, equal, p=None):
-    return _changed(limits, "ohm", SHIFTED, test, equal, p, 0.01, "moved")
+    return _changed(limits, "ohm", SHIFTED, Answers(FINE, test, equal, p, 0.01))
 
 
 @pytest.mark.parametrize(
@@ -387,7 +391,10 @@ def test_a_significant_change_and_its_margin(tolerate, status, verdict, ending) 
     limits = ConstantLimits("r", margins=(Amount(0.2, "unit"),), tolerate=tolerate)
     found = changed(limits, evaluated(), same(status))
     assert found is not None
-    assert (found.verdict, found.why) == (verdict, f"moved: beyond the scatter of 8 lots, {ending}")
+    assert (found.verdict, found.why) == (
+        verdict,
+        f"+45.5 %: beyond the scatter of 8 lots, {ending}",
+    )
     assert changed(limits, evaluated(significant=False), same(status)) is None
 
 
@@ -401,7 +408,7 @@ def test_without_history_a_change_is_beyond_margin_and_chance(margin, p, fails) 
     found = changed(ConstantLimits("r"), history, same("different", margin), p)
     assert (found is not None) is fails
     if found is not None:
-        assert found.why == "moved: beyond the margin of 492 mΩ, p 0.009 by motors"
+        assert found.why == "+45.5 %: beyond the margin of 492 mΩ, p 0.009 by motors"
 
 
 @pytest.mark.parametrize(
@@ -448,18 +455,18 @@ def test_motors_outside_come_before_all_else_and_the_move_is_relative() -> None:
         None,
         None,
     )
-    found = judge(ConstantLimits("r"), "ohm", SHIFTED, out, evaluated(), NOTHING, None, 0.01)
+    found = judge(ConstantLimits("r"), "ohm", SHIFTED, answers(out))
     assert found == Judged("fail", "+45.5 %: 3 of 7 motors outside the limits, N-3 is a fail")
     assert (_p(None), _p(0.0009), _p(0.001), _p(0.0126)) == ("unknown", "< 0.001", "0.001", "0.013")
     empty = replace(SHIFTED, candidate={})
-    missing = judge(ConstantLimits("r"), "ohm", empty, FINE, evaluated(), NOTHING, None, 0.01)
+    missing = judge(ConstantLimits("r"), "ohm", empty, answers(FINE))
     assert missing == Judged("not_evaluated", "no motor of the candidate has it")
     from_zero = assess(
         [*lot_of("A", [-0.1, 0.1], "baseline"), *lot_of("B", [0.3916, 0.5916], "candidate")],
         [],
         ["A", "B"],
     )
-    found = judge(ConstantLimits("r"), "ohm", from_zero, out, evaluated(), NOTHING, None, 0.01)
+    found = judge(ConstantLimits("r"), "ohm", from_zero, answers(out))
     assert found.why.startswith("+492 mΩ: 3 of 7")
     for candidate, words in ((0.29, "+190 %"), (0.31, "+210 mΩ")):
         values = [candidate - 0.01, candidate + 0.01]
@@ -468,9 +475,7 @@ def test_motors_outside_come_before_all_else_and_the_move_is_relative() -> None:
             [],
             ["A", "B"],
         )
-        found = judge(
-            ConstantLimits("r"), "ohm", from_little, out, evaluated(), NOTHING, None, 0.01
-        )
+        found = judge(ConstantLimits("r"), "ohm", from_little, answers(out))
         assert found.why.startswith(f"{words}: 3 of 7")
     assert overall((), ()) == ("undecided", ("no constant could be compared",))
 
