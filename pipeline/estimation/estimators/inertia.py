@@ -57,6 +57,11 @@ LONGER = (
     "record a drive of at least a second and a turn that accelerates and brakes in both senses, "
     "with iq_a and theta_mech_rad"
 )
+_OTHER_SETUP = (
+    "by the coasts the drag would be {:.3g} times that of the drives: they turn something else "
+    "besides the rotor, such as a dynamometer left coupled, and are not used; record a spin_down "
+    "of the motor alone"
+)
 LOAD = "log torque_shaft_nm in the drives, or record them with nothing coupled to the shaft"
 AIDS = (
     "kt_reluctance_nm_a2",
@@ -206,8 +211,41 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 
     Rows of drives and coast-downs (`shaft_rows`) are regressed together on g = 1/J, T_c/J, B/J:
     coast-downs fix the ratios, drives the scale. Where drag has another form, J comes from the
-    drag curve left free, T = J (a_driven - a_coasting) at each speed.
+    drag curve left free, T = J (a_driven - a_coasting) at each speed. Coasts whose drag is not that
+    of drives with a transducer turn something else besides, and are left out.
     """
+    found = _fit(campaign, known, options)
+    drives = replace(campaign, captures=campaign.of("drive"))
+    if not campaign.of("spin_down") or not any(c.has("torque_shaft_nm") for c in drives.captures):
+        return found
+    alone = _fit(drives, known, options)
+    ratio = _of_another_setup(found.estimates, alone.estimates)
+    if ratio is None:
+        return found
+    words = _OTHER_SETUP.format(ratio)
+    noted = tuple(replace(e, note=f"{words}; {e.note}") for e in alone.estimates)
+    return replace(alone, estimates=noted)
+
+
+def _of_another_setup(with_coasts: Sequence[Estimate], alone: Sequence[Estimate]) -> float | None:
+    """Drag by coasts and the inertia of drives, over the drag of the drives alone; None where both
+    may be one.
+
+    A transducer between motor and dynamometer leaves the inertia of the rotor to the drives, while
+    a shaft that coasts may carry the dynamometer as well.
+    """
+    if not all(e.known for e in (*with_coasts, *alone)):
+        return None
+    half = 0.5 * float(with_coasts[0].at["omega_mech_rad_s"])
+    drags = [c.number + half * b.number for _, c, b in (with_coasts, alone)]
+    u = sum(c.u + half * b.u for _, c, b in (with_coasts, alone))
+    limits, difference = policy().coast_down, abs(drags[0] - drags[1])
+    apart = difference > limits.setup_share * 0.5 * abs(drags[0] + drags[1])
+    return drags[0] / drags[1] if apart and difference > limits.setup_u * u else None
+
+
+def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """J, T_c and B of drives and coasts taken as one set-up, if the coasts are."""
     torque = _torque(known)
     setups = setups_of(campaign.of("spin_down"))
     if len(setups) > 1:

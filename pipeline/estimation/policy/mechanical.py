@@ -130,6 +130,11 @@ class CoastDown:
         "they are of two set-ups",
         why="by judgement: grease changes a coast by a tenth from cold to warm, a chain by more",
     )  # fmt: skip
+    setup_u: float = chosen(
+        3.0, unit="1", meaning="standard uncertainties by which the drag of coasts has to miss "
+        "that of drives besides",
+        why="by judgement: the budgets of both are added, so that chance hardly passes it",
+    )  # fmt: skip
     setup_top: float = chosen(
         0.95, unit="1", meaning="of the lower top speed of two coasts, from which on they are "
         "compared",

@@ -1,0 +1,49 @@
+"""A coast that carries the dynamometer, beside drives whose transducer stands in front of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pipeline.estimation.estimators.inertia import ESTIMATOR as INERTIA
+from pipeline.estimation.estimators.inertia import GIVES
+from pipeline.estimation.estimators.torque_map import ESTIMATOR as TORQUE_MAP
+from pipeline.records.estimate import Estimate
+from pipeline.simulator.bench import CAMPAIGN, campaign
+from pipeline.simulator.design import EXACT, Bench
+from pipeline.simulator.truth import truth
+from tests.simulated import campaign_of, design
+from tests.unit.estimation.mechanical import chain
+
+MOTOR = replace(design("servo-ipm"), effects={})
+TRUE = truth(MOTOR)["constants"]
+TESTS = ("torque_map_slow", "torque_map_backward", "drive_0", "spin_down_forward")
+
+
+def constants(far: float) -> dict[str, Estimate]:
+    """J, T_c and B where a share of what coasts is behind the transducer."""
+    motor = MOTOR.having(compliance={"load_fraction": far, "damping_ratio": 0.05}) if far else MOTOR
+    bench = Bench(torque_in_coupling=True, instruments=EXACT)
+    plan = tuple(step for step in CAMPAIGN if step[0] in TESTS)
+    known = chain(campaign_of(campaign(motor, bench, 3, plan)), TORQUE_MAP, INERTIA)
+    return {name: one for name in GIVES for one in known.all_of(name) if one.method == "inertia"}
+
+
+@pytest.mark.parametrize("far", [0.6, 0.85])
+def test_friction_is_that_of_the_drives_where_a_coast_carries_more(far: float) -> None:
+    """By the coast's deceleration and the rotor's inertia it would be a part of it only."""
+    found = constants(far)
+    inertia, dry, viscous = (found[name] for name in GIVES)
+    assert inertia.number == pytest.approx((1.0 - far) * TRUE["j_rotor_kgm2"], rel=0.03)
+    assert dry.number == pytest.approx(TRUE["torque_coulomb_nm"], abs=3.0 * dry.u)
+    assert dry.u < 0.2 * dry.number
+    assert viscous.number == pytest.approx(TRUE["b_visc_nm_s_rad"], abs=3.0 * viscous.u)
+    assert "they turn something else" in dry.note
+    assert not any("spin_down" in path for path in dry.captures)
+
+
+def test_a_coast_of_the_same_shaft_is_used() -> None:
+    dry = constants(0.0)["torque_coulomb_nm"]
+    assert dry.number == pytest.approx(TRUE["torque_coulomb_nm"], abs=3.0 * dry.u)
+    assert any("spin_down" in path for path in dry.captures)
