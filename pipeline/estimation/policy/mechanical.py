@@ -131,8 +131,8 @@ class CoastDown:
         why="by judgement: grease changes a coast by a tenth from cold to warm, a chain by more",
     )  # fmt: skip
     setup_u: float = chosen(
-        3.0, unit="1", meaning="standard uncertainties by which the drag of coasts has to miss "
-        "that of drives besides",
+        3.0, unit="1", meaning="standard uncertainties by which the drag of coasts also has to "
+        "miss that of drives",
         why="by judgement: the budgets of both are added, so that chance hardly passes it",
     )  # fmt: skip
     setup_top: float = chosen(
