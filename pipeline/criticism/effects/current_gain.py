@@ -11,10 +11,22 @@ def _current(r: Recorded, q: Values) -> Complex:
     if not r.inverter:
         return r.i_a if r.phase is None else r.i_a / (1.0 + q["bench"] * _of_phase(r.phase, q))
     gamma = (q["cosine"] + 1j * q["sine"]) * np.exp(-2j * r.eps_rad)
-    mean = 1.0 + q["mean"]
+    mean = 1.0 + q["mean"] + 1j * _turn(q)
     # recorded = mean i + gamma conj(i), solved for i
-    true: Complex = (mean * r.i_a - gamma * np.conj(r.i_a)) / (mean**2 - np.abs(gamma) ** 2)
+    size = abs(mean) ** 2 - np.abs(gamma) ** 2
+    true: Complex = (np.conj(mean) * r.i_a - gamma * np.conj(r.i_a)) / size
     return true
+
+
+def _turn(q: Values) -> float:
+    """Angle that two shunts turn the current by: the third line is less their sum, and has their
+    gains in it. Of pair k it is half of γ along e^{j(30° + 240° k)}, k = 0 of a and b.
+    """
+    pair = q["shunts"] - 1.0
+    if pair < 0.0:
+        return 0.0
+    along = np.exp(-1j * np.pi * (1.0 / 6.0 + 4.0 / 3.0 * pair))
+    return float(0.5 * ((q["cosine"] + 1j * q["sine"]) * along).real)
 
 
 def _of_phase(phase: int, q: Values) -> float:
@@ -26,7 +38,8 @@ def _of_phase(phase: int, q: Values) -> float:
 EFFECT = Effect(
     name="current_gain",
     words="recorded i = (1 + mean) i + γ i* e^{−j2ε}; one phase k off by g: |γ| = mean = g/3; "
-    "bench: how far the bench's line currents come from the same sensors",
+    "shunts: 0 of all three lines, or 1, 2, 3 of a and b, b and c, c and a alone, which turn i by "
+    "|γ|/2 as well; bench: how far the bench's line currents come from the same sensors",
     signature="second electrical order in current, voltage and torque, proportional to current",
     tests=("torque_map",),
     experiment="a torque map at two speeds",
@@ -36,6 +49,7 @@ EFFECT = Effect(
         Parameter("cosine", "1", 0.01, 0.001, low=-0.3, high=0.3),
         Parameter("sine", "1", 0.01, 0.001, low=-0.3, high=0.3),
         Parameter("mean", "1", 0.01, 0.004, low=-0.3, high=0.3),
+        Parameter("shunts", "1", 1.0, 0.0, scan=(0.0, 1.0, 2.0, 3.0), choice=True),
         Parameter("bench", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
     ),
     signals=("id_a", "iq_a"),

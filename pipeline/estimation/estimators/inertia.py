@@ -59,7 +59,7 @@ LONGER = (
 )
 _OTHER_SETUP = (
     "by the coasts the drag would be {:.3g} times that of the drives: they turn something else "
-    "besides the rotor, such as a dynamometer left coupled, and are not used; record a spin_down "
+    "beside the rotor, such as a dynamometer left coupled, and are not used; record a spin_down "
     "of the motor alone"
 )
 LOAD = "log torque_shaft_nm in the drives, or record them with nothing coupled to the shaft"
@@ -212,7 +212,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     Rows of drives and coast-downs (`shaft_rows`) are regressed together on g = 1/J, T_c/J, B/J:
     coast-downs fix the ratios, drives the scale. Where drag has another form, J comes from the
     drag curve left free, T = J (a_driven - a_coasting) at each speed. Coasts whose drag is not that
-    of drives with a transducer turn something else besides, and are left out.
+    of drives with a transducer turn something else as well, and are left out.
     """
     found = _fit(campaign, known, options)
     drives = replace(campaign, captures=campaign.of("drive"))
