@@ -21,7 +21,7 @@ from pipeline.estimation.mechanical.drag import (
     too_short,
     torque_is_separable,
 )
-from pipeline.estimation.mechanical.setups import setups_of
+from pipeline.estimation.mechanical.setups import another_setup, setups_of
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
@@ -56,11 +56,6 @@ EXPERIMENT = (
 LONGER = (
     "record a drive of at least a second and a turn that accelerates and brakes in both senses, "
     "with iq_a and theta_mech_rad"
-)
-_OTHER_SETUP = (
-    "by the coasts the drag would be {:.3g} times that of the drives: they turn something else "
-    "beside the rotor, such as a dynamometer left coupled, and are not used; record a spin_down "
-    "of the motor alone"
 )
 LOAD = "log torque_shaft_nm in the drives, or record them with nothing coupled to the shaft"
 AIDS = (
@@ -219,29 +214,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if not campaign.of("spin_down") or not any(c.has("torque_shaft_nm") for c in drives.captures):
         return found
     alone = _fit(drives, known, options)
-    ratio = _of_another_setup(found.estimates, alone.estimates)
-    if ratio is None:
+    words = another_setup(found.estimates, alone.estimates)
+    if not words:
         return found
-    words = _OTHER_SETUP.format(ratio)
     noted = tuple(replace(e, note=f"{words}; {e.note}") for e in alone.estimates)
     return replace(alone, estimates=noted)
-
-
-def _of_another_setup(with_coasts: Sequence[Estimate], alone: Sequence[Estimate]) -> float | None:
-    """Drag by coasts and the inertia of drives, over the drag of the drives alone; None where both
-    may be one.
-
-    A transducer between motor and dynamometer leaves the inertia of the rotor to the drives, while
-    a shaft that coasts may carry the dynamometer as well.
-    """
-    if not all(e.known for e in (*with_coasts, *alone)):
-        return None
-    half = 0.5 * float(with_coasts[0].at["omega_mech_rad_s"])
-    drags = [c.number + half * b.number for _, c, b in (with_coasts, alone)]
-    u = sum(c.u + half * b.u for _, c, b in (with_coasts, alone))
-    limits, difference = policy().coast_down, abs(drags[0] - drags[1])
-    apart = difference > limits.setup_share * 0.5 * abs(drags[0] + drags[1])
-    return drags[0] / drags[1] if apart and difference > limits.setup_u * u else None
 
 
 def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
