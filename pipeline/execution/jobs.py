@@ -97,6 +97,30 @@ class ModelTest:
 
 
 @dataclass(frozen=True, slots=True)
+class WarmUp:
+    """The start of a worker of a command that stays: everything that a motor needs is imported."""
+
+    @property
+    def name(self) -> str:
+        """What the task works on."""
+        return "the start of a worker"
+
+    def without(self, path: str, reason: str) -> WarmUp:
+        """The task itself: it reads no file.
+
+        Parameters
+        ----------
+        path
+            The file.
+        reason
+            Why it is refused.
+
+        """
+        del path, reason
+        return self
+
+
+@dataclass(frozen=True, slots=True)
 class MotorResult:
     """The result of a job: findings, files (none if no capture was usable) and times [s].
 

@@ -17,7 +17,7 @@ from pipeline.execution.caches.keys import batch_parts, key_of, motor_parts
 from pipeline.execution.caches.run_cache import Batch, RunCache
 from pipeline.execution.caches.stamp import configuration_digest
 from pipeline.execution.caches.versions import RUN, tools
-from pipeline.execution.jobs import ModelTest, MotorJob, MotorResult
+from pipeline.execution.jobs import ModelTest, MotorJob, MotorResult, WarmUp
 from pipeline.execution.outputs.publishing import (
     fleet_of,
     other_motors,
@@ -101,6 +101,7 @@ def main(settings: RunSettings) -> Outcome:
         if settings.watch:
             from pipeline.stages.steps.watch import Watch
 
+            workers.map_tasks(process_motor, [WarmUp()] * workers.count)
             perform = partial(_run, settings, registry, workers)
             return Watch(settings, perform, stack.pop_all()).begin()
         outcome = _run(settings, registry, workers)
@@ -109,21 +110,25 @@ def main(settings: RunSettings) -> Outcome:
     return replace(outcome, result=[sheet.document() for sheet in read_datasheets(output)])
 
 
-def process_motor(job: MotorJob | ModelTest) -> MotorResult | None:
+def process_motor(job: MotorJob | ModelTest | WarmUp) -> MotorResult | None:
     """One motor, in a worker: what it needs is imported there and not in the driver.
 
     Parameters
     ----------
     job
-        What to do with one motor, and how; or its residual test alone, beside it.
+        What to do with one motor, and how; its residual test alone, beside it; or nothing but the
+        imports.
 
     """
     from pipeline.stages.steps import motor
 
+    if isinstance(job, MotorJob):
+        return motor.process_motor(job)
     if isinstance(job, ModelTest):
         motor.test_model(job.job)
-        return None
-    return motor.process_motor(job)
+    else:
+        motor.import_all()
+    return None
 
 
 def _run(

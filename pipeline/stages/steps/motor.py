@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from pipeline.execution.caches.keys import key_of, superseding_parts
 from pipeline.execution.caches.model_memory import ModelMemory
 from pipeline.execution.caches.run_cache import note_motor
 from pipeline.execution.caches.stamp import stamp_of
+from pipeline.execution.caches.versions import datasheet_code
 from pipeline.execution.jobs import Files, Finished, MotorJob, MotorResult
 from pipeline.execution.tasks import work
 from pipeline.execution.tasks.model_tests import judged_model
@@ -28,6 +30,18 @@ from pipeline.records.ledger import Revocation
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Stopwatch
 from pipeline.records.performance import Blank, Performance
+
+LATE_IMPORTS = (
+    "pipeline.criticism.adequacy",
+    "pipeline.io.recordings.capture",
+    "pipeline.io.recordings.motor",
+    "pipeline.performance.derive",
+    "pipeline.report.pages.motor_page",
+    "pipeline.report.pages.sheet_page",
+    "rerun",
+    "rerun.blueprint",
+)
+"""Modules that a motor imports when it needs them."""
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -59,6 +73,17 @@ def test_model(job: MotorJob) -> None:
         return
     verdicts = ModelMemory(job, stamp_of(job, campaign))
     judged_model(campaign, job.model, Constants(), verdicts, job.diagnose)
+
+
+def import_all() -> None:
+    """Imports and finds what a worker needs for its first motor, a second's work."""
+    from pipeline.criticism.library.registry import effects
+
+    for name in LATE_IMPORTS:
+        importlib.import_module(name)
+    estimators()
+    effects(None)
+    datasheet_code()
 
 
 def _finish(job: MotorJob, watch: Stopwatch) -> Finished:

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
+from pipeline.execution.jobs import WarmUp
+from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.arrivals import Arrivals, snapshot
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.outcome import Outcome
 from pipeline.settings import RunSettings
 from pipeline.stages import run
-from pipeline.stages.steps import watch
+from pipeline.stages.steps import motor, watch
 from pipeline.stages.steps.watch import Watch
 
 
@@ -167,3 +170,22 @@ def test_settings_that_no_watch_can_keep(settings: RunSettings, wrong: dict[str,
         setattr(settings, name, value)
     with pytest.raises(UsageError, match=next(iter(wrong))):
         run.main(settings)
+
+
+def test_a_watch_starts_every_worker_before_the_first_campaign(tmp_path: Path) -> None:
+    """Nothing that a motor imports late is left for the first one to wait for."""
+    given: list[object] = []
+
+    def kept(_: object, function: object, tasks: Sequence[object], *__: object) -> list[object]:
+        given.extend(tasks)
+        return []
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(WorkerPool, "map_tasks", kept)
+        patch.setattr(watch, "end_at_once_or_next", lambda _: None)
+        keys = RunSettings(input=str(tmp_path), output=str(tmp_path / "out"), watch=True, workers=3)
+        assert run.main(keys).text.startswith("watching")
+    assert given == [WarmUp()] * 3
+    assert given[0].without("a.csv", "slow") == given[0]
+    assert run.process_motor(WarmUp()) is None
+    assert set(motor.LATE_IMPORTS) <= set(sys.modules)
