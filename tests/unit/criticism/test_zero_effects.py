@@ -72,6 +72,9 @@ def segment_of(kind: str) -> Segment:
     if kind == "motion":
         # a shaft that the current alone turns
         columns["iq_a"] = -0.2 * columns["theta_mech_rad"]
+    if kind == "driven":
+        # one that the voltage alone drives
+        columns["vq_v"] = 0.4 * np.gradient(columns["theta_mech_rad"], columns["t_s"])
     if kind == "steady":
         columns["id_a"] = np.repeat([0.0, -4.0, -8.0, -12.0], 1000)
     if kind == "torque_table":
