@@ -51,6 +51,11 @@ class Agreement:
         "nothing of that one",
         source="Particle Data Group, Review of Particle Physics, 2024, 5.2.2 (scale factors)",
     )  # fmt: skip
+    contradiction: float = chosen(
+        1e-4, "1", "chance at which a rougher method than that excludes a value",
+        why="four standard uncertainties; of ten pairs of methods a motor has, one motor in a "
+        "thousand is widened though it is sound",
+    )  # fmt: skip
     speed_ratio: float = chosen(
         10.0, "1", "ratio of speeds beyond which two drags are two quantities",
         why="drag at creep speed and at full speed differ where friction bends",

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.estimation.policy import policy
-from pipeline.numerics.random_effects import between
+from pipeline.numerics.random_effects import Between, between
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import METHODS, Contribution, covariance
@@ -26,8 +26,8 @@ def reconciled(constants: Constants) -> Constants:
     """The constants, each with the scatter between methods in its budget where they disagree.
 
     A measured value is judged by the other methods that hold for like conditions and are precise
-    enough to say something of it. What they scatter beyond chance joins its budget with k - 1
-    degrees of freedom, and its note names methods and values.
+    enough to say something of it, or exclude it though they are rough. What they scatter beyond
+    chance joins its budget with k - 1 degrees of freedom, and its note names methods and values.
 
     Parameters
     ----------
@@ -47,7 +47,8 @@ def reconciled(constants: Constants) -> Constants:
 
 
 def judges(constants: Constants, estimate: Estimate) -> list[Estimate]:
-    """Other methods' estimates of the same constant that can be held against this one.
+    """Other methods' estimates of the same constant that can be held against this one: those that
+    are about as precise, and rougher ones that contradict it.
 
     Parameters
     ----------
@@ -64,7 +65,12 @@ def judges(constants: Constants, estimate: Estimate) -> list[Estimate]:
         if one.known and one.status in ("measured", "derived") and new and _alike(one, estimate):
             others.append(one)
     limit = policy().agreement.precise * np.sqrt(len(others) + 1.0) * estimate.u
-    return [e for e in others if e.u <= limit]
+    return [e for e in others if e.u <= limit or _contradicts(e, estimate)]
+
+
+def _contradicts(rough: Estimate, estimate: Estimate) -> bool:
+    """Whether a rough method's own interval excludes a precise value."""
+    return _between([rough, estimate]).p_value < policy().agreement.contradiction
 
 
 def _alike(estimate: Estimate, other: Estimate) -> bool:
@@ -74,13 +80,22 @@ def _alike(estimate: Estimate, other: Estimate) -> bool:
     return len(known) < 2 or max(known) <= policy().agreement.speed_ratio * min(known)
 
 
+def _between(methods: Sequence[Estimate]) -> Between:
+    """How far methods are apart, with the degrees of freedom of the sum of their variances (JCGM
+    100:2008, G.4): those of a narrow estimate say nothing of a difference that a wide one has made.
+    """
+    values = np.array([e.number for e in methods])
+    matrix = np.array([[covariance(a.budget, b.budget) for b in methods] for a in methods])
+    power, dof = np.array([e.u**2 for e in methods]), np.array([e.dof for e in methods])
+    total = float(np.sum(power**2 / dof))
+    return between(values, matrix, float(power.sum()) ** 2 / total if total > 0.0 else np.inf)
+
+
 def _widened(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
     methods = [estimate, *others]
     if estimate.u == 0.0 or not others:
         return estimate
-    values = np.array([e.number for e in methods])
-    matrix = np.array([[covariance(a.budget, b.budget) for b in methods] for a in methods])
-    found = between(values, matrix, min(e.dof for e in methods))
+    found = _between(methods)
     if found.p_value >= policy().agreement.level or found.sd == 0.0:
         return estimate
     each = ", ".join(f"{e.method} {e.number:.5g} ± {e.u:.2g}" for e in methods)

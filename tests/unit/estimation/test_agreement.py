@@ -62,6 +62,20 @@ def test_a_rough_method_says_nothing_of_a_precise_one() -> None:
     assert part(kept[1]) > 0.0
 
 
+def test_a_rough_method_that_excludes_a_precise_value_is_heard() -> None:
+    """Coulomb friction came out as 1.76 ± 0.05 mN·m where the torque map had 12.9 ± 1.7.
+
+    The narrow one has few degrees of freedom, which say nothing of how sure the wide one is.
+    """
+    name = "torque_coulomb_nm"
+    narrow = Estimate(name, 1.76e-3, "N·m", "measured", "inertia", type_a("i", 5e-5, 1.5))
+    rough = Estimate(name, 12.9e-3, "N·m", "measured", "torque_map", type_a("t", 1.7e-3, 20.0))
+    assert judges(Constants((narrow, rough)), narrow) == [rough]
+    found = reconciled(Constants((narrow, rough))).estimates[0]
+    assert found.u > 0.5 * (rough.number - narrow.number)
+    assert "torque_map 0.0129" in found.note
+
+
 def test_drag_at_creep_speed_is_not_held_against_drag_at_full_speed() -> None:
     name = "torque_coulomb_nm"
     fast = of("inertia", 1.0, 0.005, name, omega_mech_rad_s=300.0)
