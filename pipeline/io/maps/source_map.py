@@ -283,7 +283,8 @@ def column_of(group: str) -> tuple[str, str, float] | None:
     Parameters
     ----------
     group
-        `COLUMN__UNIT`, or `COLUMN__minus_UNIT` where the name leaves out a minus.
+        Column and unit with two underscores between, as in `omega_mech_rad_s__rpm`; `minus_` before
+        the unit where the name leaves out a minus.
 
     Returns
     -------
