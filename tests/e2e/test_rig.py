@@ -125,7 +125,7 @@ def test_released_with_76_noise_floors_left(tmp_path: Path) -> None:
     (path,) = (tmp_path / "plain" / "datasheets").iterdir()
     sheet = json.loads(path.read_bytes())
     assert sheet["status"] == "provisional"
-    assert sheet["model"]["held_out"] == pytest.approx(76.0, abs=2.0)
+    assert sheet["model"]["held_out"] == pytest.approx(75.0, abs=3.0)
     (reason,) = sheet["why"]
     assert "noise floors" in reason
     (page,) = (tmp_path / "plain" / "report").glob("joint*.html")
