@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.criticism.effect import Discrimination
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.selection.alternatives import alternatives_to
 from pipeline.criticism.selection.score_test import candidates, widened
 from pipeline.criticism.selection.stepwise import search
@@ -69,3 +70,23 @@ def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
         return
     assert (name, others) == (told, ())
     assert last.fit.values[f"{told}.drag_nm"] == pytest.approx(0.12, rel=0.05)
+
+
+@pytest.mark.parametrize("coupling", [True, False])
+def test_what_noise_in_a_speed_loop_looks_like_needs_a_remainder_that_is_reported(coupling):
+    """A soft shaft was named in telemetry that hides nothing: below the floors a coupling is none,
+    any other effect of the machine is seen there.
+    """
+
+    def look(wholes, q):
+        return Discrimination("windage", {"drag_nm": (0.029, 0.001)})
+
+    windage = LIBRARY["windage"]
+    library = {"windage": replace(windage, discriminator=look) if coupling else windage}
+
+    def drag(omega, _):
+        return 0.03 * omega * np.abs(omega) / 250.0**2
+
+    fit = fitted((with_drag(drag), with_drag(drag, 6)))
+    assert not significant_groups(search(fit, {})[0].system).any()
+    assert search(fit, library)[-1].added == (() if coupling else ("windage",))
