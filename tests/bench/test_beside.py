@@ -19,6 +19,7 @@ DEMO = Path(__file__).parents[2] / "data" / "demo"
 CAPTURES = ("resistance_ab.mcap", "current_step_*.mcap", "open_circuit_*.mcap", "drive_*.mcap")
 
 
+@pytest.mark.slow
 def test_the_test_beside_takes_a_third_of_the_motors_time_off(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
