@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from pipeline.physics.conventions import UNLOGGED_D_SHARE, UNLOGGED_U_K
@@ -132,6 +133,10 @@ class Cutting:
     slower_share: float = chosen(
         0.75, "sample periods", "PWM period below which a log is slower than the PWM",
         why="a log of every second period is at a half, one of every period at 1",
+    )  # fmt: skip
+    held_turn_rad: float = derived(
+        math.pi / 3.0, "rad", "electrical turn beyond which no voltage vector is held for a sample",
+        source="six vectors a turn, the fewest of any inverter (six-step)",
     )  # fmt: skip
     instant_rad: float = chosen(
         0.2, "rad", "turn of the highest order in a coasting sample that is as good as an instant",

@@ -197,7 +197,7 @@ def operating(
         supply=Supply(
             segment.fixed.get("pwm_s", 0.0),
             segment.fixed.get("vdc_v", 0.0),
-            hold_s=hold_s(segment, model.machine.policy.cutting),
+            hold_s=hold_s(segment, motion.omega_rad_s, model.machine),
         ),
         shaft=ShaftState(
             held=segment.test == "torque_map",
@@ -210,24 +210,31 @@ def operating(
     )
 
 
-def hold_s(segment: Segment, policy: Cutting) -> float:
+def hold_s(segment: Segment, omega_rad_s: Array, machine: Machine) -> float:
     """Time for which a voltage vector is constant.
 
     Parameters
     ----------
     segment
         Its PWM period, where stated.
-    policy
-        How much slower a log must be than the PWM.
+    omega_rad_s
+        Speed of the shaft [n].
+    machine
+        Its pole pairs, and the policy of logs that are slower than the PWM.
 
     Returns
     -------
     float
-        The PWM period, or the sample period of a log as fast [s].
+        The PWM period, or the sample period of a log as fast [s]; zero for a log in whose sample
+        the rotor turns further than under one vector of any inverter: it is slower than a PWM that
+        is not stated.
 
     """
-    pwm_s = segment.fixed.get("pwm_s", math.inf)
-    return pwm_s if pwm_s < policy.slower_share * segment.ts_s else segment.ts_s
+    policy, pwm_s = machine.policy.cutting, segment.fixed.get("pwm_s")
+    if pwm_s is not None:
+        return pwm_s if pwm_s < policy.slower_share * segment.ts_s else segment.ts_s
+    turn = machine.pole_pairs * segment.ts_s * float(np.max(np.abs(omega_rad_s), initial=0.0))
+    return segment.ts_s if turn < policy.held_turn_rad else 0.0
 
 
 def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) -> Operating:

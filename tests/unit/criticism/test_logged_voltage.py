@@ -19,16 +19,16 @@ EVERY = 60
 PAIRS = 7
 
 
-def slow(pwm_s: float | None, timing: str = "centred") -> Segment:
+def slow(pwm_s: float | None, timing: str = "centred", every: int = EVERY) -> Segment:
     """A log of 3 ms of a shaft that turns by up to 2.1 rad, electrical, in that time.
 
     Its voltages are those in the rotor frame: a vector that is held for 50 us loses nothing.
     """
     fast = log()
     fixed = dict(fast.fixed) if pwm_s is None else {**fast.fixed, "pwm_s": pwm_s}
-    recorded = {name: column[::EVERY] for name, column in fast.recorded.items()}
+    recorded = {name: column[::every] for name, column in fast.recorded.items()}
     instrument = replace(fast.instrument, timing=timing)
-    slower = replace(fast, ts_s=EVERY * fast.ts_s, recorded=recorded, weak=None)
+    slower = replace(fast, ts_s=every * fast.ts_s, recorded=recorded, weak=None)
     return replace(slower, fixed=fixed, instrument=instrument)
 
 
@@ -46,9 +46,19 @@ def test_a_log_slower_than_the_pwm_holds_means_in_the_rotor_frame() -> None:
 
 def test_where_the_pwm_is_not_known_the_data_decide() -> None:
     """`ripple_edge` goes from a vector held for a whole period, 0, to one that is not, -1/24."""
-    assert left(slow(None)) > 0.5
-    assert left(slow(None), ripple_edge=-1.0 / 24.0) == pytest.approx(left(slow(None, "instant")))
-    assert left(slow(None), ripple_edge=-1.0 / 24.0) < 1e-3
+    mean, instant = (slow(None, timing, every=EVERY // 3) for timing in ("centred", "instant"))
+    assert left(mean) > 0.05
+    assert left(mean, ripple_edge=-1.0 / 24.0) == pytest.approx(left(instant))
+    assert left(mean, ripple_edge=-1.0 / 24.0) < 1e-3
+
+
+@pytest.mark.parametrize("timing", ["centred", "instant", "held"])
+def test_no_vector_is_held_while_the_rotor_turns_further_than_in_six_steps(timing: str) -> None:
+    """Such a log is slower than its PWM, which it does not state."""
+    moved = [left(slow(None, timing, every), ripple_edge=-0.04) for every in (EVERY // 3, EVERY)]
+    still = [left(slow(None, timing, every)) for every in (EVERY // 3, EVERY)]
+    assert moved[0] != still[0]
+    assert moved[1] == still[1]
 
 
 def test_a_log_as_fast_as_the_pwm_holds_one_vector_a_period() -> None:
