@@ -94,7 +94,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
             *unused(campaign, system.segments),
             *loaded(campaign, machine),
             *mixed(campaign, machine),
-            *at_ambient(system.segments, system.fit.model),
+            *at_ambient(system.fit),
             *against_stated(system, held),
             *hum_notes(base.hum),
             *held.notes,

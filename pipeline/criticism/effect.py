@@ -96,6 +96,10 @@ class Parameter:
         return not self.scan
 
 
+UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
+"""Nuisance that stands for a temperature where a test that warms the machine did not record it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Machine:
     """What the captures say of the size of the motor, before any fit.
@@ -121,6 +125,9 @@ class Machine:
     pairs_known
         Whether anything gives the pole pairs. Where not, they are taken as one, so that
         a flux linkage is Ke, and one over speed or torque says nothing of the flux.
+    unlogged
+        Column and capture, by the nuisance that stands for the temperature which that capture did
+        not record.
     stated
         Stated constants of the motor: value and standard uncertainty by the name of the parameter.
     policy
@@ -137,6 +144,7 @@ class Machine:
     load_orders: tuple[float, ...] = ()
     travel_turns: float = math.inf
     pairs_known: bool = True
+    unlogged: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     stated: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     policy: Policy = DEFAULT
 

@@ -14,7 +14,7 @@ from pipeline.criticism.data.sensor_noise import rounding_step
 from pipeline.criticism.data.settling import settling_of
 from pipeline.criticism.data.stated import stated_parameters
 from pipeline.criticism.data.traces import LINES_V, with_values
-from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.effect import UNLOGGED, Array, Machine
 from pipeline.criticism.policy.policy import DEFAULT, Policy
 from pipeline.physics.frames import vector_of_lines
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
@@ -85,9 +85,25 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         encoder_step(campaign, policy),
         travel_turns=max(map(_travel_turns, campaign.captures), default=0.0),
         pairs_known=counted,
+        unlogged=_unlogged(campaign),
         stated=known,
         policy=policy,
     )
+
+
+def _unlogged(campaign: Campaign) -> dict[str, tuple[str, str]]:
+    """Column and capture [path], by nuisance, of the temperatures that captures do not record.
+
+    Captures of one day may be of a cold machine and of a warm one. One that alone lacks a column
+    has the nuisance that all captures have in common.
+    """
+    made = {}
+    warm = [c for c in campaign.captures if c.meta.test not in (*_SHAFT_ALONE, *_TABLES)]
+    for column, nuisance in UNLOGGED.items():
+        paths = sorted(c.path for c in warm if not c.has(column))
+        if len(paths) > 1:
+            made |= {f"{nuisance}_{n}": (column, path) for n, path in enumerate(paths)}
+    return made
 
 
 def _scales(

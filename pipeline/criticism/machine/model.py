@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.criticism.effect import (
+    UNLOGGED,
     Array,
     CoenergyHook,
     Complex,
@@ -104,8 +105,6 @@ BASE: tuple[Constant, ...] = (
     ),
     Constant("unlogged_rest_k", "K", "the same of a winding in tests at rest", hook="gain"),
 )
-UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
-"""Nuisance that stands for a temperature where a test that warms the machine did not record it."""
 UNLOGGED_AT_REST = "unlogged_rest_k"
 """That of the winding in tests at rest: they warm it little, and show nothing of one that turns."""
 LATE_SPEED = "late_speed_s"
@@ -122,9 +121,6 @@ UNLOGGED_K = (*UNLOGGED.values(), UNLOGGED_AT_REST)
 _SHARED_PRIORS = {
     "zero_alpha_a": "zero_a",
     "zero_beta_a": "zero_a",
-    "unlogged_winding_k": "unlogged_k",
-    "unlogged_magnet_k": "unlogged_k",
-    "unlogged_rest_k": "unlogged_k",
 }
 """Fields of `policy.priors` that stand for several nuisances."""
 STATE = tuple(constant.name for constant in BASE if constant.hook == "state")
@@ -134,23 +130,30 @@ PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 
 def _prior(name: str, priors: Priors) -> float | None:
     """Standard uncertainty of a nuisance by the policy; None of a constant that has no prior."""
-    usual: float | None = getattr(priors, _SHARED_PRIORS.get(name, name), None)
+    shared = "unlogged_k" if name.startswith(UNLOGGED_K) else _SHARED_PRIORS.get(name, name)
+    usual: float | None = getattr(priors, shared, None)
     return priors.gain if usual is None and name.startswith("gain_") else usual
 
 
 def base_of(machine: Machine) -> tuple[Constant, ...]:
-    """The constants of the base model, and gains of further instruments that the station has.
+    """The constants of the base model, gains of further instruments that the station has, and
+    temperatures that single captures do not record.
 
     Parameters
     ----------
     machine
-        Its `stated_u` names the gains.
+        Its `stated_u` names the gains, its `unlogged` the temperatures.
 
     """
     known = {constant.name for constant in BASE}
     further = sorted(set(machine.stated_u) - known)
     words = "gain of a further instrument"
-    return (*BASE, *(Constant(name, "1", words, hook="gain") for name in further))
+    gains = (Constant(name, "1", words, hook="gain") for name in further)
+    warmth = (
+        Constant(name, "K", f"{column} of {path} over that of others", hook="gain")
+        for name, (column, path) in machine.unlogged.items()
+    )
+    return (*BASE, *gains, *warmth)
 
 
 @dataclass(frozen=True, slots=True)

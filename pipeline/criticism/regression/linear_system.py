@@ -518,7 +518,7 @@ def _linear(column: Column, model: Model) -> bool:
     """Whether the residual is linear along a column, whatever the other parameters are."""
     effect = column.effect
     if effect is None:
-        return column.name not in ("offset_temp_k", LATE_SPEED, LATE_VOLTAGE, *UNLOGGED_K)
+        return not column.name.startswith(("offset_temp_k", LATE_SPEED, LATE_VOLTAGE, *UNLOGGED_K))
     if effect not in model.effects:
         return True
     shaped = any(not (p.amplitude or p.choice) for p in effect.parameters_of(model.machine))

@@ -395,7 +395,7 @@ class _Sampler:
             "gain_torque": observes_sensor(self.segment, "load"),
             "gain_lcr": observes_sensor(self.segment, "lcr"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
-            **{n: n in self.segment.fixed for n in _OF_SOME_LOGS},
+            **{n: n in self.segment.fixed for n in (*_OF_SOME_LOGS, *self.model.machine.unlogged)},
             "gain_clock": observes_sensor(self.segment, "clock"),
             self.segment.instrument.meter: observes_sensor(self.segment, "voltage"),
             self.segment.instrument.ammeter: observes_sensor(self.segment, "current"),
@@ -410,8 +410,7 @@ class _Sampler:
             "offset_temp_k",
             LATE_SPEED,
             LATE_VOLTAGE,
-            *UNLOGGED_K,
-        ):
+        ) or column.name.startswith(UNLOGGED_K):
             return (self._residual(self.model, moved) - self.base_residual) / column.step
         after = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(after - self.start) / column.step

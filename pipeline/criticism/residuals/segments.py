@@ -11,14 +11,13 @@ from pipeline.criticism.data.instruments import gains_of
 from pipeline.criticism.data.segment import UNSMOOTHED, Kept, Segment, with_lines
 from pipeline.criticism.data.sensor_noise import is_rounded, rounding_step
 from pipeline.criticism.data.traces import PAD, with_values
-from pipeline.criticism.effect import Machine
+from pipeline.criticism.effect import UNLOGGED, Machine
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equation_of, equations
 from pipeline.criticism.machine.model import (
     COAST_SHARES,
     LATE_SPEED,
     OPEN_FLUX,
-    UNLOGGED,
     UNLOGGED_AT_REST,
 )
 from pipeline.numerics.coast_setups import Limits, Setup, coast_setups
@@ -100,7 +99,7 @@ def _cut(capture: Capture, machine: Machine) -> Iterator[Segment]:
             continue
         segment = equation.cut(capture, machine)
         if segment is not None and (segment.weak is None or segment.weak.starts.size):
-            lacks = {**_unlogged(segment, equation), **_late_speed(segment, capture)}
+            lacks = {**_unlogged(segment, equation, machine), **_late_speed(segment, capture)}
             yield replace(segment, fixed={**segment.fixed, **lacks})
 
 
@@ -115,14 +114,22 @@ def _beside(segment: Segment, others: Sequence[Segment]) -> dict[str, float]:
     return dict.fromkeys(shares, 1.0) if shown else {}
 
 
-def _unlogged(segment: Segment, equation: Equation) -> dict[str, float]:
-    """Nuisances of the temperatures that such a test changes and the capture did not record."""
+def _unlogged(segment: Segment, equation: Equation, machine: Machine) -> dict[str, float]:
+    """Nuisances of the temperatures that such a test changes and the capture did not record: one
+    that all such captures have in common, and one of the capture's own.
+    """
     hooks = {"temp_winding_degc": "drop", "temp_magnet_degc": "flux"}
-    return {
-        UNLOGGED_AT_REST if hook == "drop" and equation.use.at_rest else UNLOGGED[name]: 1.0
+    lacks = [
+        name
         for name, hook in hooks.items()
         if hook in equation.use.warms and name not in segment.recorded
-    }
+    ]
+    common = (
+        UNLOGGED_AT_REST if hooks[name] == "drop" and equation.use.at_rest else UNLOGGED[name]
+        for name in lacks
+    )
+    own = (n for n, at in machine.unlogged.items() if at in {(c, segment.capture) for c in lacks})
+    return dict.fromkeys((*common, *own), 1.0)
 
 
 def _late_speed(segment: Segment, capture: Capture) -> dict[str, float]:

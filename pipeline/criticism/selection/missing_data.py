@@ -9,9 +9,9 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.data.settling import unexplained_voltage
 from pipeline.criticism.data.traces import with_values
 from pipeline.criticism.data.unlogged_load import unexplained_share
-from pipeline.criticism.effect import Effect, Evidence, Machine
+from pipeline.criticism.effect import UNLOGGED, Effect, Evidence, Machine
 from pipeline.criticism.library.equations import equation_of, equations
-from pipeline.criticism.machine.model import UNLOGGED, Model
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.residuals.segments import known_tests, mixed_setups
 from pipeline.criticism.selection.alternatives import detectable
 from pipeline.criticism.selection.score_test import Candidate
@@ -141,23 +141,22 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     return tuple(notes[current] for current, own in shares.items() if own)
 
 
-def at_ambient(cut_segments: Sequence[Segment], model: Model) -> tuple[str, ...]:
+def at_ambient(fit: Fit) -> tuple[str, ...]:
     """Notes of the captures in which a temperature that the model uses was not recorded.
 
     Parameters
     ----------
-    cut_segments
-        The segments.
-    model
-        The model.
+    fit
+        Segments, model and values.
 
     Returns
     -------
     tuple of str
-        One a temperature, with the uncertainty that it is taken with.
+        One a temperature, with the uncertainty that it is taken with, and one a capture that only
+        a temperature beyond it explains.
 
     """
-    notes = []
+    model, cut_segments, notes = fit.model, fit.segments, []
     for effect in model.effects:
         for name in (signal for signal in effect.signals if signal.startswith("temp_")):
             warmed = (s for s in cut_segments if effect.hook in equation_of(s).use.warms)
@@ -166,7 +165,19 @@ def at_ambient(cut_segments: Sequence[Segment], model: Model) -> tuple[str, ...]
                 where = ", ".join(sorted(cold))
                 u_k = model.priors()[UNLOGGED[name]][1]
                 notes.append(f"no {name}, taken to be at ambient temperature ± {u_k:g} K: {where}")
+                notes += [
+                    f"{path} is as a {name} of {warmer:+.0f} K beside the other captures makes it, "
+                    "which none of these records: log it"
+                    for path, warmer in _warmer(fit, name).items()
+                    if abs(warmer) > u_k
+                ]
     return tuple(dict.fromkeys(notes))
+
+
+def _warmer(fit: Fit, name: str) -> dict[str, float]:
+    """How much warmer [K] each capture without this temperature is fitted than all of them."""
+    known = fit.model.machine.unlogged
+    return {path: fit.values[key] for key, (one, path) in known.items() if one == name}
 
 
 def unexcited(

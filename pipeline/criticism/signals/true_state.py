@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.segment import Segment, slow_orders
 from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.effect import (
+    UNLOGGED,
     Array,
     Complex,
     Machine,
@@ -24,7 +25,6 @@ from pipeline.criticism.effect import (
 )
 from pipeline.criticism.machine.model import (
     LATE_SPEED,
-    UNLOGGED,
     UNLOGGED_AT_REST,
     Model,
     clock_gain,
@@ -382,7 +382,7 @@ def _warmth(
 ) -> Array:
     if name not in signals:
         known = [UNLOGGED[name], *([UNLOGGED_AT_REST] if name == "temp_winding_degc" else [])]
-        warmed = sum(segment.fixed.get(one, 0.0) * values[one] for one in known)
+        warmed = sum(values[one] for one in segment.fixed if one.startswith(tuple(known)))
         return np.full(size, segment.fixed["ambient_k"] + warmed)
     warm = signals[name] - 25.0 - values["offset_temp_k"]
     return np.repeat(warm, size // warm.size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import polars as pl
@@ -50,6 +51,14 @@ def test_a_warm_magnet_without_a_thermometer():
     assert abs(psi.value - TRUE["psi_pm_wb"]) < REACH * psi.u
     assert psi.u / psi.value == pytest.approx(U_K * 0.0011, rel=0.1)
     assert any(f"± {U_K:g} K" in note for note in result.notes)
+
+
+def test_of_captures_without_a_thermometer_each_has_a_temperature_of_its_own():
+    """One that all have in common leaves 33 K of magnet temperature between two spins."""
+    psi, result = flux(spins("temp_magnet_degc"))
+    assert abs(psi.value - TRUE["psi_pm_wb"]) < REACH * psi.u
+    assert psi.u / psi.value == pytest.approx(math.sqrt(1.5) * U_K * 0.0011, rel=0.1)
+    assert result.held_out < 1.5
 
 
 def test_a_recorded_temperature_leaves_the_flux_as_sharp_as_the_instruments():
