@@ -97,7 +97,7 @@ def _unlogged(campaign: Campaign) -> dict[str, tuple[str, str]]:
     Captures of one day may be of a cold machine and of a warm one. One that alone lacks a column
     has the nuisance that all captures have in common.
     """
-    made = {}
+    made: dict[str, tuple[str, str]] = {}
     warm = [c for c in campaign.captures if c.meta.test not in (*_SHAFT_ALONE, *_TABLES)]
     for column, nuisance in UNLOGGED.items():
         paths = sorted(c.path for c in warm if not c.has(column))
