@@ -30,15 +30,19 @@ JUDGED = (*LIMITS, "b_visc_nm_s_rad", "temp_coeff_copper_1_k", "temp_coeff_magne
 
 @pytest.fixture(scope="module")
 def sheets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    """Datasheet of each rig motor, by folder."""
-    found = {}
-    for folder in ("P0", "P1"):
-        output = tmp_path_factory.mktemp(folder)
-        words = [f"input={RIG / folder}", f"output={output}", "report=false", "recordings=false"]
-        assert main(["run", *words]) in (0, 1)
-        (path,) = (output / "datasheets").iterdir()
-        found[folder] = json.loads(path.read_bytes())
-    return found
+    """Datasheet of each rig motor, by folder; the model of the second is in a slow test."""
+    return {
+        "P0": sheet_of("P0", tmp_path_factory.mktemp("P0")),
+        "P1": sheet_of("P1", tmp_path_factory.mktemp("P1"), "residual_test=false"),
+    }
+
+
+def sheet_of(folder: str, output: Path, *more: str) -> dict[str, Any]:
+    words = [f"input={RIG / folder}", f"output={output}", "report=false", "recordings=false"]
+    assert main(["run", *words, *more]) in (0, 1)
+    (path,) = (output / "datasheets").iterdir()
+    sheet: dict[str, Any] = json.loads(path.read_bytes())
+    return sheet
 
 
 def truth(folder: str) -> dict[str, Any]:
@@ -96,14 +100,14 @@ def test_the_motor_with_nothing_hidden_leaves_nothing_over_the_noise(
 ) -> None:
     model = sheets["P0"]["model"]
     assert (model["verdict"], model["missing"], model["worst"]) == ("adequate", [], None)
-    assert model["held_out"] < 1.0
+    assert 0.4 < model["held_out"] < 1.0
     assert model["residual"] < math.sqrt(2.0)
 
 
-def test_a_motor_with_hidden_effects_names_them_with_their_sizes(
-    sheets: dict[str, dict[str, Any]],
-) -> None:
-    model, why = sheets["P1"]["model"], sheets["P1"]["why"]
+@pytest.mark.slow
+def test_a_motor_with_hidden_effects_names_them_with_their_sizes(tmp_path: Path) -> None:
+    sheet = sheet_of("P1", tmp_path)
+    model, why = sheet["model"], sheet["why"]
     found = {one["effect"]: one["parameters"] for one in model["missing"]}
     assert (model["verdict"], set(found)) == ("missing", {"cogging", "dead_time"})
     loss = found["dead_time"]["loss_v"]

@@ -48,8 +48,8 @@ STILL = ("resistance", "current", "lcr")
 
 
 def part_of(bench: Path, folder: Path) -> Path:
-    """A folder with the first and the last capture of each test of one motor, and the still ones
-    of another.
+    """A folder with the first capture of each test of one motor, and the first and the last of the
+    still ones of another.
     """
     for motor in ("one", "two"):
         by_test: dict[str, list[Path]] = {}
@@ -57,7 +57,8 @@ def part_of(bench: Path, folder: Path) -> Path:
             by_test.setdefault(path.name.split("_")[0], []).append(path)
         (folder / motor).mkdir(parents=True)
         for test, found in by_test.items():
-            for path in {found[0], found[-1]} if motor == "one" or test in STILL else ():
+            both = {found[0], found[-1]} if test in STILL else set()
+            for path in both if motor == "two" else found[:1]:
                 shutil.copyfile(path, folder / motor / path.name)
     return folder
 

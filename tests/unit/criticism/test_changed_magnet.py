@@ -36,7 +36,7 @@ def diagnosed(name, kept):
 @pytest.mark.parametrize(
     ("name", "kept"),
     [
-        ("gimbal-5208", 0.94),
+        pytest.param("gimbal-5208", 0.94, marks=pytest.mark.slow),
         pytest.param("joint-11p", 0.96, marks=pytest.mark.slow),
         pytest.param("servo-ipm", 0.92, marks=pytest.mark.slow),
     ],

@@ -34,7 +34,7 @@ PLAY = {"backlash": 0.006}
 @pytest.mark.parametrize(
     ("name", "hidden", "share"),
     [
-        ("servo-ipm", SPRING, 0.7),
+        pytest.param("servo-ipm", SPRING, 0.7, marks=pytest.mark.slow),
         pytest.param("gimbal-5208", SPRING, 0.7, marks=pytest.mark.slow),
         ("gimbal-5208", PLAY, 0.5),
         pytest.param("servo-ipm", PLAY, 0.5, marks=pytest.mark.slow),

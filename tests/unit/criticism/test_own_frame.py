@@ -54,6 +54,7 @@ def test_no_error_of_an_encoder_is_in_the_frame_of_the_voltage(name):
         assert bool(np.any(change)) == (segment.test != "open_circuit")
 
 
+@pytest.mark.slow
 def test_an_encoder_off_its_centre_is_found_beside_a_scope():
     found = diagnose(telemetry(MOTOR.having(angle_eccentricity=0.01)), ModelSpec(), Constants())
     assert found.missing == ("angle_eccentricity",)
