@@ -7,13 +7,21 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from pipeline.physics.glossary import Term
-from pipeline.physics.notation import MINUS, Reading, plain, quantity, reading, significant
+from pipeline.physics.glossary import Term, suffix_of, unit_of
+from pipeline.physics.notation import (
+    MINUS,
+    Reading,
+    plain,
+    quantity,
+    reading,
+    scale_for,
+    significant,
+)
 from pipeline.records.datasheet import Check, Datasheet
-from pipeline.records.estimate import Estimate
+from pipeline.records.estimate import Conditions, Estimate
 from pipeline.records.uncertainty import Budget, covariance
-from pipeline.views.conditions import conditions
 from pipeline.views.constants import constant_words, symbol
+from pipeline.views.names import quantity_words
 
 NEGLIGIBLE = 1e-3
 CHECK_ORDER = ("fail", "marginal", "not_evaluated", "pass")
@@ -211,3 +219,69 @@ def _dof(estimate: Estimate) -> str:
     if not estimate.known or estimate.u == 0.0:
         return ""
     return f"{estimate.dof:.0f}" if estimate.dof < 1e4 else "∞"
+
+
+_LOW, _HIGH = "low", "high"
+
+
+def conditions(at: Conditions) -> str:
+    """Conditions in order of their names; `X_low_UNIT` with `X_high_UNIT` is one range.
+
+    Parameters
+    ----------
+    at
+        Conditions by name [unit of the name].
+
+    """
+    texts = []
+    for key in sorted(at, key=_without_end):
+        end, partner = _end(key), at.get(_partner(key))
+        if end == _HIGH and isinstance(partner, int | float):
+            continue
+        value = at[key]
+        if end == _LOW and isinstance(value, int | float) and isinstance(partner, int | float):
+            texts.append(f"{_words(_without_end(key))} {_range(value, partner, unit_of(key))}")
+        else:
+            texts.append(f"{_words(key)} {_value(value, unit_of(key))}")
+    return ", ".join(texts)
+
+
+def _words(key: str) -> str:
+    words = quantity_words(key).replace("_", "")
+    first, _, rest = words.partition(" ")
+    return rest if first == "temperature" and rest else words
+
+
+def _value(value: float | int | str, unit: str) -> str:
+    if isinstance(value, str):
+        return value
+    scale = scale_for(value, unit)
+    return f"{plain(scale.shown(value), 4)} {scale.unit}".strip()
+
+
+def _range(low: float, high: float, unit: str) -> str:
+    scale = scale_for(max(abs(low), abs(high)), unit)
+    first, last = plain(scale.shown(low), 4), plain(scale.shown(high), 4)
+    return f"{first} to {last} {scale.unit}".strip()
+
+
+def _stem(key: str) -> list[str]:
+    suffix = suffix_of(key)
+    return (key[: -len(suffix) - 1] if suffix else key).split("_")
+
+
+def _end(key: str) -> str:
+    last = _stem(key)[-1]
+    return last if last in {_LOW, _HIGH} else ""
+
+
+def _without_end(key: str) -> str:
+    stem = _stem(key)
+    return "_".join([*(stem[:-1] if _end(key) else stem), *filter(None, [suffix_of(key)])])
+
+
+def _partner(key: str) -> str:
+    other = {_LOW: _HIGH, _HIGH: _LOW}.get(_end(key))
+    if other is None:
+        return ""
+    return "_".join([*_stem(key)[:-1], other, *filter(None, [suffix_of(key)])])

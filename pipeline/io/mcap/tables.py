@@ -1,4 +1,8 @@
-"""All samples of a file as raw tables: one a topic and schema, fields still by their own names."""
+"""All samples of a file as raw tables: one a topic and schema, fields still by their own names.
+
+Fields of many batches are put together as they come: each value goes to its last place once. Of a
+sensor_msgs/JointState one joint's position, velocity and effort are taken.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +15,6 @@ from numpy.typing import NDArray
 
 from pipeline.io.mcap.cdr import CdrDecoder
 from pipeline.io.mcap.container import Definitions, Layout
-from pipeline.io.mcap.gather import Gathered
-from pipeline.io.mcap.joint import JOINT_STATE, QUANTITIES, pick_joint
 from pipeline.io.mcap.json_payload import JsonDecoder
 from pipeline.io.mcap.leaf import Decoder, Leaf
 from pipeline.io.mcap.messages import Batch, batches
@@ -20,6 +22,7 @@ from pipeline.io.mcap.protobuf import ProtobufDecoder
 from pipeline.io.mcap.protobuf_plan import plan_of
 from pipeline.io.mcap.records import Schema
 from pipeline.io.mcap.ros2msg import layout_of
+from pipeline.io.mcap.walk import Integers
 from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 
@@ -198,3 +201,212 @@ def _counts(
                 (row, row),
             )
     return first, True
+
+
+JOINT_STATE = frozenset({"sensor_msgs/msg/JointState", "sensor_msgs/JointState"})
+QUANTITIES = ("position", "velocity", "effort")
+
+
+def pick_joint(batch: Batch, leaves: dict[str, Leaf], joint: str | None) -> dict[str, Leaf]:
+    """The quantities of one joint of joint states.
+
+    Parameters
+    ----------
+    batch
+        Messages of the type sensor_msgs/JointState.
+    leaves
+        Their decoded fields.
+    joint
+        Name of the joint; None means the only one.
+
+    Returns
+    -------
+    dict
+        Leaves by name: position, velocity and effort [messages] of the joint, a quantity that no
+        message holds left out, and the fields that are no arrays.
+
+    Raises
+    ------
+    CaptureError
+        The joint is not stated and several are there, it is missing from a message, or a message
+        has another number of values than of names (`joint`).
+
+    References
+    ----------
+    ROS 2, sensor_msgs/msg/JointState.
+
+    """
+    found = {name: leaf for name, leaf in leaves.items() if leaf.counts is None}
+    names = leaves.get("name")
+    if names is None or names.counts is None:
+        raise _bad("a joint state has no list of names")
+    counts = names.counts
+    at = _place(batch, names, counts, joint)
+    for quantity in QUANTITIES:
+        leaf = leaves.get(quantity)
+        if leaf is None or leaf.counts is None or not leaf.counts.any():
+            continue
+        if np.any((leaf.counts != 0) & (leaf.counts != counts)):
+            raise _bad(f"a joint state has another number of {quantity} values than of joints")
+        first = np.cumsum(leaf.counts) - leaf.counts
+        values = np.full(counts.size, np.nan)
+        there = leaf.counts > 0
+        values[there] = leaf.values.reshape(-1)[(first + at)[there]]
+        found[quantity] = Leaf(values)
+    return found
+
+
+def _bad(message: str) -> CaptureError:
+    return CaptureError(
+        "joint", message, "name the joint as `joint` in the metadata or the source map"
+    )
+
+
+def _place(batch: Batch, names: Leaf, counts: Integers, joint: str | None) -> Integers:
+    """Place of the joint within each message [messages]."""
+    if counts.size == 0 or counts.min() == 0:
+        raise _bad("a joint state names no joint")
+    start, length = names.values[:, 0], names.values[:, 1]
+    if joint is None:
+        if counts.max() > 1:
+            raise _bad(f"the joint states name {int(counts.max())} joints, none is chosen")
+        return np.zeros(counts.size, np.int64)
+    target = joint.encode() + b"\0"
+    raw = np.frombuffer(batch.buffer, np.uint8)
+    same = length == len(target)
+    for offset, byte in enumerate(target):
+        same &= raw[np.minimum(start + offset, raw.size - 1)] == byte
+    whose = np.repeat(np.arange(counts.size), counts)
+    place = np.arange(whose.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    hits = np.bincount(whose[same], minlength=counts.size)
+    if np.any(hits != 1):
+        row = int(np.argmax(hits != 1))
+        raise CaptureError(
+            "joint",
+            f"the joint {joint!r} is not there exactly once",
+            "check the joint's name with `inspect`",
+            (row, row),
+        )
+    chosen: Integers = place[same].astype(np.int64)
+    return chosen
+
+
+_SLACK = 1.05
+
+
+class Column:
+    """One field of a stream. Room that was not needed is never touched, so it costs no memory."""
+
+    def __init__(self, name: str, topic: str) -> None:
+        self.name = name
+        self.topic = topic
+        self.array: bool | None = None
+        self._buffer: NDArray[Any] = np.empty(0)
+        self._size = 0
+        self._dtype: np.dtype[Any] | None = None
+        self._counts: list[NDArray[np.int64]] = []
+
+    def add(self, leaf: Leaf, batches: int) -> None:
+        """Takes a batch's values.
+
+        Parameters
+        ----------
+        leaf
+            Of the batch.
+        batches
+            How many of them may come in all.
+
+        Raises
+        ------
+        CaptureError
+            The field is a number in one message and an array in another (`bad_message`).
+
+        """
+        array = leaf.counts is not None
+        if self.array not in (None, array):
+            raise CaptureError(
+                "bad_message",
+                f"the field {self.name!r} of {self.topic} is a number here and an array there",
+                "write one sample, or one block, in every message",
+            )
+        self.array = array
+        if leaf.counts is not None:
+            self._counts.append(leaf.counts)
+        self._append(leaf.values, batches)
+
+    def skip(self, messages: int) -> None:
+        """Takes in messages that do not hold the field: NaN, or no items.
+
+        Parameters
+        ----------
+        messages
+            How many.
+
+        """
+        if self.array:
+            self._counts.append(np.zeros(messages, np.int64))
+            self._append(np.empty(0), 1)
+        else:
+            self._append(np.full(messages, np.nan), 1)
+
+    def _append(self, values: NDArray[Any], batches: int) -> None:
+        stop = self._size + values.size
+        dtype = values.dtype.newbyteorder("=")
+        if self._dtype is not None:
+            dtype = np.result_type(self._dtype, dtype)
+        if dtype != self._dtype or stop > self._buffer.size:
+            capacity = max(int(_SLACK * values.size * batches), 2 * self._size, stop)
+            moved = np.empty(capacity, dtype)
+            moved[: self._size] = self._buffer[: self._size]
+            self._buffer, self._dtype = moved, dtype
+        self._buffer[self._size : stop].reshape(values.shape)[...] = values
+        self._size = stop
+
+    def whole(self) -> Leaf:
+        """All that was taken."""
+        counts = np.concatenate(self._counts) if self.array else None
+        return Leaf(self._buffer[: self._size], counts)
+
+
+class Gathered:
+    """The fields of one stream over all batches so far, and the log times of its messages [ns]."""
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self.messages = 0
+        self._columns: dict[str, Column] = {}
+        self._times = Column("log_time", topic)
+
+    def add(self, leaves: dict[str, Leaf], times: NDArray[np.uint64], batches: int) -> None:
+        """Takes in one batch of messages.
+
+        Parameters
+        ----------
+        leaves
+            Its fields by name.
+        times
+            Log times of its messages [ns].
+        batches
+            How many batches may come in all, to reserve room.
+
+        """
+        for name, leaf in leaves.items():
+            if name not in self._columns:
+                column = Column(name, self.topic)
+                column.array = leaf.counts is not None
+                if self.messages:
+                    column.skip(self.messages)
+                self._columns[name] = column
+            self._columns[name].add(leaf, batches)
+        for name in self._columns.keys() - leaves.keys():
+            self._columns[name].skip(times.size)
+        self._times.add(Leaf(times), batches)
+        self.messages += times.size
+
+    def leaves(self) -> dict[str, Leaf]:
+        """Every field that some batch held, NaN or empty where a batch did not."""
+        return {name: column.whole() for name, column in self._columns.items()}
+
+    def log_time(self) -> NDArray[np.uint64]:
+        """Log times [messages] in ns."""
+        return self._times.whole().values

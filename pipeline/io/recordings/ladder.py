@@ -9,6 +9,8 @@ A recording holds, on the sequence timeline `rung` and for every SIGNAL whose er
     /angle/SIGNAL          mean error over the electrical angle (torque: the mechanical one)
     /spread/SIGNAL         how the errors are spread, in noise floors
     /over/SIGNAL           the error over its floor, as a line over the steps
+
+In the viewer it has one workspace a signal, and one for all.
 """
 
 from __future__ import annotations
@@ -19,9 +21,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipeline.io.recordings.error_map import send_frame, send_map
+from pipeline.io.recordings.datasheet_page import plain
+from pipeline.io.recordings.error_map import map_view, send_frame, send_map
 from pipeline.io.recordings.font import drawable
-from pipeline.io.recordings.ladder_page import step_markdown
 from pipeline.io.recordings.ladder_scales import (
     TIMELINE,
     angle_reach,
@@ -29,16 +31,26 @@ from pipeline.io.recordings.ladder_scales import (
     error_scale,
     map_reach,
 )
-from pipeline.io.recordings.ladder_views import ladder_layout
 from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import recording, send_axis_ends, send_bars, send_property
-from pipeline.io.recordings.views import MEASURED, MODEL, RESIDUAL
+from pipeline.io.recordings.views import (
+    MEASURED,
+    MODEL,
+    PALETTE,
+    RESIDUAL,
+    bar_view,
+    page_view,
+    workspace,
+)
 from pipeline.io.storage.publish import canonical_json
+from pipeline.physics.notation import quantity
 from pipeline.records.diagnosis import Diagnosis
-from pipeline.views.ladder import CURRENT, SPEED, angle_of, mapped_signals
+from pipeline.views.ladder import CURRENT, SPEED, LadderView, angle_of, ladder_view, mapped_signals
+from pipeline.views.names import quantity_words
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
+    from rerun.blueprint import Blueprint
 
 WORDS = ("speed [rad/s]", "iq [A]")
 
@@ -159,3 +171,142 @@ def _send_spread(stream: RecordingStream, result: Diagnosis, signal: str) -> Non
                 width = float(edges[1] - edges[0])
                 at = (TIMELINE, place)
                 send_bars(stream, f"/spread/{signal}", share, edges[:-1], width, MEASURED, at)
+
+
+def step_markdown(result: Diagnosis, place: int) -> str:
+    """One step of the search as a page: what was added, its parameters, all errors so far.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+    place
+        Number of the step; the last one has the verdict too.
+
+    """
+    view = ladder_view(result)
+    step = view.steps[place]
+    lines = [f"# Step {place}: {plain(step.title)}", ""]
+    for text in (*step.headlines, *step.explanations):
+        lines += [plain(text), ""]
+    lines += [f"Held-out error **{step.held_out}** (1 is the noise floor)", ""]
+    if step.parameters:
+        lines += ["| parameter | value ± U (k = 2) |", "| --- | --- |"]
+        lines += [f"| {plain(name)} | {text} |" for name, text in step.parameters] + [""]
+    lines += _table(view, place)
+    if place == len(view.steps) - 1:
+        lines += ["", f"**{result.verdict}**: {plain(view.headline)}"]
+        for doubt in view.doubts:
+            alternatives = (
+                f"{doubt.effect} could as well be {doubt.alternatives}: {'; '.join(doubt.tests)}"
+            )
+            lines += ["", plain(alternatives)]
+        if result.unknown is not None:
+            one = result.unknown
+            lines += ["", f"Left over in {plain(one.signal)}: {plain(one.shape)}"]
+        lines += [line for note in result.notes for line in ("", plain(note))]
+    return "\n".join(
+        [*lines, "", "Drag the time cursor (timeline `rung`) to go from step to step.", ""]
+    )
+
+
+def _table(view: LadderView, place: int) -> list[str]:
+    """The steps so far, the latest first, of the signals whose noise floor is known."""
+    columns = [n for n, cell in enumerate(view.steps[0].errors) if cell is not None and cell.floor]
+    names = [cell.signal for cell in view.steps[0].errors if cell is not None and cell.floor]
+    lines = ["| step | model | held out | " + " | ".join(map(plain, names)) + " |"]
+    lines.append("| --- | --- | --- |" + " --- |" * len(names))
+    floors = [cell.floor if (cell := view.steps[place].errors[n]) else "" for n in columns]
+    lines.append("|  | noise floor | 1 | " + " | ".join(floors) + " |")
+    for step in reversed(view.steps[: place + 1]):
+        cells = [cell.rmse if (cell := step.errors[n]) else "" for n in columns]
+        last = "**" if step.number == place else ""
+        change = f" ({step.change})" if step.change else ""
+        lines.append(
+            f"| {last}{step.number}{last} | {plain(step.title)} | {step.held_out}{change} | "
+            + " | ".join(cells)
+            + " |"
+        )
+    return lines
+
+
+def ladder_layout(result: Diagnosis) -> Blueprint:
+    """The layout of a search: a tab a signal, and a last tab with all steps as lines.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+
+    """
+    signals = mapped_signals(result)
+    tabs = [_workspace(result, signal) for signal in signals]
+    tabs = [*tabs, _overview(signals)] if tabs else [_page()]
+    return workspace(*tabs, timeline=TIMELINE, panel="expanded")
+
+
+def _page() -> Any:
+    return page_view("/sheet", "What this step adds")
+
+
+def _workspace(result: Diagnosis, signal: str) -> Any:
+    import rerun.blueprint as rrb
+
+    named = quantity_words(signal)
+    unit, over = error_scale(result, signal).unit, angle_scale(result, signal).unit
+    flat = result.ladder[0].map_of(signal, SPEED, CURRENT)
+    upper = [_page()]
+    if flat is not None:
+        reach = map_reach(result, signal)
+        colour = f"full colour ±{quantity(reach, flat.unit, 2)} on every step"
+        upper.append(map_view(f"/map/{signal}", flat, f"{named}: mean error, {colour}"))
+    angle = angle_of(signal)
+    turn = "electrical" if angle == "theta_elec_rad" else "mechanical"
+    lower = [
+        bar_view(
+            f"rms error per step [{unit}], beside its noise floor",
+            f"/errors/{signal}",
+            f"/floor/{signal}",
+            legend=True,
+        )
+    ]
+    if result.ladder[0].map_of(signal, angle) is not None:
+        lower.append(
+            bar_view(
+                f"mean error [{over}] over {turn} angle [°]",
+                f"/angle/{signal}",
+                f"/angle_axis/{signal}",
+            )
+        )
+    lower.append(bar_view("held-out error in noise floors, % of windows", f"/spread/{signal}"))
+    shares = [1.0, 1.5][: len(upper)]
+    return rrb.Vertical(
+        rrb.Horizontal(*upper, column_shares=shares),
+        rrb.Horizontal(*lower),
+        row_shares=[1.5, 1.0],
+        name=named,
+    )
+
+
+def _overview(signals: tuple[str, ...]) -> Any:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    lines: dict[Any, Any] = {
+        f"/over/{signal}": rr.SeriesLines(
+            names=quantity_words(signal), colors=PALETTE[place % len(PALETTE)], widths=2.5
+        )
+        for place, signal in enumerate(signals)
+    }
+    return rrb.Horizontal(
+        rrb.TimeSeriesView(
+            origin="/over",
+            name="error over noise floor, step by step",
+            contents=list(lines),
+            overrides=lines,
+            plot_legend=rrb.Corner2D.RightTop,
+        ),
+        _page(),
+        column_shares=[1.6, 1.0],
+        name="All steps",
+    )

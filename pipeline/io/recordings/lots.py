@@ -16,17 +16,19 @@ timeline serves every view at once.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from pipeline.io.recordings.datasheet_page import plain
 from pipeline.io.recordings.font import drawable, in_headings
-from pipeline.io.recordings.lots_page import verdict_markdown
 from pipeline.io.recordings.lots_traces import (
     COLOURS,
+    FILL,
     MOTORS,
     PLACE,
     SIDES,
@@ -34,8 +36,8 @@ from pipeline.io.recordings.lots_traces import (
     constant_scale,
     drift,
     histogram,
+    leading_order,
 )
-from pipeline.io.recordings.lots_views import lots_layout
 from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
     Trace,
@@ -45,14 +47,29 @@ from pipeline.io.recordings.stream import (
     send_property,
     send_trace,
 )
+from pipeline.io.recordings.views import (
+    BASELINE,
+    CANDIDATE,
+    MEASURED,
+    RESIDUAL,
+    WIDE,
+    Line,
+    ViewPlan,
+    bar_view,
+    page_view,
+    time_view,
+    workspace,
+)
 from pipeline.io.storage.publish import canonical_json
 from pipeline.records.lot_constant import ConstantResult
 from pipeline.records.lot_regression import LotRegression
 from pipeline.records.naming import file_stem
-from pipeline.views.lots import compared
+from pipeline.views.lots import ConstantRow, compared, lot_view
+from pipeline.views.names import quantity_words
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
+    from rerun.blueprint import Blueprint
 
 Array = NDArray[np.float64]
 DIGITS = 5
@@ -172,3 +189,188 @@ def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
         )
         frame = pl.DataFrame([place, (column / 10.0**scale.exponent).round_sig_figs(DIGITS)])
         send_trace(stream, Trace(f"{MOTORS}/{one.name}", PLACE, frame))
+
+
+MOST_OUTLIERS = 12
+
+
+def verdict_markdown(result: LotRegression) -> str:
+    """Verdict, headline, reasons, one line a constant, outliers and notes as a page.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    """
+    before, after = result.baseline, result.candidate
+    lines = [
+        f"# {plain(before.selector)} → {plain(after.selector)}: {plain(result.verdict)}",
+        "",
+        f"**{plain(result.headline)}**",
+        "",
+        f"{before.motors} \\+ {after.motors} motors, "
+        f"{len(before.lots)} \\+ {len(after.lots)} lots; "
+        "blue is the baseline, orange the candidate, everywhere.",
+        "",
+    ]
+    lines += [f"- {plain(reason)}" for reason in result.reasons]
+    if result.history != "sufficient":
+        needed = result.limits.min_lots
+        lines.append(f"- {plain(result.history)}: the test over lots needs {needed} baseline lots")
+    lines += [
+        "",
+        "| | constant | baseline | candidate | change ± U | p |",
+        "| --- |" + " --- |" * 5,
+    ]
+    view = lot_view(result)
+    lines += [_line(row) for row in view.rows]
+    lines += ["", *(f"- {len(r.members)} constants: {plain(r.text)}" for r in view.reasons)]
+    changed = [one for one in result.effects if one.verdict != "pass"]
+    if changed:
+        lines += ["", "## Effects and orders", ""]
+        lines += [f"- {plain(one.verdict)}: {plain(one.name)}: {plain(one.why)}" for one in changed]
+    if result.outliers:
+        lines += ["", "## Motors apart from their lot", ""]
+        lines += [
+            f"- {plain(o.motor_id)}: {plain(o.constant)} {plain(o.why)}"
+            + (f" ({plain(o.capture)})" if o.capture else "")
+            for o in result.outliers[:MOST_OUTLIERS]
+        ]
+    lines += ["", *(f"{plain(note)}\n" for note in result.notes)]
+    order = [*before.lots, *after.lots]
+    lines += ["## Lots by number", ""]
+    lines += [f"- {number}: {plain(lot)}" for number, lot in enumerate(order)]
+    return "\n".join([*lines, ""])
+
+
+def _line(row: ConstantRow) -> str:
+    strong = "**" if row.tone == "fail" else ""
+    return (
+        f"| {row.mark} | {strong}{plain(row.name)}{strong} | {row.before} | {row.after} "
+        f"| {strong}{plain(row.change)}{strong} | {row.p_value} |"
+    )
+
+
+MOST_SHOWN, GRID, PERIODS = 2, 3, 6
+FILL_ALPHA, FILL_WIDTH = 40, 3.0
+
+
+def lots_layout(result: LotRegression) -> Blueprint:
+    """The layout of a comparison of lots: verdict; all distributions; drift of every constant.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    """
+    import rerun.blueprint as rrb
+
+    shown = compared(result)
+    tabs: list[Any] = [_verdict_tab(result, shown)]
+    if shown:
+        views = [histogram_view(one) for one in shown]
+        name = "2 · All distributions"
+        tabs.append(rrb.Grid(*views, grid_columns=GRID, name=name))
+    drifting = [one for one in shown if drift(one) is not None]
+    if drifting:
+        views = [time_view(drift_plan(one)) for one in drifting]
+        tabs.append(rrb.Grid(*views, grid_columns=GRID, name="3 · Drift, lot by lot"))
+    return workspace(*tabs, timeline=PLACE)
+
+
+def histogram_view(constant: ConstantResult) -> Any:
+    """Motors a bin of one constant, both sides over each other.
+
+    Parameters
+    ----------
+    constant
+        Its result.
+
+    """
+    unit = constant_scale(constant).unit or "1"
+    name = f"{quantity_words(constant.name)} [{unit}], motors per bin: {constant.verdict}"
+    return bar_view(name, *(f"/hist/{constant.name}/{side}" for side in SIDES), legend=True)
+
+
+def drift_plan(constant: ConstantResult) -> ViewPlan:
+    """Lot means with ±U, the candidate in its own colour, and the control limits of the chart.
+
+    Parameters
+    ----------
+    constant
+        Its result.
+
+    """
+    entity = f"/drift/{constant.name}"
+    lines = (
+        Line(entity, "low", "mean ± U", (*BASELINE, 110)),
+        Line(entity, "high", "mean ± U", (*BASELINE, 110)),
+        Line(entity, "mean", "lot mean", BASELINE, WIDE),
+        Line(entity, "candidate", "candidate", CANDIDATE, 4.0),
+        Line(entity, "ewma", "EWMA", MEASURED),
+        Line(entity, "ewma_low", "limit", (*RESIDUAL, 160)),
+        Line(entity, "ewma_high", "limit", (*RESIDUAL, 160)),
+    )
+    words = f"{quantity_words(constant.name)}: change from the baseline [%] by lot number"
+    return ViewPlan(words, lines, 1.0, rows=len(constant.lots))
+
+
+def cogging_plan(result: LotRegression) -> ViewPlan | None:
+    """Both bands of cogging torque over the mechanical angle.
+
+    Parameters
+    ----------
+    result
+        The comparison.
+
+    Returns
+    -------
+    ViewPlan or None
+        None where no motor was turned without current.
+
+    """
+    lines: list[Line] = []
+    for band in result.cogging:
+        entity, colour = f"/cogging/{band.side}", COLOURS[band.side]
+        words, faint = f"{band.side}: mean ± sd of {band.motors} motors", (*colour, FILL_ALPHA)
+        lines.append(Line(entity, "mean", words, colour, WIDE))
+        lines += [Line(entity, f"fill_{n}", words, faint, FILL_WIDTH) for n in range(1, FILL)]
+        lines += [Line(entity, edge, words, (*colour, 110)) for edge in ("low", "high")]
+    if not lines:
+        return None
+    order = leading_order(result)
+    words = (
+        f"cogging torque [mN·m] over mechanical angle [0.1°], {PERIODS} periods of order {order}"
+    )
+    return ViewPlan(words, tuple(lines), 1.0, rows=-(-3600 * PERIODS // order))
+
+
+def _verdict_tab(result: LotRegression, shown: Sequence[ConstantResult]) -> Any:
+    import rerun.blueprint as rrb
+
+    left: list[Any] = [page_view("/verdict", "Verdict")]
+    shares = [1.4]
+    if shown:
+        order = [MOTORS, *(f"{MOTORS}/{one.name}" for one in shown)]
+        query = rrb.archetypes.DataframeQuery(timeline=PLACE, entity_order=order)
+        left.append(rrb.DataframeView(origin=MOTORS, name="Motors", query=query))
+        shares.append(1.0)
+    right: list[Any] = []
+    if shown:
+        views = [histogram_view(one) for one in shown[:MOST_SHOWN]]
+        right.append(rrb.Horizontal(*views))
+    lower: list[Any] = []
+    plan = cogging_plan(result)
+    if plan is not None:
+        lower.append(time_view(plan))
+    if result.orders:
+        orders = "its amplitude [mN·m] by mechanical order"
+        sides = dict.fromkeys(level.side for level in result.orders)
+        lower.append(bar_view(orders, *(f"/orders/{side}" for side in sides), legend=True))
+    if lower:
+        right.append(rrb.Horizontal(*lower, column_shares=[1.8, 1.0][: len(lower)]))
+    columns = [rrb.Vertical(*left, row_shares=shares)]
+    columns += [rrb.Vertical(*right)] if right else []
+    return rrb.Horizontal(*columns, column_shares=[1.0, 1.5][: len(columns)], name="1 · Lots")

@@ -13,7 +13,7 @@ from pipeline.criticism.data.segment import Instrument, Segment, Sensors
 from pipeline.criticism.effect import Array
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.validation.free_run import Run, free_run
+from pipeline.criticism.validation.held_out import Run, free_run
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, machine
 

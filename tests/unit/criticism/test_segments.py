@@ -14,7 +14,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.noise_floors import window_gain
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.validation.free_run import free_run
+from pipeline.criticism.validation.held_out import free_run
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from tests.unit.criticism.machines import BASE, machine

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import pipeline
-from pipeline.criticism.data.stated import stated_parameters
+from pipeline.criticism.data.machine_scale import stated_parameters
 from pipeline.records.capture import Campaign
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import type_b

@@ -19,8 +19,7 @@ from pipeline.io.recordings.comparison import (
     write_comparison_recording,
 )
 from pipeline.io.recordings.error_map import CELL, diverging, map_labels, map_picture
-from pipeline.io.recordings.ladder import write_ladder_recording
-from pipeline.io.recordings.ladder_page import step_markdown
+from pipeline.io.recordings.ladder import step_markdown, write_ladder_recording
 from pipeline.io.recordings.ladder_scales import error_scale, map_reach
 from pipeline.records.comparison import Comparison, SignalError, Trace
 from pipeline.views.ladder import ladder_view, mapped_signals

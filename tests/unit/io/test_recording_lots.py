@@ -9,10 +9,14 @@ import polars as pl
 import pytest
 
 from pipeline.io.recordings.font import in_headings
-from pipeline.io.recordings.lots import lots_name, write_lots_recording
-from pipeline.io.recordings.lots_page import verdict_markdown
+from pipeline.io.recordings.lots import (
+    cogging_plan,
+    drift_plan,
+    lots_name,
+    verdict_markdown,
+    write_lots_recording,
+)
 from pipeline.io.recordings.lots_traces import MOTORS, SIDES, constant_scale, drift, histogram
-from pipeline.io.recordings.lots_views import cogging_plan, drift_plan
 from pipeline.io.recordings.readback import entities, recording_property
 from pipeline.io.recordings.seal import verify
 from pipeline.views.lots import compared

@@ -18,9 +18,8 @@ from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.report.pages.fleet_page import page_of, render_fleet
 from pipeline.report.pages.motor_page import render_motor
-from pipeline.views.conditions import conditions
 from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
-from pipeline.views.motor import kind_of, parts_of
+from pipeline.views.motor import conditions, kind_of, parts_of
 
 VOID = {"meta", "br", "input", "path", "rect", "circle"}
 HOSTILE = '"><script>alert(1)</script>{{7*7}}<img src=x onerror=alert(2)>\u202e'

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.io.recordings.lots_page import verdict_markdown
+from pipeline.io.recordings.lots import verdict_markdown
 from pipeline.records.lot_constant import ConstantResult
 from pipeline.report.pages.lot_page import render_regression
 from pipeline.report.text.lot_text import regression_text
