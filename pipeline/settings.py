@@ -7,6 +7,7 @@ change no result (where to, how fast) are marked so and stay out of the configur
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,30 @@ def key(
     if isinstance(default, (dict, list)):
         return field(default_factory=lambda: type(default)(default), metadata=metadata)
     return field(default=default, metadata=metadata)
+
+
+# keys of several commands
+_input = partial(
+    key, "data/demo", "folder of captures, searched with its subfolders", result=False, place=True
+)
+_output = partial(
+    key, "reports/demo", "folder for everything that is written", result=False, place=True
+)
+_source = partial(
+    key, "auto", "source map for foreign files, a name or path/to/map.yaml; auto recognises them"
+)
+_limits = partial(
+    key, "default", "limits file of conf/limits/: constants a release must hold", place=True
+)
+_policy = partial(
+    key, {}, "constants of judgement: policy.SECTION.FIELD=number, or policy=NAME of conf/policy/"
+)
+_constants = partial(
+    key, {}, "stated constants: constants.NAME=number and constants.u_NAME=its standard uncertainty"
+)
+_registry = partial(
+    key, "auto", "folder or URL; auto is registry/ in output", result=False, place=True
+)
 
 
 @dataclass(kw_only=True)
@@ -102,23 +127,15 @@ class OperateSettings:
 class RunSettings(ReadingSettings):
     """`run`: captures in; datasheets, checks, report and recordings out."""
 
-    input: str = key(
-        "data/demo", "folder of captures, searched with its subfolders", result=False, place=True
-    )
-    output: str = key(
-        "reports/demo", "folder for everything that is written", result=False, place=True
-    )
-    source: str = key(
-        "auto", "source map for foreign files, a name or path/to/map.yaml; auto recognises them"
-    )
+    input: str = _input()
+    output: str = _output()
+    source: str = _source()
     release: str = key(
         "manual",
         "manual, or auto: release a datasheet that meets every condition",
         one_of=("manual", "auto"),
     )
-    limits: str = key(
-        "default", "limits file of conf/limits/: constants a release must hold", place=True
-    )
+    limits: str = _limits()
     recover: bool = key(False, "use the good part of MCAP files that are cut off, unverified")
     workers: int = key(0, "motors worked on at once; 0 is one a core", result=False)
     executor: str = key("local", "local processes, or dask", result=False)
@@ -161,16 +178,12 @@ class RunSettings(ReadingSettings):
         one_of=("auto", "true", "false"),
     )
     model: ModelSettings = field(default_factory=ModelSettings)
-    policy: dict[str, Any] = key(
-        {}, "constants of judgement: policy.SECTION.FIELD=number, or policy=NAME of conf/policy/"
-    )
+    policy: dict[str, Any] = _policy()
     operate: OperateSettings = field(
         default_factory=OperateSettings, metadata={"result": False, "words": ""}
     )
     fit: dict[str, Any] = key({}, "options of an estimator: fit.ESTIMATOR.OPTION=number")
-    constants: dict[str, Any] = key(
-        {}, "stated constants: constants.NAME=number and constants.u_NAME=its standard uncertainty"
-    )
+    constants: dict[str, Any] = _constants()
     gates: dict[str, Any] = key({}, "options of a gate: gates.GATE.OPTION=number")
     crosscheck: dict[str, Any] = key({}, "options of a check: crosscheck.CHECK.OPTION=number")
 
@@ -211,12 +224,8 @@ class PlanSettings(ReadingSettings):
     )
     source: str = key("auto", "source map for foreign files, a name or path/to/map.yaml")
     motor: str | None = key(None, "motor_id; every motor without it")
-    limits: str = key(
-        "default", "limits file of conf/limits/: constants a release must hold", place=True
-    )
-    constants: dict[str, Any] = key(
-        {}, "stated constants: constants.NAME=number and constants.u_NAME=its standard uncertainty"
-    )
+    limits: str = _limits()
+    constants: dict[str, Any] = _constants()
 
 
 @dataclass(kw_only=True)
@@ -253,12 +262,8 @@ class RegressSettings(Settings):
     mode: str = key(
         "auto", "auto, lots, or code: the same captures under two versions of the pipeline"
     )
-    output: str = key(
-        "reports/demo", "folder for everything that is written", result=False, place=True
-    )
-    registry: str = key(
-        "auto", "folder or URL; auto is registry/ in output", result=False, place=True
-    )
+    output: str = _output()
+    registry: str = _registry()
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
     diagnoses: str = key(
         "auto", "folders of diagnoses, separated by commas; auto is diagnosis/ in output and beside"
@@ -277,9 +282,7 @@ class ExportSettings(Settings):
     revision: str | None = key(None, "1, 2, ... of the motor; the newest released without it")
     version: str | None = key(None, "beginning of the version's digest, instead of a revision")
     output: str = key("reports/demo", "folder to write export/ to", result=False, place=True)
-    registry: str = key(
-        "auto", "folder or URL; auto is registry/ in output", result=False, place=True
-    )
+    registry: str = _registry()
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
     options: dict[str, Any] = key({}, "of the format: options.NAME=value")
 
@@ -304,24 +307,14 @@ class SimulateSettings(Settings):
 class CompareSettings(ReadingSettings):
     """`compare`: where a model is off, signal by signal."""
 
-    input: str = key(
-        "data/demo", "folder of captures, searched with its subfolders", result=False, place=True
-    )
-    output: str = key(
-        "reports/demo", "folder for everything that is written", result=False, place=True
-    )
-    source: str = key(
-        "auto", "source map for foreign files, a name or path/to/map.yaml; auto recognises them"
-    )
+    input: str = _input()
+    output: str = _output()
+    source: str = _source()
     motor: str | None = key(None, "motor_id; every motor without it")
     model: ModelSettings = field(default_factory=ModelSettings)
-    policy: dict[str, Any] = key(
-        {}, "constants of judgement: policy.SECTION.FIELD=number, or policy=NAME of conf/policy/"
-    )
+    policy: dict[str, Any] = _policy()
     effects_path: str | None = key(None, "folder of your own effects, one file each", place=True)
-    constants: dict[str, Any] = key(
-        {}, "stated constants: constants.NAME=number and constants.u_NAME=its standard uncertainty"
-    )
+    constants: dict[str, Any] = _constants()
 
 
 @dataclass(kw_only=True)

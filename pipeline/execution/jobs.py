@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Self
 
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Entry
@@ -24,8 +26,61 @@ class Finished:
     files: Files
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OfFiles:
+    """A task on several files; `refused` are those that must not be read, with the reason."""
+
+    refused: tuple[tuple[str, str], ...] = ()
+
+    def without(self, path: str, reason: str) -> Self:
+        """The task with a file refused for a reason.
+
+        Parameters
+        ----------
+        path
+            The file, relative to the input folder.
+        reason
+            The reason, in words.
+
+        """
+        return replace(self, refused=(*self.refused, (path, reason)))
+
+
 @dataclass(frozen=True, slots=True)
-class MotorJob:
+class OfFile:
+    """A task on one file of a folder; `refused` is why it must not be read."""
+
+    folder: str
+    file: str
+    limits: ReadLimits
+    refused: str | None = field(default=None, kw_only=True)
+
+    @property
+    def name(self) -> str:
+        """What the task works on."""
+        return f"file {printable(self.file)}"
+
+    @property
+    def place(self) -> Path:
+        """Where the file lies."""
+        return Path(self.folder) / self.file
+
+    def without(self, path: str, reason: str) -> Self:  # noqa: ARG002 (it has one file)
+        """The task with its file refused for a reason.
+
+        Parameters
+        ----------
+        path
+            The file, relative to the input folder.
+        reason
+            The reason, in words.
+
+        """
+        return replace(self, refused=reason)
+
+
+@dataclass(frozen=True, slots=True)
+class MotorJob(OfFiles):
     """Everything that a worker needs for one motor: plain data, so that it can be pickled.
 
     `key` is the digest of the work, None where the result is not cached; `refused` are files that
@@ -56,25 +111,11 @@ class MotorJob:
     limits: ReadLimits = field(default_factory=ReadLimits)
     revoked: tuple[Revocation, ...] = ()
     key: str | None = None
-    refused: tuple[tuple[str, str], ...] = ()
 
     @property
     def name(self) -> str:
         """What the task works on."""
         return f"motor {printable(self.motor_id)}"
-
-    def without(self, path: str, reason: str) -> MotorJob:
-        """The job with a file refused for a reason.
-
-        Parameters
-        ----------
-        path
-            The file, relative to the input folder.
-        reason
-            The reason, in words.
-
-        """
-        return replace(self, refused=(*self.refused, (path, reason)))
 
 
 @dataclass(frozen=True, slots=True)

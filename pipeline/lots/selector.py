@@ -256,45 +256,13 @@ def _within(day: datetime, low: datetime, high: datetime) -> bool:
     return low <= day < high
 
 
-def _row_lot(version: Version, one: Wanted) -> bool:
-    return one.fits(version.published.lot)
-
-
-def _row_type(version: Version, one: Wanted) -> bool:
-    return one.fits(version.published.motor_type)
-
-
-def _row_station(version: Version, one: Wanted) -> bool:
-    return any(one.fits(station) for station in version.published.stations)
-
-
-def _row_motor(version: Version, one: Wanted) -> bool:
-    return one.fits(version.motor_id)
-
-
-def _row_tag(version: Version, one: Wanted) -> bool:
-    return any(one.fits(tag) for tag in version.tags)
-
-
-def _row_status(version: Version, one: Wanted) -> bool:
-    return one.fits(version.status)
-
-
-def _row_version(version: Version, one: Wanted) -> bool:
-    return version.version.startswith(one.text)
-
-
-def _row_revision(version: Version, one: Wanted) -> bool:
-    return version.revision == int(one.text)
-
-
 ROW: Mapping[str, Callable[[Version, Wanted], bool]] = {
-    "lot": _row_lot,
-    "type": _row_type,
-    "station": _row_station,
-    "motor": _row_motor,
-    "tag": _row_tag,
-    "status": _row_status,
-    "version": _row_version,
-    "revision": _row_revision,
+    "lot": lambda version, one: one.fits(version.published.lot),
+    "type": lambda version, one: one.fits(version.published.motor_type),
+    "station": lambda version, one: any(map(one.fits, version.published.stations)),
+    "motor": lambda version, one: one.fits(version.motor_id),
+    "tag": lambda version, one: any(map(one.fits, version.tags)),
+    "status": lambda version, one: one.fits(version.status),
+    "version": lambda version, one: version.version.startswith(one.text),
+    "revision": lambda version, one: version.revision == int(one.text),
 }

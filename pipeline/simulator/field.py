@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from pipeline.simulator.plant import Plant
 
+Array = NDArray[np.float64]
+
 SQRT3 = math.sqrt(3.0)
 
 
@@ -333,13 +335,7 @@ def cogging(theta: float, p: Plant) -> float:
 
 
 @njit(cache=True)
-def fluxes(
-    i_d: NDArray[np.float64],
-    i_q: NDArray[np.float64],
-    eps: NDArray[np.float64],
-    degc: float,
-    p: Plant,
-) -> NDArray[np.float64]:
+def fluxes(i_d: Array, i_q: Array, eps: Array, degc: float, p: Plant) -> Array:
     """Flux [n, 2] of currents [n] at electrical angles [n].
 
     Parameters
@@ -363,13 +359,7 @@ def fluxes(
 
 
 @njit(cache=True)
-def torques(
-    i_d: NDArray[np.float64],
-    i_q: NDArray[np.float64],
-    eps: NDArray[np.float64],
-    degc: float,
-    p: Plant,
-) -> NDArray[np.float64]:
+def torques(i_d: Array, i_q: Array, eps: Array, degc: float, p: Plant) -> Array:
     """Electromagnetic torque [n] of currents [n] at electrical angles [n], cogging not in.
 
     Parameters
@@ -395,7 +385,7 @@ def torques(
 
 
 @njit(cache=True)
-def inductances(eps: NDArray[np.float64], degc: float, p: Plant) -> NDArray[np.float64]:
+def inductances(eps: Array, degc: float, p: Plant) -> Array:
     """Incremental Ld, Lq, Ldq [n, 3] at zero current, at electrical angles [n].
 
     Parameters
@@ -418,7 +408,7 @@ def inductances(eps: NDArray[np.float64], degc: float, p: Plant) -> NDArray[np.f
 
 
 @njit(cache=True)
-def open_flux(eps: NDArray[np.float64], degc: NDArray[np.float64], p: Plant) -> NDArray[np.float64]:
+def open_flux(eps: Array, degc: Array, p: Plant) -> Array:
     """Phase flux linkages a, b, c [n, 3] with the terminals open, at electrical angles [n].
 
     Parameters
@@ -443,9 +433,7 @@ def open_flux(eps: NDArray[np.float64], degc: NDArray[np.float64], p: Plant) -> 
 
 
 @njit(cache=True)
-def open_emf(
-    eps: NDArray[np.float64], omega_elec: NDArray[np.float64], degc: NDArray[np.float64], p: Plant
-) -> NDArray[np.float64]:
+def open_emf(eps: Array, omega_elec: Array, degc: Array, p: Plant) -> Array:
     """Phase voltages with the terminals open.
 
     Parameters

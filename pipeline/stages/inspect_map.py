@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from pipeline.execution.jobs import OfFile
 from pipeline.execution.tasks.inspect_tasks import InspectTask, Looked, in_workers, look_into
 from pipeline.io.ingest.files import list_files, size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading
@@ -32,32 +33,10 @@ _STATED = frozenset(METADATA) - {"contract", "sha256_rows"}
 
 
 @dataclass(frozen=True, slots=True)
-class PreviewTask:
+class PreviewTask(OfFile):
     """A file to show through a map that is not written yet."""
 
-    folder: str
-    file: str
-    limits: ReadLimits
     map_text: str
-    refused: str | None = None
-
-    @property
-    def name(self) -> str:
-        """What the task works on."""
-        return f"file {printable(self.file)}"
-
-    def without(self, path: str, reason: str) -> PreviewTask:  # noqa: ARG002 (it has one file)
-        """The task with its file refused for a reason.
-
-        Parameters
-        ----------
-        path
-            The file, relative to the input folder.
-        reason
-            The reason, in words.
-
-        """
-        return replace(self, refused=reason)
 
 
 def check_answers(settings: InspectSettings) -> None:

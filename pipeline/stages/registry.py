@@ -6,6 +6,7 @@ import re
 import shlex
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime, time
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -144,14 +145,6 @@ def _verify(registry: Registry, settings: RegistrySettings) -> Outcome:
     return Outcome(1 if found.faults else 0, text, errors, result=found)
 
 
-def _approve(registry: Registry, settings: RegistrySettings) -> Outcome:
-    return _decide("approve", registry, settings)
-
-
-def _revoke(registry: Registry, settings: RegistrySettings) -> Outcome:
-    return _decide("revoke", registry, settings)
-
-
 def _decide(
     kind: Literal["approve", "revoke"], registry: Registry, settings: RegistrySettings
 ) -> Outcome:
@@ -178,15 +171,7 @@ def _decide(
     )
 
 
-def _tag(registry: Registry, settings: RegistrySettings) -> Outcome:
-    return _name(registry, settings, "tag")
-
-
-def _untag(registry: Registry, settings: RegistrySettings) -> Outcome:
-    return _name(registry, settings, "untag")
-
-
-def _name(registry: Registry, settings: RegistrySettings, kind: Literal["tag", "untag"]) -> Outcome:
+def _name(kind: Literal["tag", "untag"], registry: Registry, settings: RegistrySettings) -> Outcome:
     """Gives the newest version of each motor that `select` takes, or one motor's, a name."""
     tag, by = _needed(settings, "tag", "by")
     if not TAG.fullmatch(tag):
@@ -215,10 +200,10 @@ ACTIONS: Mapping[str, Callable[[Registry, RegistrySettings], Outcome]] = {
     "diff": _diff,
     "at": _at,
     "verify": _verify,
-    "approve": _approve,
-    "revoke": _revoke,
-    "tag": _tag,
-    "untag": _untag,
+    "approve": partial(_decide, "approve"),
+    "revoke": partial(_decide, "revoke"),
+    "tag": partial(_name, "tag"),
+    "untag": partial(_name, "untag"),
 }
 
 

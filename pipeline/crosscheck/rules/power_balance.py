@@ -15,6 +15,8 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
 
+Array = NDArray[np.float64]
+
 NAME = "power_balance"
 COLUMNS = ("t_s", "vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm")
 SPEEDS = ("theta_mech_rad", "omega_mech_rad_s")
@@ -67,7 +69,7 @@ def _gains(captures: Sequence[Capture]) -> list[float]:
     return [max(meta.instrument_u(key) for meta in metas) for key in keys]
 
 
-def _speed(data: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+def _speed(data: Mapping[str, Array]) -> Array:
     """Shaft speed [n, rad/s]: the angle's own rate where there, else the bench's."""
     if "theta_mech_rad" not in data:
         return data["omega_mech_rad_s"]
@@ -76,7 +78,7 @@ def _speed(data: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     return smooth_speed(t_s, data["theta_mech_rad"], width_s)
 
 
-def _blocks(capture: Capture, r_phase_ohm: float | None) -> NDArray[np.float64]:
+def _blocks(capture: Capture, r_phase_ohm: float | None) -> Array:
     """Block means [n, 8]: net power, i_q omega, shaft power, i², |i|, |omega|, omega², 1; SI.
 
     Copper loss at the winding's temperature is taken off where R and the temperature are known,
@@ -108,11 +110,11 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> NDArray[np.float64]:
     rows = np.column_stack([*columns, np.ones(omega.size)])
     size = max(1, rows.shape[0] // BINS)
     usable = rows[: rows.shape[0] // size * size]
-    means: NDArray[np.float64] = usable.reshape(-1, size, rows.shape[1]).mean(axis=1)
+    means: Array = usable.reshape(-1, size, rows.shape[1]).mean(axis=1)
     return means
 
 
-def _slope(blocks: NDArray[np.float64]) -> tuple[float, float]:
+def _slope(blocks: Array) -> tuple[float, float]:
     """Coefficient of shaft power by the instrument in column 1, and its standard uncertainty.
 
     Sandwich with five lags (Newey and West, Econometrica 55, 1987): blocks neither scatter alike

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from pipeline.execution.jobs import OfFiles
 from pipeline.io.ingest.files import size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading, refusing
 from pipeline.io.ingest.survey import Entry
@@ -17,33 +18,19 @@ from pipeline.records.outcome import Stopwatch
 
 
 @dataclass(frozen=True, slots=True)
-class ReadTask:
-    """One motor's files; `refused` are those that must not be read, with the reason."""
+class ReadTask(OfFiles):
+    """One motor's files."""
 
     motor_id: str
     folder: str
     entries: tuple[Entry, ...]
     limits: ReadLimits
     gates: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    refused: tuple[tuple[str, str], ...] = ()
 
     @property
     def name(self) -> str:
         """What the task works on."""
         return f"motor {printable(self.motor_id)}"
-
-    def without(self, path: str, reason: str) -> ReadTask:
-        """The task with a file refused for a reason.
-
-        Parameters
-        ----------
-        path
-            The file, relative to the input folder.
-        reason
-            The reason, in words.
-
-        """
-        return replace(self, refused=(*self.refused, (path, reason)))
 
 
 Usable = tuple[tuple[Capture, ...], tuple[Finding, ...]]

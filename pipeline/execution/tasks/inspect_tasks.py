@@ -8,13 +8,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from pipeline.execution.jobs import OfFile
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.files import size_bytes
-from pipeline.io.ingest.guard import ReadLimits, died, reading
+from pipeline.io.ingest.guard import died, reading
 from pipeline.records.errors import CaptureError, MachineError
 from pipeline.records.finding import Finding
-from pipeline.records.naming import printable
 
 if TYPE_CHECKING:
     from pipeline.io.inspection.describe import InspectReport
@@ -22,37 +22,10 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class InspectTask:
-    """An untrusted file of a folder to inspect; `refused` is why it must not be read."""
+class InspectTask(OfFile):
+    """An untrusted file of a folder to inspect."""
 
-    folder: str
-    file: str
-    limits: ReadLimits
     answers: Mapping[str, str]
-    refused: str | None = None
-
-    @property
-    def name(self) -> str:
-        """What the task works on."""
-        return f"file {printable(self.file)}"
-
-    @property
-    def place(self) -> Path:
-        """Where the file lies."""
-        return Path(self.folder) / self.file
-
-    def without(self, path: str, reason: str) -> InspectTask:  # noqa: ARG002 (it has one file)
-        """The task with its file refused for a reason.
-
-        Parameters
-        ----------
-        path
-            The file, relative to the input folder.
-        reason
-            The reason, in words.
-
-        """
-        return replace(self, refused=reason)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
+from pipeline.execution.jobs import OfFiles
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.files import size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading
@@ -19,7 +20,7 @@ SMALLEST_BATCH = 16
 
 
 @dataclass(frozen=True, slots=True)
-class SurveyTask:
+class SurveyTask(OfFiles):
     """Files to identify in one task."""
 
     folder: str
@@ -27,25 +28,11 @@ class SurveyTask:
     sources: Mapping[str, SourceMap]
     recover: bool
     limits: ReadLimits
-    refused: tuple[tuple[str, str], ...] = ()
 
     @property
     def name(self) -> str:
         """What the task works on."""
         return f"the survey of {self.questions[0].path} and {len(self.questions) - 1} more files"
-
-    def without(self, path: str, reason: str) -> SurveyTask:
-        """The task with a file refused for a reason.
-
-        Parameters
-        ----------
-        path
-            The file, relative to the input folder.
-        reason
-            The reason, in words.
-
-        """
-        return replace(self, refused=(*self.refused, (path, reason)))
 
 
 def survey_files(task: SurveyTask) -> tuple[Answer, ...]:

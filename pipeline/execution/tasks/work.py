@@ -73,7 +73,9 @@ def read(job: MotorJob, watch: Stopwatch) -> Usable:
         Takes the time of each stage [s].
 
     """
-    task = ReadTask(job.motor_id, job.input, job.entries, job.limits, job.gates, job.refused)
+    task = ReadTask(
+        job.motor_id, job.input, job.entries, job.limits, job.gates, refused=job.refused
+    )
     return usable_captures(task, watch)
 
 

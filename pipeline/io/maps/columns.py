@@ -18,6 +18,8 @@ from pipeline.io.tables.raw_table import RawTable
 from pipeline.physics.glossary import COLUMNS, suffix_of
 from pipeline.records.errors import CaptureError
 
+Array = NDArray[np.float64]
+
 JOINT_COLUMNS = {
     "position": "theta_mech_rad",
     "velocity": "omega_mech_rad_s",
@@ -238,9 +240,7 @@ def _mechanical(part: FieldMap, pole_pairs: int | None) -> FieldMap:
     return replace(part, scale=part.scale / pole_pairs)
 
 
-def _converted(
-    values: NDArray[Any], part: FieldMap, units: Mapping[str, str]
-) -> NDArray[np.float64]:
+def _converted(values: NDArray[Any], part: FieldMap, units: Mapping[str, str]) -> Array:
     """Values in the column's unit, infinite where no double holds one, which is a reading that is
     missing; raises CaptureError for complex ones.
     """
@@ -266,9 +266,7 @@ def _converted(
         return numbers + shift if shift else numbers
 
 
-def _time(
-    table: RawTable, clock: FieldMap | None, source: SourceMap | None
-) -> NDArray[np.float64] | None:
+def _time(table: RawTable, clock: FieldMap | None, source: SourceMap | None) -> Array | None:
     origin = "field" if source is None else source.time.origin
     if origin == "increment" and source is not None:
         return _counted(table.rows, source.time.start_s, source.time.increment_s)
@@ -290,7 +288,7 @@ def _time(
     return time + increment * _place_in_block(table.log_time_ns)
 
 
-def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
+def _even(time: Array) -> Array:
     """The straight line through rounded times [s]; a gap that rounding cannot explain is refused.
 
     The printed times carry three digits or more, so each lies within 0.5 % of the line.
@@ -300,7 +298,7 @@ def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
     row = np.arange(time.size, dtype=np.float64)
     row -= row.mean()
     step = float(row @ time / (row @ row))
-    line: NDArray[np.float64] = time.mean() + step * row
+    line: Array = time.mean() + step * row
     off = np.abs(time - line) > 0.006 * np.abs(time) + abs(step)
     if step <= 0 or off.any():
         first = int(np.argmax(off))
@@ -313,7 +311,7 @@ def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
     return line
 
 
-def _counted(rows: int, start_s: float, increment_s: float | None) -> NDArray[np.float64]:
+def _counted(rows: int, start_s: float, increment_s: float | None) -> Array:
     if increment_s is None:
         raise CaptureError(
             "missing_time",
@@ -323,15 +321,15 @@ def _counted(rows: int, start_s: float, increment_s: float | None) -> NDArray[np
     return start_s + increment_s * np.arange(rows, dtype=np.float64)
 
 
-def _place_in_block(log_time_ns: NDArray[np.uint64]) -> NDArray[np.float64]:
+def _place_in_block(log_time_ns: NDArray[np.uint64]) -> Array:
     """Number of each row within its block [rows]; rows of one block share the log time."""
     first = np.flatnonzero(np.diff(log_time_ns, prepend=log_time_ns[:1] + np.uint64(1)))
     size = np.diff(np.append(first, log_time_ns.size))
-    place: NDArray[np.float64] = np.arange(log_time_ns.size, dtype=np.float64)
+    place: Array = np.arange(log_time_ns.size, dtype=np.float64)
     return place - np.repeat(first, size)
 
 
-def _from_field(table: RawTable, clock: FieldMap, source: SourceMap | None) -> NDArray[np.float64]:
+def _from_field(table: RawTable, clock: FieldMap, source: SourceMap | None) -> Array:
     """Time from a field; whole-number clocks count from the first row, so no digit is lost."""
     values = table.fields[clock.field]
     if values.dtype.kind in "iu" and values.size:

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from rerun import RecordingStream
     from rerun.blueprint import Blueprint
 
+Array = NDArray[np.float64]
+
 ROWS_A_CHUNK = 4096
 OPEN_FILES = Path("/proc/self/fd")
 TIME, ROW, PACK = "t", "row", "samples"
@@ -63,10 +65,7 @@ class Recording:
 
 @contextmanager
 def recording(
-    name: str,
-    identity: Sequence[str],
-    layout: Blueprint | None,
-    ids: tuple[str, str] | None = None,
+    name: str, identity: Sequence[str], layout: Blueprint | None, ids: tuple[str, str] | None = None
 ) -> Iterator[Recording]:
     """A recording called `name` with an id made of `identity`: equal work, equal id.
 
@@ -165,7 +164,7 @@ def digest(parts: Sequence[str]) -> str:
     return hashlib.sha256("\n".join(parts).encode("utf-8", "surrogatepass")).hexdigest()[:32]
 
 
-def timed(entity: str, t_s: NDArray[np.float64], values: pl.DataFrame) -> Trace:
+def timed(entity: str, t_s: Array, values: pl.DataFrame) -> Trace:
     """A trace on the time line; rows whose instant is not finite have no place there.
 
     Parameters
@@ -184,7 +183,7 @@ def timed(entity: str, t_s: NDArray[np.float64], values: pl.DataFrame) -> Trace:
     return Trace(entity, TIME, kept.insert_column(0, index))
 
 
-def nanoseconds(t_s: NDArray[np.float64]) -> NDArray[np.int64]:
+def nanoseconds(t_s: Array) -> NDArray[np.int64]:
     """Instants as whole nanoseconds; a float of seconds would lose some.
 
     Parameters
@@ -264,8 +263,8 @@ def send_property(stream: RecordingStream, name: str, values: dict[str, Any]) ->
 def send_bars(
     stream: RecordingStream,
     entity: str,
-    values: NDArray[np.float64],
-    left: NDArray[np.float64],
+    values: Array,
+    left: Array,
     width: float,
     colour: Colour,
     at: tuple[str, int] | None = None,
@@ -329,7 +328,7 @@ def send_axis_ends(
     stream.log(entity, marks, static=True)
 
 
-def tensor(values: NDArray[np.float64]) -> Any:
+def tensor(values: Array) -> Any:
     """One row of a column of tensors; a bare list of arrays would become one of more axes.
 
     Parameters
