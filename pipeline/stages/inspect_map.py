@@ -51,12 +51,12 @@ def check_answers(settings: InspectSettings) -> None:
     from pipeline.records.stated import may_be_stated
 
     for key in settings.answers:
-        of_field = key.startswith(("unit.", "column.", "scale."))
+        of_field = key.startswith(("unit.", "column.", "scale.", "times."))
         constant = may_be_stated(key.removeprefix("u_"))
         if not (of_field or constant or key in _STATED or key == "increment_s"):
             raise UsageError(
                 f"inspect: no key or metadata {key!r}",
-                "answers are unit.NAME, scale.NAME, column.NAME, increment_s, "
+                "answers are unit.NAME, scale.NAME, times.NAME, column.NAME, increment_s, "
                 f"{', '.join(sorted(_STATED))}",
             )
     if settings.map and Path(settings.map).exists():

@@ -10,7 +10,7 @@ from functools import cache
 from pipeline.io.inspection.aliases import alias
 from pipeline.io.inspection.vocabulary import QUALIFIERS, QUANTITIES, SYMBOLS
 from pipeline.io.maps.columns import last_part
-from pipeline.io.maps.units import FOREIGN_UNITS, normal_unit
+from pipeline.io.maps.units import COUNTS, FOREIGN_UNITS, normal_unit
 from pipeline.physics.glossary import COLUMNS
 
 _BRACKET = re.compile(r"^(.+?)\s*[(\[{<]\s*([^)\]}>]*?)\s*[)\]}>]\s*$")
@@ -67,6 +67,8 @@ def read_label(name: str, unit_row: str | None = None) -> Label:
     found = tuple(c for c in _columns(stem) if not dimensions or COLUMNS[c].unit in dimensions)
     if not text:
         head, _, tail = stem.replace(" ", "_").rpartition("_")
+        if head and normal_unit(tail) == COUNTS:
+            return Label(_columns(head), None, tail)
         ended = tuple(c for c in _columns(head) if known_unit(COLUMNS[c].unit, tail) is not None)
         if ended and tail not in _LETTERS:
             found, text = ended, tail
@@ -75,7 +77,10 @@ def read_label(name: str, unit_row: str | None = None) -> Label:
     if not found and dimensions:
         found = _of_dimension(stem, dimensions)
     unit = known_unit(COLUMNS[found[0]].unit, text) if found and text else None
-    implied = _IMPLIED.get(_key(stem)) if found and not text else None
+    implied = None
+    if found and not text:
+        names = _key(stem), *words_of(stem)[-1:]
+        implied = next((_IMPLIED[name] for name in names if name in _IMPLIED), None)
     return Label(found, unit or implied, text)
 
 

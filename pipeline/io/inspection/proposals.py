@@ -42,6 +42,7 @@ class FieldSeen:
     certain: bool = False
     wraps: float | None = None
     scale: float | None = None
+    times: str | None = None
     per_pole_pair: bool = False
     question: tuple[str, str] | None = None
     why: str = ""
@@ -250,10 +251,14 @@ def _stated(field: FieldSeen, label: Label, answers: Mapping[str, str]) -> Field
         return field
     key = f"unit.{answer_key(field.name)}"
     text = answers.get(key, label.unit_text)
+    times = answers.get(f"times.{answer_key(field.name)}")
+    if times is not None:
+        field = replace(field, times=times)
     unit = known_unit(COLUMNS[field.column].unit, text) if text else label.unit
     scale = number(answers.get(f"scale.{answer_key(field.name)}", ""))
     if text and normal_unit(text) == COUNTS and scale:
         return replace(field, unit=COUNTS, scale=scale)
+    field = replace(field, scale=scale if times is not None else None)
     if key in answers and unit is None:
         known = ", ".join(FOREIGN_UNITS[COLUMNS[field.column].unit])
         raise UsageError(f"{key}={text} is no unit of {field.column}", f"use one of {known}")

@@ -196,6 +196,7 @@ def _field_line(seen: FieldSeen) -> str:
         return f"# {line}   # asked: {seen.question[1]}{why}"
     parts += [f"unit: {_quoted(seen.unit)}"] if seen.unit else []
     parts += [f"scale: {seen.scale!r}"] if seen.scale else []
+    parts += [f"times: {_quoted(seen.times)}"] if seen.times else []
     parts += [f"wraps: {seen.wraps:.12g}"] if seen.wraps else []
     parts += ["per_pole_pair: true"] if seen.per_pole_pair else []
     note = "" if seen.certain else "   # probably: check column, unit and sign"

@@ -213,12 +213,23 @@ def to_frame(
     }
     if not columns:
         return None
+    named = {part.field: part.column for part in chosen}
+    for part in (part for part in chosen if part.times is not None):
+        columns[part.column] = columns[part.column] * columns[_factor(part, named)]
     clock = next((part for part in chosen if part.column == "t_s"), None)
     time = _time(table, clock, source)
     if time is not None:
         columns = {"t_s": time} | columns
     frame = pl.DataFrame(columns)
     return frame if source is None else _without_blank_rows(frame)
+
+
+def _factor(part: FieldMap, named: Mapping[str, str]) -> str:
+    """The column that a field is a share of; raises CaptureError where the file lacks it."""
+    if part.times not in named:
+        words = f"{part.field!r} is a share of {part.times!r}, which the file lacks"
+        raise CaptureError("missing_column", words, "log it too, or state its size as `scale`")
+    return named[part.times]
 
 
 def _without_blank_rows(frame: pl.DataFrame) -> pl.DataFrame:

@@ -125,6 +125,14 @@ KEYS: tuple[Key, ...] = (
         "65536",
     ),
     Key(
+        "fields.*.times",
+        "text",
+        "field of the map that this one is a share of: a duty cycle times the bus voltage; `scale` "
+        "is the voltage at full duty over the bus voltage (1 of a DC motor's bridge, 0.5 or 0.577 "
+        "of the amplitude that a sine or a space vector modulation makes)",
+        "bus_voltage",
+    ),
+    Key(
         "time.from",
         ("field", "even", "log", "increment"),
         "where `t_s` comes from: a field; a field whose digits are too few, evenly spaced; the "

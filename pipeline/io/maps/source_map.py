@@ -42,6 +42,8 @@ class FieldMap:
     wraps
         Span after which a counter or an angle starts again [the field's own numbers]; a clock
         continues forwards, anything else by the shorter way.
+    times
+        Field of the map, in its column's unit, of which this one is a share; None for none.
 
     """
 
@@ -53,6 +55,7 @@ class FieldMap:
     offset: float = 0.0
     per_pole_pair: bool = False
     wraps: float | None = None
+    times: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -522,11 +525,17 @@ def _fields(section: Section) -> tuple[FieldMap, ...]:
         unit, per_pole_pair = part.text("unit"), part.flag("per_pole_pair", False)
         if unit and normal_unit(unit) == COUNTS and scale == 1.0:
             raise part.fault("unit", "counts have no size", "write what one is into `scale`")
-        wraps = _positive(part, "wraps")
+        wraps, times = _positive(part, "wraps"), part.text("times")
         fields.append(
-            FieldMap(name, column, unit, sign, scale, offset or 0.0, per_pole_pair, wraps)
+            FieldMap(name, column, unit, sign, scale, offset or 0.0, per_pole_pair, wraps, times)
         )
         part.close()
+    known = {part.field for part in fields if part.column != "t_s" and part.times is None}
+    for part in fields:
+        if part.times is not None and part.times not in known:
+            raise Section(section.source, f"fields.{part.field}", {}).fault(
+                "times", f"{part.times!r} is no field of the map", "map that field to its column"
+            )
     return tuple(fields)
 
 

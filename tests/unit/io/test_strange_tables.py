@@ -14,6 +14,7 @@ from pipeline.io.inspection.proposals import propose
 from pipeline.io.maps.source_map import parse_source_file
 from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.capture import Capture
+from pipeline.records.errors import UsageError
 
 
 def looked(folder: Path, name: str, data: bytes, **answers: str) -> tuple[InspectReport, Capture]:
@@ -117,3 +118,55 @@ def test_stamps_of_joint_states_are_not_taken_for_the_clock_of_the_log() -> None
     log = (np.arange(300) * 10_000_000).astype(np.uint64)
     seen = propose(RawTable("/joint_states", fields, log, joint_state=True), {})
     assert [one.column for one in seen] == [None, "theta_mech_rad"]
+
+
+def test_a_name_that_ends_in_rpm_is_in_rpm() -> None:
+    """The telemetry of an ESC: the word is the quantity and its unit."""
+    label = read_label("esc_rpm")
+    assert (label.columns, label.unit) == (("omega_mech_rad_s",), "rpm")
+    assert read_label("rpm_limit_source").unit is None
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"), [("Iq (A pk)", "A"), ("Moment [cNm]", "N·cm"), ("M [cN·m]", "N·cm")]
+)
+def test_units_that_benches_write(text: str, unit: str) -> None:
+    assert read_label(text).unit == unit
+
+
+def test_per_unit_columns_are_asked_for_their_base(tmp_path: Path) -> None:
+    data = b"time_s,iq_pu,vq_pu\n" + b"".join(b"%d,0.5,0.25\n" % k for k in range(9))
+    report, capture = looked(tmp_path, "dsp.csv", data, **{
+        "unit.iq_pu": "pu", "scale.iq_pu": "20"})  # fmt: skip
+    assert report.columns == {"t_s", "iq_a", "vq_v"}
+    assert "the unit of 'vq_pu' (vq_v)" in report.starter
+    np.testing.assert_allclose(capture.arrays("iq_a")["iq_a"], 10.0)
+
+
+def test_a_preamble_of_names_and_numbers_is_no_table(tmp_path: Path) -> None:
+    """A line of an oscilloscope's preamble is a name and a number, a row begins with a number."""
+    head = b"Model,DSO-X 2024A\nRecord Length,9\nSample Interval,1.0E-05\nUnits,s\n\nTIME,CH1\n"
+    data = head + b"".join(b"%.1e,%d\n" % (1e-5 * k, k) for k in range(9))
+    report, capture = looked(tmp_path, "scope.csv", data, **{
+        "column.CH1": "vab_v", "unit.CH1": "V", "unit.TIME": "s"})  # fmt: skip
+    assert report.columns == {"t_s", "vab_v"}
+    np.testing.assert_allclose(capture.arrays("vab_v")["vab_v"], np.arange(9.0))
+
+
+def test_a_duty_cycle_times_the_bus_voltage_is_a_voltage(tmp_path: Path) -> None:
+    rows = b"".join(b"%d,%d,%.1f\n" % (k, 10 * k, 48.0 - k) for k in range(9))
+    answers = {
+        "column.duty_pct": "vq_v",
+        "times.duty_pct": "bus_V",
+        "scale.duty_pct": "0.5",
+    }
+    _, capture = looked(tmp_path, "cart.csv", b"time_ms,duty_pct,bus_V\n" + rows, **answers)
+    k = np.arange(9.0)
+    np.testing.assert_allclose(capture.arrays("vq_v")["vq_v"], 0.5 * 0.1 * k * (48.0 - k))
+
+
+@pytest.mark.parametrize("other", ["speed", "t"])
+def test_a_share_of_what_the_map_does_not_have_is_a_usage_error(other: str) -> None:
+    text = f"fields: {{t: t_s, duty: {{column: vq_v, unit: '%', times: {other}}}}}\n"
+    with pytest.raises(UsageError, match="is no field of the map"):
+        parse_source_file(b"recognise: {files: ['*.csv']}\n" + text.encode(), "found")
