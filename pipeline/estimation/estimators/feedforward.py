@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -308,11 +309,32 @@ def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Esti
         if doubt is not None:
             contributions.append(doubt.part(f"{METHOD.name}:{name}", value))
             words.append(doubt.words("the value"))
+        if k == 3:
+            between = float(np.mean([_between_rows_s(part) for part in parts]))
+            contributions.append(Contribution("instant of the voltage's steps", between, "B"))
         if k < 3:
             scaled = {s: value * u_rel * float(shares[s]) for s, u_rel in gains.items()}
             contributions += [Contribution(s, u_gain, "B") for s, u_gain in scaled.items()]
         estimates.append(METHOD.measured(name, value, contributions, used, at, [*words, *notes]))
     return estimates
+
+
+def _between_rows_s(part: Part) -> float:
+    """Standard uncertainty [s] of the instant at which a logged voltage changes.
+
+    Notes
+    -----
+    A step that is in the log from one row to the next was anywhere between them, T/√12, and always
+    at the same place where log and drive go by one clock. Of a voltage that changes steadily each
+    row is known. How much of what changes are steps, the correlation of increments says that
+    follow each other: 1 of a ramp, 0 of steps.
+
+    """
+    steps, gaps = np.diff(part.voltage_v), np.diff(part.t_s)
+    period = float(np.median(gaps))
+    steps[gaps > 1.5 * period] = 0.0
+    steady = float(steps[1:] @ steps[:-1]) / (float(steps @ steps) or 1.0)
+    return min(1.0, 1.0 - steady) * period / math.sqrt(12.0)
 
 
 def _resolved(parts: Sequence[Part], values: Sequence[float]) -> bool:
