@@ -251,18 +251,15 @@ def _stated(field: FieldSeen, label: Label, answers: Mapping[str, str]) -> Field
         return field
     key = f"unit.{answer_key(field.name)}"
     text = answers.get(key, label.unit_text)
-    times = answers.get(f"times.{answer_key(field.name)}")
-    if times is not None:
-        field = replace(field, times=times)
     unit = known_unit(COLUMNS[field.column].unit, text) if text else label.unit
     scale = number(answers.get(f"scale.{answer_key(field.name)}", ""))
     if text and normal_unit(text) == COUNTS and scale:
         return replace(field, unit=COUNTS, scale=scale)
-    field = replace(field, scale=scale if times is not None else None)
     if key in answers and unit is None:
         known = ", ".join(FOREIGN_UNITS[COLUMNS[field.column].unit])
         raise UsageError(f"{key}={text} is no unit of {field.column}", f"use one of {known}")
-    return replace(field, unit=unit)
+    times = answers.get(f"times.{answer_key(field.name)}")
+    return replace(field, unit=unit, times=times, scale=scale if times is not None else None)
 
 
 def _ask_unit(field: FieldSeen, factor: float | None) -> tuple[str, str]:

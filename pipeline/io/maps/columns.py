@@ -226,7 +226,7 @@ def to_frame(
 
 def _factor(part: FieldMap, named: Mapping[str, str]) -> str:
     """The column that a field is a share of; raises CaptureError where the file lacks it."""
-    if part.times not in named:
+    if part.times is None or part.times not in named:
         words = f"{part.field!r} is a share of {part.times!r}, which the file lacks"
         raise CaptureError("missing_column", words, "log it too, or state its size as `scale`")
     return named[part.times]

@@ -530,11 +530,11 @@ def _fields(section: Section) -> tuple[FieldMap, ...]:
             FieldMap(name, column, unit, sign, scale, offset or 0.0, per_pole_pair, wraps, times)
         )
         part.close()
-    known = {part.field for part in fields if part.column != "t_s" and part.times is None}
-    for part in fields:
-        if part.times is not None and part.times not in known:
-            raise Section(section.source, f"fields.{part.field}", {}).fault(
-                "times", f"{part.times!r} is no field of the map", "map that field to its column"
+    known = {one.field for one in fields if one.column != "t_s" and one.times is None}
+    for one in fields:
+        if one.times is not None and one.times not in known:
+            raise Section(section.source, f"fields.{one.field}", {}).fault(
+                "times", f"{one.times!r} is no field of the map", "map that field to its column"
             )
     return tuple(fields)
 

@@ -20,8 +20,18 @@ TRUE = {
 }
 
 
-def log(seed: int, load_nm: float = 0.4, noise_nm: float = 2e-3, computed: bool = False) -> Capture:
-    """Speed of both senses under a load of steps; `computed`: torque is Kt times the current."""
+def log(
+    seed: int,
+    load_nm: float = 0.4,
+    noise_nm: float = 2e-3,
+    computed: bool = False,
+    amps: float = 0.0,
+    force: float = 0.0,
+    **meta: float,
+) -> Capture:
+    """Speed of both senses under a load of steps; `computed`: torque is Kt times the current;
+    `amps` and `force` are gains of the sensors, less one.
+    """
     rng = np.random.default_rng(seed)
     t_s = np.arange(0.0, 16.0, 1e-3)
     rates, phases = rng.uniform(1.0, 12.0, 5), rng.uniform(0.0, 2 * np.pi, 5)
@@ -38,11 +48,12 @@ def log(seed: int, load_nm: float = 0.4, noise_nm: float = 2e-3, computed: bool 
         "drive",
         f"d{seed}",
         t_s=t_s,
-        iq_a=noisy,
+        iq_a=noisy * (1.0 + amps),
         id_a=0.0 * t_s,
         theta_mech_rad=np.round(theta / step) * step,
-        torque_shaft_nm=torque,
+        torque_shaft_nm=torque * (1.0 + force),
         temp_magnet_degc=np.full(t_s.size, 25.0),
+        **meta,
     )
 
 
