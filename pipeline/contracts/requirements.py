@@ -128,7 +128,12 @@ def requirements(test: str, pair: str | None = None) -> tuple[Requirement, ...]:
     terminals = tuple(group for one in pairs for group in _terminals(one))
     words = f"v{pair}_v and {' or '.join(f'i{p}_a' for p in pair)}" if pair in PAIRS else ""
     anywhere = words or "the voltage and the line current of one terminal pair"
-    if test in ("resistance", "current_step"):
+    if test == "resistance":
+        shown = tuple((f"r{one}_ohm",) for one in pairs)
+        table = f"{anywhere}, or {' or '.join(name for (name,) in shown)} of an ohmmeter"
+        clock = Requirement((("t_s",), *shown), "t_s")
+        return clock, Requirement((*terminals, *shown), table), *fixed
+    if test == "current_step":
         fixed = (Requirement(terminals, anywhere), *fixed)
     if test == "heat_run":
         fixed = (Requirement((DQ, *terminals), f"vd_v, vq_v, id_a, iq_a or {anywhere}"), *fixed)

@@ -14,7 +14,7 @@ import numpy as np
 import polars as pl
 
 from pipeline.contracts.requirements import requirements
-from pipeline.physics.glossary import COLUMNS, METADATA, TESTS, TESTS_WITHOUT_CLOCK, Term
+from pipeline.physics.glossary import COLUMNS, METADATA, TESTS, Term, has_clock
 from pipeline.records.capture import Capture, CaptureMeta
 from pipeline.records.errors import CaptureError, merged
 
@@ -222,7 +222,7 @@ def check_columns(capture: Capture) -> None:
             f"{test} needs {needs}; the file has {', '.join(sorted(there)) or 'none'}{blank}",
             _remedy(test, there),
         )
-    if test not in TESTS_WITHOUT_CLOCK:
+    if has_clock(test, capture.columns):
         _every_table_has_a_clock(capture)
 
 

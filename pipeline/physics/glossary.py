@@ -128,7 +128,9 @@ def _columns() -> Iterable[Term]:
     yield column("theta_elec_deg", "deg", "electrical angle of a locked rotor", -1e5, 1e5)
     for pair in ("ab", "bc", "ca"):
         yield column(f"l{pair}_h", "H", f"inductance between {pair[0]} and {pair[1]}", 0.0, 10.0)
-    yield column("rab_ohm", "ohm", "resistance between a and b", 0.0, 1e4)
+    for pair in ("ab", "bc", "ca"):
+        words = f"resistance between {pair[0]} and {pair[1]}"
+        yield column(f"r{pair}_ohm", "ohm", words, 0.0, 1e4)
     yield column("freq_hz", "Hz", "frequency of the LCR meter", 0.0, 1e7)
 
 
@@ -242,3 +244,20 @@ TESTS: dict[str, str] = {
 }
 TESTS_WITHOUT_CLOCK = frozenset({"lcr", "flux_map", "torque_table"})
 """Tests whose captures are tables: their rows come in no time."""
+OHMMETER = ("rab_ohm", "rbc_ohm", "rca_ohm")
+"""What an ohmmeter shows of each terminal pair: a `resistance` capture may be a table of them."""
+
+
+def has_clock(test: str, columns: frozenset[str]) -> bool:
+    """Whether the rows of a capture come in time, and are not those of a table.
+
+    Parameters
+    ----------
+    test
+        Its test.
+    columns
+        Columns that it holds.
+
+    """
+    table = test == "resistance" and "t_s" not in columns and not columns.isdisjoint(OHMMETER)
+    return test not in TESTS_WITHOUT_CLOCK and not table

@@ -15,7 +15,7 @@ from pipeline.io.ingest.files import list_files, size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading
 from pipeline.io.ingest.metadata import MANIFEST, SIDECAR_SUFFIX
 from pipeline.io.storage.publish import write_whole
-from pipeline.physics.glossary import METADATA, TESTS_WITHOUT_CLOCK
+from pipeline.physics.glossary import METADATA, OHMMETER, TESTS_WITHOUT_CLOCK
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.finding import lines_of
 from pipeline.records.naming import counted, printable
@@ -249,7 +249,8 @@ def _questions(
     for shape, _ in groups:
         found |= dict(seen.question for seen in shape.fields if seen.question)
         timeless = settings.answers.get("test") in TESTS_WITHOUT_CLOCK or shape.topics
-        if not timeless and not any(seen.column == "t_s" for seen in shape.fields):
+        columns = {seen.column for seen in shape.fields}
+        if not timeless and columns.isdisjoint(("t_s", *OHMMETER)):
             found["increment_s"] = "s from row to row, where rows follow a clock"
         if any(seen.per_pole_pair for seen in shape.fields):
             found["pole_pairs"] = "electrical speed is divided by them"

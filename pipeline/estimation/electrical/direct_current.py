@@ -25,6 +25,7 @@ from pipeline.estimation.uncertainty.instruments import (
 )
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import find_plateaus
+from pipeline.physics.glossary import OHMMETER
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 
 TEST = "resistance"
@@ -103,6 +104,9 @@ def direct_current_points(
     notes: list[str] = []
     temp_assumed_degc = options["temp_assumed_degc"]
     for index, capture in enumerate(campaign.of(TEST)):
+        if capture.has("temp_winding_degc") and not capture.has("t_s"):
+            points += _of_ohmmeter(capture, index)
+            continue
         pair = pair_of(capture)
         if pair is None:
             notes.append(f"{capture.path}: which terminal pair is not stated")
@@ -119,6 +123,21 @@ def direct_current_points(
             notes.append(f"{capture.path}: no voltage and current of pair {pair}")
     largest = max((abs(p.i_a) for p in points), default=0.0)
     return [p for p in points if abs(p.i_a) > options["zero_crossing"] * largest], notes
+
+
+def _of_ohmmeter(capture: Capture, index: int) -> list[Point]:
+    """The rows of an ohmmeter's table, as voltages at one ampere.
+
+    Their noise is what they scatter; the meter's gain is that of a voltage over a current.
+    """
+    points = []
+    for column in (name for name in OHMMETER if capture.has(name)):
+        rows = capture.arrays(column, "temp_winding_degc")
+        for ohm, degc in zip(*rows.values(), strict=True):
+            if math.isfinite(ohm) and math.isfinite(degc):
+                means = float(ohm), 1.0, float(degc)
+                points.append(Point(index, column[1:3], *means, 0.0, 0.0, capture.meta))
+    return points
 
 
 def captures_of(campaign: Campaign, points: Sequence[Point]) -> tuple[Capture, ...]:

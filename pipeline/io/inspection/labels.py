@@ -248,12 +248,14 @@ def _of(quantity: str, marks: frozenset[str]) -> tuple[str, ...]:
     if quantity == "inductance":
         pairs = [pair for pair in ("ab", "bc", "ca") if pair in marks]
         return tuple(f"l{pair}_h" for pair in (pairs or ["ab"]))
+    if quantity == "resistance":
+        pairs = [pair for pair in ("ab", "bc", "ca") if pair in marks]
+        return tuple(f"r{pair}_ohm" for pair in (pairs or ["ab"]))
     simple = {
         "time": "t_s",
         "torque": "torque_shaft_nm",
         "speed": "omega_mech_rad_s",
         "angle": "theta_elec_rad" if "electrical" in marks else "theta_mech_rad",
-        "resistance": "rab_ohm",
         "frequency": "freq_hz",
     }
     return (simple[quantity],) if quantity in simple else ()
