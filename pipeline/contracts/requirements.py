@@ -131,8 +131,8 @@ def requirements(test: str, pair: str | None = None) -> tuple[Requirement, ...]:
     if test == "resistance":
         shown = tuple((f"r{one}_ohm",) for one in pairs)
         table = f"{anywhere}, or {' or '.join(name for (name,) in shown)} of an ohmmeter"
-        clock = Requirement((("t_s",), *shown), "t_s")
-        return clock, Requirement((*terminals, *shown), table), *fixed
+        timed = Requirement((("t_s",), *shown), "t_s")
+        return timed, Requirement((*terminals, *shown), table), *fixed
     if test == "current_step":
         fixed = (Requirement(terminals, anywhere), *fixed)
     if test == "heat_run":
