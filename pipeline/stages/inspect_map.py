@@ -53,11 +53,11 @@ def check_answers(settings: InspectSettings) -> None:
     for key in settings.answers:
         of_field = key.startswith(("unit.", "column.", "scale.", "times."))
         constant = may_be_stated(key.removeprefix("u_"))
-        if not (of_field or constant or key in _STATED or key == "increment_s"):
+        if not (of_field or constant or key in _STATED or key in ("increment_s", "captures")):
             raise UsageError(
                 f"inspect: no key or metadata {key!r}",
                 "answers are unit.NAME, scale.NAME, times.NAME, column.NAME, increment_s, "
-                f"{', '.join(sorted(_STATED))}",
+                f"captures, {', '.join(sorted(_STATED))}",
             )
     if settings.map and Path(settings.map).exists():
         raise UsageError(f"map={settings.map} is there already", "remove it, or name another file")
@@ -152,6 +152,7 @@ def finish(
     metadata = {key: value for key, value in settings.answers.items() if "." not in key}
     if unmapped:
         lines, text, asked = _drafted(settings, root, unmapped, metadata, listed=only is None)
+    metadata.pop("captures", None)
     if metadata or settings.map or text:
         text = _with_known(known, settings.config_dir, metadata, text)
     if text and settings.map:
@@ -224,7 +225,7 @@ def _groups(unmapped: Sequence[Looked]) -> list[tuple[Shape, list[str]]]:
 
 
 def _shape_lines(groups: Sequence[tuple[Shape, list[str]]], names: NamePatterns) -> list[str]:
-    from pipeline.io.inspection.text import field_line
+    from pipeline.io.inspection.text import field_line, part_lines
 
     lines: list[str] = []
     for number, (shape, files) in enumerate(groups, 1):
@@ -236,6 +237,7 @@ def _shape_lines(groups: Sequence[tuple[Shape, list[str]]], names: NamePatterns)
             clock = f" ({stream.clock})" if stream.clock else ""
             lines.append(f"  {counted(stream.rows, 'row')} in the first{rate}{clock}")
             lines += [f"    {field_line(seen)}" for seen in stream.fields]
+            lines += part_lines(stream.parts)
     if names.keys:
         lines.append(f"file names give {', '.join(sorted(names.keys))}")
     return lines
@@ -256,6 +258,10 @@ def _questions(
             found["pole_pairs"] = "electrical speed is divided by them"
     found |= {"motor_id": "the serial number", "test": "which test of the contract it is"}
     given = set(settings.answers) | names.keys
+    if any(stream.parts for shape, _ in groups for stream in shape.streams):
+        found["captures"] = "whether the files are cut into the parts above: captures=proposed"
+    if "captures" in settings.answers:
+        given |= {"test"}
     return {key: text for key, text in found.items() if key not in given}
 
 

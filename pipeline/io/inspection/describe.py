@@ -15,18 +15,20 @@ from pipeline.io.ingest.files import read_whole
 from pipeline.io.ingest.metadata import CONTRACT_VERSION, SIDECAR_SUFFIX, capture_meta
 from pipeline.io.ingest.survey import look, question_of
 from pipeline.io.inspection.file_names import name_patterns
+from pipeline.io.inspection.parts import parts_of
 from pipeline.io.inspection.proposals import FieldSeen, StreamSeen, propose
 from pipeline.io.inspection.sniff import encoding_of, numeric_columns, sniff
 from pipeline.io.inspection.starter_map import Shape, map_text
 from pipeline.io.maps.columns import to_frame
 from pipeline.io.maps.source_map import SourceMap
-from pipeline.io.maps.units import FOREIGN_UNITS
+from pipeline.io.maps.units import FOREIGN_UNITS, Scale
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.tables import read_tables
 from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT
 from pipeline.io.tables.csv_table import MAX_HEAD_BYTES, check_text, read_csv, split_comments
 from pipeline.io.tables.foreign import Reader, readers
 from pipeline.io.tables.raw_table import RawTable
+from pipeline.physics.glossary import COLUMNS
 from pipeline.records.errors import CaptureError
 from pipeline.records.naming import counted
 from pipeline.records.parse import whole
@@ -243,7 +245,9 @@ def _text(look_at: _Look) -> InspectReport:
             parsed = read_csv(data, dialect, numeric_columns(data[begin:], dialect))
             stated = "sha256_rows covers the rows, and holds"
             look_at.checksums = stated if parsed.verified else "none"
-            streams = (_stream(parsed.table, "text", look_at.answers),)
+            stream = _stream(parsed.table, "text", look_at.answers)
+            columns = _in_si_units(parsed.table, stream.fields)
+            streams = (replace(stream, parts=parts_of(look_at.name, columns)),)
             suffix = PurePosixPath(look_at.name).suffix
             marked = data.startswith(b"\xef\xbb\xbf")
             shape = Shape(streams, dialect, header, suffixes=(suffix,), marked=marked)
@@ -320,6 +324,19 @@ def _stream(table: RawTable, encoding: str, answers: Mapping[str, str]) -> Strea
     rate = 1.0 / step if step > 0 else None
     clock = "" if rate is None else _clock_words(steps, step)
     return StreamSeen(table.name, encoding, table.rows, rate, fields, clock)
+
+
+def _in_si_units(table: RawTable, fields: Sequence[FieldSeen]) -> dict[str, NDArray[np.float64]]:
+    """The columns [n] of a table whose unit is known."""
+    columns = {}
+    for seen in fields:
+        if seen.column is None or seen.question is not None or seen.wraps or seen.times:
+            continue
+        scale = FOREIGN_UNITS[COLUMNS[seen.column].unit].get(seen.unit or "", Scale(1.0))
+        values = table.fields[seen.name].astype(np.float64)
+        columns[seen.column] = values * (seen.scale or scale.factor) + scale.shift
+    time = _time_s(table, fields)
+    return columns if time is None else {**columns, "t_s": time}
 
 
 def _clock_words(steps: NDArray[np.float64], step: float) -> str:

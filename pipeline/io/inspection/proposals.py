@@ -13,6 +13,7 @@ import numpy as np
 
 from pipeline.io.inspection.evidence import Evidence, gather
 from pipeline.io.inspection.labels import Label, known_unit, read_label, words_of
+from pipeline.io.inspection.parts import PartSeen
 from pipeline.io.maps.columns import JOINT_COLUMNS
 from pipeline.io.maps.units import COUNTS, FOREIGN_UNITS, normal_unit
 from pipeline.io.tables.raw_table import RawTable
@@ -50,7 +51,9 @@ class FieldSeen:
 
 @dataclass(frozen=True, slots=True)
 class StreamSeen:
-    """One table or topic: rows, rate [Hz] (None without a clock), and its fields."""
+    """One table or topic: rows, rate [Hz] (None without a clock), its fields, and the `parts` of a
+    log that holds several tests.
+    """
 
     name: str
     encoding: str
@@ -58,6 +61,7 @@ class StreamSeen:
     rate_hz: float | None
     fields: tuple[FieldSeen, ...]
     clock: str = ""
+    parts: tuple[PartSeen, ...] = ()
 
 
 def answer_key(name: str) -> str:

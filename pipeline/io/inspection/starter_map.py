@@ -46,7 +46,11 @@ class Shape:
 
         """
         streams = tuple(
-            replace(one, fields=tuple(map(_clearer, one.fields, two.fields)))
+            replace(
+                one,
+                fields=tuple(map(_clearer, one.fields, two.fields)),
+                parts=(*one.parts, *two.parts),
+            )
             for one, two in zip(self.streams, other.streams, strict=True)
         )
         suffixes = tuple(dict.fromkeys([*self.suffixes, *other.suffixes]))
@@ -76,8 +80,8 @@ def map_text(
 ) -> str:
     """A source map in YAML for files of these shapes.
 
-    `answers` are metadata and `increment_s`. `by_name`: the file says `contract` and so has to
-    name the map that it is to be read by.
+    `answers` are metadata, `increment_s` and `captures`. `by_name`: the file says `contract` and so
+    has to name the map that it is to be read by.
 
     Parameters
     ----------
@@ -86,7 +90,7 @@ def map_text(
     names
         Patterns of their file names.
     answers
-        Metadata, and `increment_s`.
+        Metadata, `increment_s`, and `captures`, with which files are cut into the parts seen.
     by_name
         Whether the file states `contract`, so that it must name the map that it is read by.
 
@@ -98,6 +102,7 @@ def map_text(
     """
     given = dict(answers or {})
     increment = given.pop("increment_s", None)
+    cut = given.pop("captures", None) is not None
     lines = ["# A source map. Lines that are comments wait for an answer; docs/source-maps.md."]
     if by_name:
         text = "`# source: NAME` among its first lines"
@@ -107,11 +112,11 @@ def map_text(
     names = names or NamePatterns()
     lines += _metadata_lines(given, names)
     if len(shapes) == 1:
-        lines += _shape_lines(shapes[0], increment)
+        lines += _shape_lines(shapes[0], increment) + _capture_lines(shapes[0], cut)
     else:
         lines.append("variants:")
         for shape in shapes:
-            own = _shape_lines(shape, increment)
+            own = _shape_lines(shape, increment) + _capture_lines(shape, cut)
             lines += [f"  - {own[0]}", *(f"    {line}" for line in own[1:])]
     return "\n".join(lines) + "\n"
 
@@ -149,6 +154,16 @@ def _shape_lines(shape: Shape, increment: str | None) -> list[str]:
         else:
             lines.append("# time: {from: increment, increment_s: }   # s from row to row")
     return lines
+
+
+def _capture_lines(shape: Shape, cut: bool) -> list[str]:
+    """Parts that the rows show, as comments where nobody asked for them."""
+    parts = [part for stream in shape.streams for part in stream.parts]
+    if not parts:
+        return []
+    lines = ["captures:   # parts that the rows show; without them each file is one capture"]
+    lines += [f"  {one.line}   # {one.why}" for one in parts if one.test is not None]
+    return lines if cut else [f"# {line}" for line in lines]
 
 
 def _recognise(shape: Shape) -> str:

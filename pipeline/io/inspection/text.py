@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from pipeline.io.inspection.parts import PartSeen
 from pipeline.io.inspection.proposals import FieldSeen
 
 
@@ -23,3 +26,20 @@ def field_line(seen: FieldSeen) -> str:
     lacks = ", its unit is not stated" if seen.question else ""
     verb = "is" if seen.certain else "probably"
     return f"{name}: {verb} {seen.column}{unit}{lacks}{why}"
+
+
+def part_lines(parts: Sequence[PartSeen]) -> list[str]:
+    """What the rows of a log show of several tests in it, one line a part.
+
+    Parameters
+    ----------
+    parts
+        The parts.
+
+    """
+    several = len({part.file for part in parts}) > 1
+    return [
+        f"  rows {part.first}-{part.last}{f' of {part.file}' if several else ''}: {part.why}"
+        + (f"; test {part.test}" if part.test else "")
+        for part in parts
+    ]
