@@ -34,7 +34,7 @@ def test_a_coast_and_a_rest_are_parted_from_what_was_driven() -> None:
     assert (drive.last + 1, coast.last + 1) == (coast.first, rest.first)
     assert rest.last == TIME.size - 1
     assert "no current beyond 0.1 A" in coast.why
-    assert "driven for 6 s" in drive.why
+    assert "driven for 5.99 s" in drive.why
 
 
 def test_the_angle_alone_shows_the_same_coast() -> None:
