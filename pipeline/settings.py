@@ -209,7 +209,8 @@ class InspectSettings(ReadingSettings):
         {},
         "what the files do not say: unit.NAME=mA, scale.NAME=1e-4 of counts, column.NAME=iq_a or "
         "none, times.NAME=FIELD of a duty cycle, increment_s=1e-4, captures=proposed to cut files "
-        "into the parts that their rows show, and metadata such as motor_id=M1 test=drive pole_pairs=7",
+        "into the parts that their rows show, and metadata such as motor_id=M1 test=drive "
+        "pole_pairs=7",
     )
 
 
