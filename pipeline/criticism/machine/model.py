@@ -15,11 +15,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from pipeline.criticism.effect import (
-    UNLOGGED,
     Array,
     CoenergyHook,
     Complex,
@@ -49,9 +49,13 @@ class Constant:
     center
         Centre of a nuisance's prior [unit].
     hook
-        Where it enters.
+        Where it enters: `log` of a nuisance of the segments that have it in `fixed`.
     scale
-        What its standard uncertainty (`policy.priors`) is in multiples of.
+        What its standard uncertainty is in multiples of.
+    prior
+        Field of `policy.priors` with its standard uncertainty; the one of its own name without it.
+    curved
+        Whether it moves the true state or its time, so that no residual is linear along it.
 
     """
 
@@ -61,8 +65,25 @@ class Constant:
     center: float = 0.0
     hook: str = "drop"
     scale: str = "1"
+    prior: str = ""
+    curved: bool = False
+
+    def u(self, priors: Priors) -> float | None:
+        """Its standard uncertainty by the policy, in multiples of `scale`; None without a prior.
+
+        Parameters
+        ----------
+        priors
+            Of the policy.
+
+        """
+        return getattr(priors, self.prior or self.name, None)
 
 
+_of_log = partial(Constant, hook="log")
+"""A nuisance of some logs: its equation, or the cut of segments, has it in `fixed`."""
+_unlogged = partial(_of_log, unit="K", prior="unlogged_k", curved=True)
+_gain = partial(Constant, unit="1", hook="gain", prior="gain")
 BASE: tuple[Constant, ...] = (
     Constant("r_ohm", "ohm", "phase resistance at 25 °C", hook="drop"),
     Constant("ld_h", "H", "d inductance near zero current", hook="flux"),
@@ -79,31 +100,27 @@ BASE: tuple[Constant, ...] = (
     Constant("ripple_held", "1", "(ω_e T_s)², ripple in a held shaft's torque", hook="hold"),
     Constant("bench_angle_rad", "rad", "electrical zero of the bench's encoder", hook="bench"),
     Constant("lead_share", "1", "resistance of inverter and leads over the phase's"),
-    Constant("zero_alpha_a", "A", "α offset of the shunts", hook="state", scale="current_a"),
-    Constant("zero_beta_a", "A", "β offset of the shunts", hook="state", scale="current_a"),
+    Constant("zero_alpha_a", "A", "α offset of the shunts", 0.0, "state", "current_a", "zero_a"),
+    Constant("zero_beta_a", "A", "β offset of the shunts", 0.0, "state", "current_a", "zero_a"),
     Constant("zero_angle_rad", "rad", "electrical zero of the drive's encoder", hook="state"),
-    Constant("gain_current", "1", "gain of the drive's current sensors", hook="gain"),
-    Constant("gain_current_bench", "1", "gain of the bench's ammeter", hook="gain"),
-    Constant("gain_voltage", "1", "gain of the bench's voltmeters", hook="gain"),
-    Constant("gain_commanded", "1", "gain of a drive's own voltage", hook="gain"),
-    Constant("gain_torque", "1", "gain of the torque transducer", hook="gain"),
-    Constant("gain_lcr", "1", "gain of the LCR meter", hook="gain"),
+    _gain("gain_current", words="gain of the drive's current sensors"),
+    _gain("gain_current_bench", words="gain of the bench's ammeter"),
+    _gain("gain_voltage", words="gain of the bench's voltmeters"),
+    _gain("gain_commanded", words="gain of a drive's own voltage"),
+    _gain("gain_torque", words="gain of the torque transducer"),
+    _gain("gain_lcr", words="gain of the LCR meter"),
     Constant("gain_clock", "1", "recorded time over true time, less one", hook="gain"),
-    Constant("offset_temp_k", "K", "offset of the thermometers", hook="gain"),
-    Constant("unlogged_d_share", "1", "reluctance torque of an unlogged i_d", hook="gain"),
-    Constant("unlogged_winding_k", "K", "unrecorded winding over ambient", hook="gain"),
-    Constant("unlogged_magnet_k", "K", "unrecorded magnet over ambient", hook="gain"),
-    Constant("late_speed_s", "s", "lateness of a speed that no angle is beside", hook="gain"),
-    Constant("late_voltage_s", "s", "by how much motion follows a voltage late", hook="gain"),
-    Constant("unsampled_share", "1", "change of flux that samples of a voltage miss", hook="gain"),
-    Constant("coast_dry_share", "1", "dry drags of coasts over others, less one", hook="gain"),
-    Constant(
-        "coast_viscous_share", "1", "viscous drag of coasts over others, less one", hook="gain"
-    ),
-    Constant(
-        "open_flux_share", "1", "magnet of open windings over that of others, less one", hook="gain"
-    ),
-    Constant("unlogged_rest_k", "K", "the same of a winding in tests at rest", hook="gain"),
+    Constant("offset_temp_k", "K", "offset of the thermometers", hook="gain", curved=True),
+    _of_log("unlogged_d_share", "1", "reluctance torque of an unlogged i_d"),
+    _unlogged("unlogged_winding_k", words="unrecorded winding over ambient"),
+    _unlogged("unlogged_magnet_k", words="unrecorded magnet over ambient"),
+    _of_log("late_speed_s", "s", "lateness of a speed that no angle is beside", curved=True),
+    _of_log("late_voltage_s", "s", "by how much motion follows a voltage late", curved=True),
+    _of_log("unsampled_share", "1", "change of flux that samples of a voltage miss"),
+    _of_log("coast_dry_share", "1", "dry drags of coasts over others, less one"),
+    _of_log("coast_viscous_share", "1", "viscous drag of coasts over others, less one"),
+    _of_log("open_flux_share", "1", "magnet of open windings over that of others, less one"),
+    _unlogged("unlogged_rest_k", words="the same of a winding in tests at rest"),
 )
 UNLOGGED_AT_REST = "unlogged_rest_k"
 """That of the winding in tests at rest: they warm it little, and show nothing of one that turns."""
@@ -117,22 +134,11 @@ COAST_SHARES = ("coast_dry_share", "coast_viscous_share")
 """Nuisances of a coast beside other tests with drags: friction repeats to some percent."""
 OPEN_FLUX = "open_flux_share"
 """Nuisance of an open-circuit test beside other tests that turn: a magnet may have lost flux."""
-UNLOGGED_K = (*UNLOGGED.values(), UNLOGGED_AT_REST)
-_SHARED_PRIORS = {
-    "zero_alpha_a": "zero_a",
-    "zero_beta_a": "zero_a",
-}
-"""Fields of `policy.priors` that stand for several nuisances."""
+CURVED = tuple(constant.name for constant in BASE if constant.curved)
+"""How the names of nuisances begin along which no residual is linear."""
 STATE = tuple(constant.name for constant in BASE if constant.hook == "state")
 PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 """The base's constants of the station, and of the motor; the others are nuisances of a log."""
-
-
-def _prior(name: str, priors: Priors) -> float | None:
-    """Standard uncertainty of a nuisance by the policy; None of a constant that has no prior."""
-    shared = "unlogged_k" if name.startswith(UNLOGGED_K) else _SHARED_PRIORS.get(name, name)
-    usual: float | None = getattr(priors, shared, None)
-    return priors.gain if usual is None and name.startswith("gain_") else usual
 
 
 def base_of(machine: Machine) -> tuple[Constant, ...]:
@@ -147,10 +153,9 @@ def base_of(machine: Machine) -> tuple[Constant, ...]:
     """
     known = {constant.name for constant in BASE}
     further = sorted(set(machine.stated_u) - known)
-    words = "gain of a further instrument"
-    gains = (Constant(name, "1", words, hook="gain") for name in further)
+    gains = (_gain(name, words="gain of a further instrument") for name in further)
     warmth = (
-        Constant(name, "K", f"{column} of {path} over that of others", hook="gain")
+        _unlogged(name, words=f"{column} of {path} over that of others")
         for name, (column, path) in machine.unlogged.items()
     )
     return (*BASE, *gains, *warmth)
@@ -197,7 +202,7 @@ class Model:
         """
         stated = self.machine.stated_u
         sizes = {"1": 1.0, **self.machine.scales}
-        base = [(c, _prior(c.name, self.policy.priors)) for c in base_of(self.machine)]
+        base = [(c, c.u(self.policy.priors)) for c in base_of(self.machine)]
         own = {
             c.name: (c.center, stated.get(c.name, u * sizes[c.scale]))
             for c, u in base

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Values
-from pipeline.criticism.machine.model import LATE_SPEED, LATE_VOLTAGE, UNLOGGED_K, Model
+from pipeline.criticism.machine.model import CURVED, Model
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.fit import Fit
@@ -518,7 +518,7 @@ def _linear(column: Column, model: Model) -> bool:
     """Whether the residual is linear along a column, whatever the other parameters are."""
     effect = column.effect
     if effect is None:
-        return not column.name.startswith(("offset_temp_k", LATE_SPEED, LATE_VOLTAGE, *UNLOGGED_K))
+        return not column.name.startswith(CURVED)
     if effect not in model.effects:
         return True
     shaped = any(not (p.amplitude or p.choice) for p in effect.parameters_of(model.machine))

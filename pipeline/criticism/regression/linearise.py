@@ -16,13 +16,8 @@ from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.effect import Array, Complex, Effect, Machine, Operating, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import (
-    COAST_SHARES,
-    LATE_SPEED,
-    LATE_VOLTAGE,
-    OPEN_FLUX,
+    CURVED,
     STATE,
-    UNLOGGED_K,
-    UNSAMPLED,
     Model,
     Pieces,
     base_of,
@@ -284,15 +279,6 @@ def _restore(rows: Array, unknown: Sequence[Array]) -> None:
 
 _FINE = 1e-3
 """Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
-_OF_SOME_LOGS = (
-    "unlogged_d_share",
-    LATE_SPEED,
-    LATE_VOLTAGE,
-    UNSAMPLED,
-    *COAST_SHARES,
-    OPEN_FLUX,
-    *UNLOGGED_K,
-)
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 
@@ -327,7 +313,7 @@ class _Sampler:
         self.hooks = hooks_in(segment)
         pieces = self.pieces = evaluate(model, self.x, values, self.hooks)
         self.effect_pieces: dict[str, Pieces] = {}
-        self.gains = {c.name for c in base_of(model.machine) if c.hook == "gain"}
+        self.gains = {c.name for c in base_of(model.machine) if c.hook in ("gain", "log")}
         self.paced: dict[float, Array] = {}
         self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
@@ -395,22 +381,16 @@ class _Sampler:
             "gain_torque": observes_sensor(self.segment, "load"),
             "gain_lcr": observes_sensor(self.segment, "lcr"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
-            **{n: n in self.segment.fixed for n in (*_OF_SOME_LOGS, *self.model.machine.unlogged)},
             "gain_clock": observes_sensor(self.segment, "clock"),
             self.segment.instrument.meter: observes_sensor(self.segment, "voltage"),
             self.segment.instrument.ammeter: observes_sensor(self.segment, "current"),
         }
-        if not observed.get(column.name, False):
+        if not observed.get(column.name, column.name in self.segment.fixed):
             return None
         if column.name == "gain_clock":
             return self._along_time(column.step)
         moved = {**self.values, column.name: self.values[column.name] + column.step}
-        if column.name in (
-            self.segment.instrument.ammeter,
-            "offset_temp_k",
-            LATE_SPEED,
-            LATE_VOLTAGE,
-        ) or column.name.startswith(UNLOGGED_K):
+        if column.name == self.segment.instrument.ammeter or column.name.startswith(CURVED):
             return (self._residual(self.model, moved) - self.base_residual) / column.step
         after = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(after - self.start) / column.step
