@@ -30,7 +30,7 @@ BASE = {
     "ripple_held": 0.0,
     "bench_angle_rad": 0.0,
     "lead_share": 0.0,
-    **dict.fromkeys((*STATE, *(one.name for one in BASE if one.hook == "gain")), 0.0),
+    **dict.fromkeys((*STATE, *(one.name for one in BASE if one.hook in ("gain", "log"))), 0.0),
 }
 
 
