@@ -182,7 +182,8 @@ def _datasheet(
         diagnose=settings.diagnose,
         model_gates=model_gates,
     )
-    found = work.check(job, fit.campaign, fit.constants, None, Stopwatch())
+    checked = work.check(job, fit.campaign, fit.constants, Stopwatch())
+    found = work.with_verdict(job, fit.campaign, checked, None, Stopwatch())
     return work.assemble(job, fit.campaign, found, stamp_of(job, fit.campaign))
 
 

@@ -37,6 +37,7 @@ from pipeline.performance.sources import (
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
+from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.performance import (
     Blank,
     Curve,
@@ -88,6 +89,35 @@ def performance_of(sheet: Datasheet, operation: Operation | None) -> Performance
         lq_h, psi_pm_wb or pole_pairs is not known.
 
     """
+    return with_model(of_constants(sheet, operation), sheet)
+
+
+def with_model(performance: Performance, sheet: Datasheet) -> Performance:
+    """The numbers of a datasheet with its version and what the verdict on its model says of them.
+
+    Parameters
+    ----------
+    performance
+        The numbers of the constants alone, by `of_constants`.
+    sheet
+        Version, and the verdict on the model.
+
+    """
+    notes = (*performance.notes, *_note_of_model(sheet.model)) if performance.numbers else ()
+    return replace(performance, version=sheet.version, notes=notes)
+
+
+def of_constants(sheet: Datasheet, operation: Operation | None) -> Performance:
+    """The numbers of a datasheet's constants, whatever the verdict on its model.
+
+    Parameters
+    ----------
+    sheet
+        Constants with their budgets.
+    operation
+        The conditions; None where there are none.
+
+    """
     bare = Performance(sheet.motor_id, sheet.version, operation)
     if operation is None:
         return replace(bare, blanks=(NO_CONDITIONS,))
@@ -121,7 +151,7 @@ def performance_of(sheet: Datasheet, operation: Operation | None) -> Performance
             for p, w in zip(peak, speeds, strict=True)
         ),
         blanks=(*lacking, *blanks, *losses_not_known(operation)),
-        notes=_notes(sheet, sources, operation, speeds),
+        notes=_notes(sheet.constants, sources, operation, speeds),
     )
 
 
@@ -333,25 +363,27 @@ def _torque_per_ampere(case: _Case) -> Curve:
 
 
 def _notes(
-    sheet: Datasheet, sources: Sources, operation: Operation, speeds: Array
+    constants: Mapping[str, Estimate], sources: Sources, operation: Operation, speeds: Array
 ) -> tuple[str, ...]:
     """What the numbers rest on beyond the constants."""
     notes = [f"{text[0].upper()}{text[1:]}" for text in sources.assumed]
     fastest = _at(sources.known, MECHANICAL[0], "omega_mech_rad_s")
     if fastest is not None and speeds[-1] > 1.02 * fastest:
         notes.append(f"Drag was measured up to {fastest:.4g} rad/s and is extrapolated beyond")
-    tested = _at(sheet.constants, "kt_peak_nm_a", "iq_a")
+    tested = _at(constants, "kt_peak_nm_a", "iq_a")
     if tested is not None and operation.current_a > 1.1 * tested:
         notes.append(f"Torque was measured up to {tested:.3g} A and is extrapolated beyond")
-    lacking = () if sheet.model is None else tuple(sheet.model.missing)
-    if lacking:
-        names = " and ".join(name.replace("_", " ") for name in lacking)
-        notes.append(f"The model lacks {names}, which is not in these numbers")
-    elif sheet.model is None or not sheet.model.passed:
-        notes.append(
-            "The model was not shown to explain the captures: the intervals hold if it does"
-        )
     return tuple(notes)
+
+
+def _note_of_model(model: ModelVerdict | None) -> tuple[str, ...]:
+    """What the verdict on the model says of the numbers."""
+    if model is not None and model.missing:
+        names = " and ".join(name.replace("_", " ") for name in model.missing)
+        return (f"The model lacks {names}, which is not in these numbers",)
+    if model is None or not model.passed:
+        return ("The model was not shown to explain the captures: the intervals hold if it does",)
+    return ()
 
 
 def _at(constants: Mapping[str, Estimate], name: str, condition: str) -> float | None:

@@ -31,6 +31,8 @@ from pipeline.records.finding import Finding
 from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.outcome import Stopwatch
 
+UNTESTED = ModelVerdict("not_tested", note="the residual test is not made yet")
+
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
@@ -51,7 +53,7 @@ class Stamp:
 @dataclass(frozen=True, slots=True)
 class Judged:
     """Constants, evidence of the fits, checks, residual test and findings of one motor; its
-    diagnosis where one was asked for.
+    diagnosis where one was asked for. Before the residual test is made, `model` is `UNTESTED`.
     """
 
     constants: Constants
@@ -79,16 +81,8 @@ def read(job: MotorJob, watch: Stopwatch) -> Usable:
     return usable_captures(task, watch)
 
 
-def judge(
-    job: MotorJob,
-    campaign: Campaign,
-    recall: Recall | None,
-    verdicts: Verdicts | None,
-    watch: Stopwatch,
-) -> Judged:
-    """Fits every estimator, makes every check, and compares the model with the captures.
-
-    Results that `recall` and `verdicts` have cached are not computed again.
+def judge(job: MotorJob, campaign: Campaign, recall: Recall | None, watch: Stopwatch) -> Judged:
+    """Fits every estimator and makes every check; fits that `recall` has cached are not made again.
 
     Parameters
     ----------
@@ -98,28 +92,20 @@ def judge(
         The captures of one motor.
     recall
         Cache of the estimators' fits; None for no cache.
-    verdicts
-        Cache of verdicts; None for no cache.
     watch
         Takes the time of each stage [s].
 
     """
     with watch.stage("fit"):
         constants, evidence, failures = fit_all(campaign, job.fit, recall)
-    found = check(job, campaign, constants, verdicts, watch)
+    found = check(job, campaign, constants, watch)
     broken = (Finding(job.motor_id, "warning", *failure) for failure in failures)
     findings = (*agree(campaign), *broken, *found.findings)
     return replace(found, evidence=evidence, findings=findings)
 
 
-def check(
-    job: MotorJob,
-    campaign: Campaign,
-    constants: Constants,
-    verdicts: Verdicts | None,
-    watch: Stopwatch,
-) -> Judged:
-    """Makes every check of fitted constants, and compares the model with the captures.
+def check(job: MotorJob, campaign: Campaign, constants: Constants, watch: Stopwatch) -> Judged:
+    """Makes every check of fitted constants.
 
     Parameters
     ----------
@@ -129,8 +115,6 @@ def check(
         The captures of one motor.
     constants
         The fitted constants.
-    verdicts
-        Cache of verdicts; None for no cache.
     watch
         Takes the time of each stage [s].
 
@@ -138,10 +122,40 @@ def check(
     with watch.stage("crosscheck"):
         apart = disagreements_between_captures(campaign, job.fit)
         checks = check_all(constants, campaign, job.crosscheck, apart)
+    return Judged(constants, (), checks, UNTESTED, tuple(agreement.findings(apart)))
+
+
+def with_verdict(
+    job: MotorJob,
+    campaign: Campaign,
+    judged: Judged,
+    verdicts: Verdicts | None,
+    watch: Stopwatch,
+) -> Judged:
+    """Compares the model with the captures, unless `verdicts` has cached what that comes to.
+
+    Parameters
+    ----------
+    job
+        What to do with one motor, and how.
+    campaign
+        The captures of one motor.
+    judged
+        Constants and checks of the motor.
+    verdicts
+        Cache of verdicts; None for no cache.
+    watch
+        Takes the time of each stage [s].
+
+    """
     with watch.stage("residual test"):
-        tested = judged_model(campaign, job.model, constants, verdicts, job.diagnose)
-    findings = (*agreement.findings(apart), *tested.findings)
-    return Judged(constants, (), checks, tested.verdict, findings, tested.diagnosis)
+        tested = judged_model(campaign, job.model, judged.constants, verdicts, job.diagnose)
+    return replace(
+        judged,
+        model=tested.verdict,
+        findings=(*judged.findings, *tested.findings),
+        diagnosis=tested.diagnosis,
+    )
 
 
 def disagreements_between_captures(

@@ -6,6 +6,7 @@ where the kernel reports nothing of what other machines write.
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -82,3 +83,16 @@ class Arrivals:
         if now != self._seen:
             self._seen, self._since_s = now, time_s
         return now != self.taken and time_s - self._since_s >= self.settle_s
+
+    def rest_s(self, time_s: float) -> float:
+        """How long what has come must still rest [s]; infinite where nothing has come.
+
+        Parameters
+        ----------
+        time_s
+            This moment, of the clock of `due` [s].
+
+        """
+        if self._seen == self.taken:
+            return math.inf
+        return self._since_s + self.settle_s - time_s

@@ -34,7 +34,7 @@ from pipeline.io.recordings.capture_traces import (
     sample_table,
 )
 from pipeline.io.recordings.capture_views import Shown, capture_layout
-from pipeline.io.recordings.datasheet_page import sheet_markdown
+from pipeline.io.recordings.datasheet_page import capture_markdown
 from pipeline.io.recordings.error_map import send_frame, send_map
 from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
@@ -127,9 +127,7 @@ def recording_bytes(
         send_lines(made.stream, capture, lines_of(capture, own, findings))
         _send_properties(made.stream, capture)
         if datasheet is not None:
-            send_page(made.stream, "/datasheet", sheet_markdown(datasheet, capture.path))
-            motor = {"status": datasheet.status, "why": list(datasheet.why)}
-            send_property(made.stream, "motor", motor)
+            send_page(made.stream, "/datasheet", capture_markdown(datasheet, capture.path))
     return made.content
 
 

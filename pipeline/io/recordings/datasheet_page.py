@@ -15,33 +15,51 @@ _MARKS = {"fail": "✗ fail", "marginal": "⚠ marginal", "not_evaluated": "–"
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&])")
 
 
-def sheet_markdown(datasheet: Datasheet, path: str, first: Sequence[str] = ()) -> str:
-    """Status, checks and constants of a motor as a page.
+def sheet_markdown(datasheet: Datasheet, first: Sequence[str]) -> str:
+    """Status, constants and checks of a motor as a page.
 
     Parameters
     ----------
     datasheet
         The datasheet.
-    path
-        Constants that rest on this capture come first.
     first
-        Constants that come first instead.
+        Constants that come first.
 
     """
-    names = sorted(datasheet.constants)
-    own = [name for name in names if path in datasheet.constants[name].captures]
-    heading = "Constants from this capture"
-    if first:
-        own, heading = [name for name in first if name in names], "Key constants"
-    rest = [name for name in names if name not in own]
     lines = [f"# {plain(datasheet.motor_id)}: {datasheet.status}", ""]
     lines += [f"- {plain(reason)}" for reason in datasheet.why]
-    if own:
-        lines += ["", f"## {heading}", "", *_table(datasheet, own)]
+    own = [name for name in first if name in datasheet.constants]
+    lines += _constants_and_checks(datasheet, own, "Key constants")
+    return "\n".join([*lines, "", f"version {datasheet.version}", ""])
+
+
+def capture_markdown(datasheet: Datasheet, path: str) -> str:
+    """Constants and checks of a motor as a page beside one of its captures.
+
+    The status is not in it: it may change while the capture does not.
+
+    Parameters
+    ----------
+    datasheet
+        The datasheet; its status, reasons and verdict on the model are not read.
+    path
+        Constants that rest on this capture come first.
+
+    """
+    own = [
+        name for name in sorted(datasheet.constants) if path in datasheet.constants[name].captures
+    ]
+    lines = [f"# {plain(datasheet.motor_id)}"]
+    lines += _constants_and_checks(datasheet, own, "Constants from this capture")
+    return "\n".join([*lines, "", "Its status is in the recording of the motor.", ""])
+
+
+def _constants_and_checks(datasheet: Datasheet, own: Sequence[str], heading: str) -> list[str]:
+    rest = [name for name in sorted(datasheet.constants) if name not in own]
+    lines = ["", f"## {heading}", "", *_table(datasheet, own)] if own else []
     if rest:
         lines += ["", "## Other constants", "", *_table(datasheet, rest)]
-    lines += ["", "## Checks", "", *_checks(datasheet)]
-    return "\n".join([*lines, "", f"version {datasheet.version}", ""])
+    return [*lines, "", "## Checks", "", *_checks(datasheet)]
 
 
 def checks_markdown(datasheet: Datasheet) -> str:
@@ -76,7 +94,7 @@ def _checks(datasheet: Datasheet) -> list[str]:
     return lines
 
 
-def _table(datasheet: Datasheet, names: list[str]) -> list[str]:
+def _table(datasheet: Datasheet, names: Sequence[str]) -> list[str]:
     head = ["| constant | value ± U (k = 2) | method |", "| --- | --- | --- |"]
     return head + [_line(datasheet.constants[name]) for name in names]
 

@@ -101,7 +101,7 @@ def motor_bytes(
         send_page(
             made.stream,
             "/sheet",
-            sheet_markdown(datasheet, "", KEY_CONSTANTS),
+            sheet_markdown(datasheet, KEY_CONSTANTS),
         )
         send_page(made.stream, "/checks", checks_markdown(datasheet))
         _send_constants(made.stream, datasheet)

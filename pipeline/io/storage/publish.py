@@ -82,8 +82,8 @@ def together(folder: Path) -> Iterator[Callable[[str, bytes], None]]:
     Yields
     ------
     callable
-        `write(name, content)`. The first file written is the last to get its name, so that whoever
-        finds it finds the others.
+        `write(name, content)`. Files get their names in the order in which they were written, so
+        that whoever finds the last one finds the others.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def together(folder: Path) -> Iterator[Callable[[str, bytes], None]]:
 
     try:
         yield write
-        for temporary, path in reversed(waiting):
+        for temporary, path in waiting:
             with _refusals(path):
                 temporary.replace(path)
         for parent in dict.fromkeys(path.parent for _, path in waiting):

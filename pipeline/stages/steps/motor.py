@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from pipeline.execution.caches.model_memory import ModelMemory
 from pipeline.execution.caches.run_cache import note_motor
 from pipeline.execution.caches.stamp import stamp_of
 from pipeline.execution.caches.versions import datasheet_code
-from pipeline.execution.jobs import Files, Finished, MotorJob, MotorResult
+from pipeline.execution.jobs import Finished, MotorJob, MotorResult
 from pipeline.execution.tasks import work
 from pipeline.execution.tasks.model_tests import judged_model
 from pipeline.execution.tasks.start import starts_from_fits
@@ -42,6 +43,8 @@ LATE_IMPORTS = (
     "rerun.blueprint",
 )
 """Modules that a motor imports when it needs them."""
+Write = Callable[[str, bytes], str]
+"""Writes a file of a motor, and gives its sha256."""
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -87,6 +90,11 @@ def import_all() -> None:
 
 
 def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
+    """Writes the files of one motor, all of them or nothing.
+
+    What needs no verdict on the model comes before it: the verdict is what takes longest, and where
+    a worker would be idle it is made there meanwhile.
+    """
     captures, findings = work.read(job, watch)
     if not captures:
         return Finished(findings, ())
@@ -94,14 +102,28 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
     stamp = stamp_of(job, campaign)
     recall = None if job.key is None else FitMemory(job, stamp)
     verdicts = None if job.key is None else ModelMemory(job, stamp)
-    found = work.judge(job, campaign, recall, verdicts, watch)
+    checked = work.judge(job, campaign, recall, watch)
     if recall is not None:
         recall.save()
-    findings = (*findings, *found.findings)
-    datasheet = superseding(work.assemble(job, campaign, found, stamp), job.revoked)
-    all_findings = (*job.findings, *findings)
-    files = _write(job, campaign, datasheet, found, all_findings, watch)
-    return Finished(findings, files)
+    draft = work.assemble(job, campaign, checked, stamp)
+    with watch.stage("performance"):
+        performance = performance_at(campaign, draft, job.operate)
+    with _files(job) as (write, files):
+        if job.recordings:
+            with watch.stage("recordings"):
+                read = (*job.findings, *findings, *checked.findings)
+                shown = _shown(campaign, draft, checked.evidence)
+                for name, content in _capture_recordings(campaign, draft, shown, read):
+                    _write_sealed(write, name, content)
+        judged = work.with_verdict(job, campaign, checked, verdicts, watch)
+        findings = (*findings, *judged.findings)
+        sheet = superseding(work.assemble(job, campaign, judged, stamp), job.revoked)
+        if job.recordings:
+            with watch.stage("recordings"):
+                content = _motor_recording(campaign, sheet, shown, (*job.findings, *findings))
+                _write_sealed(write, f"recordings/motor-{file_stem(job.motor_id)}.rrd", content)
+        _write(job, sheet, judged, (*job.findings, *findings), performance, write, watch)
+    return Finished(findings, tuple(files))
 
 
 def superseding(sheet: Datasheet, revoked: Sequence[Revocation]) -> Datasheet:
@@ -128,16 +150,9 @@ def superseding(sheet: Datasheet, revoked: Sequence[Revocation]) -> Datasheet:
     return sheet
 
 
-def _write(
-    job: MotorJob,
-    campaign: Campaign,
-    datasheet: Datasheet,
-    judged: work.Judged,
-    findings: tuple[Finding, ...],
-    watch: Stopwatch,
-) -> Files:
-    """Writes what the job asks for, all of it or nothing; returns the files, relative to output."""
-    stem = file_stem(job.motor_id)
+@contextmanager
+def _files(job: MotorJob) -> Iterator[tuple[Write, list[tuple[str, str]]]]:
+    """How to write a file of the motor, and the names and digests of those that were written."""
     files: list[tuple[str, str]] = []
     with together(Path(job.output)) as write_one:
 
@@ -146,42 +161,51 @@ def _write(
             files.append((name, hashlib.sha256(content).hexdigest()))
             return files[-1][1]
 
-        with watch.stage("datasheet"):
-            write(f"datasheets/{stem}.json", work.content_of(datasheet))
-        with watch.stage("performance"):
-            performance = performance_at(campaign, datasheet, job.operate)
-        write(f"performance/{stem}.json", canonical_json(performance.document()))
-        if judged.diagnosis is not None:
-            for name, content in _diagnosis_files(job, stem, judged.diagnosis):
-                write(name, content)
-        if job.report:
-            from pipeline.execution.outputs.page_links import links_of
-            from pipeline.report.pages.motor_page import render_motor
-            from pipeline.report.pages.sheet_page import render_sheet
+        yield write, files
 
-            with watch.stage("report"):
-                terms = {term.name: term for estimator in estimators() for term in estimator.terms}
-                coming = [f"recordings/motor-{stem}.rrd"] if job.recordings else []
-                coming += [] if judged.diagnosis is None else [f"diagnosis/{stem}.html"]
-                links = links_of(Path(job.output), "report/{}.html", job.motor_id, coming)
-                page = render_motor(datasheet, judged.evidence, findings, terms, links, performance)
-                write(f"report/{stem}.html", page.encode())
-                write(f"sheet/{stem}.html", render_sheet(datasheet, performance).encode())
-        if job.recordings:
-            from pipeline.io.recordings.seal import SEAL, seal_line
 
-            with watch.stage("recordings"):
-                shown = _recordings(stem, campaign, datasheet, judged.evidence, findings)
-                for name, content in shown:
-                    sha256 = write(name, content)
-                    write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], sha256))
-    return tuple(files)
+def _write(
+    job: MotorJob,
+    datasheet: Datasheet,
+    judged: work.Judged,
+    findings: tuple[Finding, ...],
+    performance: Performance,
+    write: Write,
+    watch: Stopwatch,
+) -> None:
+    """Writes performance, diagnosis, pages and, last of all, the datasheet.
+
+    `performance` is of the constants alone.
+    """
+    from pipeline.performance.derive import with_model
+
+    stem, performance = file_stem(job.motor_id), with_model(performance, datasheet)
+    write(f"performance/{stem}.json", canonical_json(performance.document()))
+    if judged.diagnosis is not None:
+        for name, content in _diagnosis_files(job, stem, judged.diagnosis):
+            write(name, content)
+    if job.report:
+        from pipeline.execution.outputs.page_links import links_of
+        from pipeline.report.pages.motor_page import render_motor
+        from pipeline.report.pages.sheet_page import render_sheet
+
+        with watch.stage("report"):
+            terms = {term.name: term for estimator in estimators() for term in estimator.terms}
+            coming = [f"recordings/motor-{stem}.rrd"] if job.recordings else []
+            coming += [] if judged.diagnosis is None else [f"diagnosis/{stem}.html"]
+            links = links_of(Path(job.output), "report/{}.html", job.motor_id, coming)
+            page = render_motor(datasheet, judged.evidence, findings, terms, links, performance)
+            write(f"report/{stem}.html", page.encode())
+            write(f"sheet/{stem}.html", render_sheet(datasheet, performance).encode())
+    with watch.stage("datasheet"):
+        write(f"datasheets/{stem}.json", work.content_of(datasheet))
 
 
 def performance_at(
     campaign: Campaign, sheet: Datasheet, stated: Mapping[str, float | None]
 ) -> Performance:
-    """The performance of a motor at stated conditions, else at those of its captures.
+    """The performance of a motor at stated conditions, else at those of its captures, by its
+    constants alone; `with_model` adds what the verdict on its model says.
 
     Numbers that break on odd constants cost nothing but themselves.
 
@@ -196,11 +220,11 @@ def performance_at(
 
     """
     from pipeline.performance.conditions import operation_of
-    from pipeline.performance.derive import performance_of
+    from pipeline.performance.derive import of_constants
 
     operation = operation_of(campaign, stated)
     try:
-        return performance_of(sheet, operation)
+        return of_constants(sheet, operation)
     except BROKEN as error:
         why = f"the derivation broke on these constants: {type(error).__name__}: {error}"
         blank = Blank("performance", "performance", why, "report the captures with this line")
@@ -221,27 +245,44 @@ def _diagnosis_files(job: MotorJob, stem: str, diagnosis: Diagnosis) -> Iterator
         yield f"diagnosis/{stem}.html", render_ladder(diagnosis, links=links).encode()
 
 
-def _recordings(
-    stem: str,
-    campaign: Campaign,
-    datasheet: Datasheet,
-    evidence: tuple[Evidence, ...],
-    findings: tuple[Finding, ...],
-) -> Iterator[tuple[str, bytes]]:
-    """Name and content of the motor's recording and of one a capture; what the datasheet says of a
-    capture comes first in it.
-    """
-    from pipeline.io.recordings.capture import recording_bytes
-    from pipeline.io.recordings.motor import motor_bytes
+def _shown(
+    campaign: Campaign, sheet: Datasheet, evidence: tuple[Evidence, ...]
+) -> tuple[Evidence, ...]:
+    """The plots of a recording: what the datasheet says of a capture comes first."""
     from pipeline.stages.steps.replay import replay
 
-    shown = [*(one for capture in campaign.captures for one in replay(capture, datasheet))]
-    shown += evidence
-    yield f"recordings/motor-{stem}.rrd", motor_bytes(campaign, datasheet, shown, findings)
+    return (*(one for capture in campaign.captures for one in replay(capture, sheet)), *evidence)
+
+
+def _capture_recordings(
+    campaign: Campaign,
+    sheet: Datasheet,
+    shown: Sequence[Evidence],
+    findings: Sequence[Finding],
+) -> Iterator[tuple[str, bytes]]:
+    """Name and content of the recording of each capture."""
+    from pipeline.io.recordings.capture import recording_bytes
+
+    stem = file_stem(campaign.motor_id)
     for capture in campaign.captures:
         of_capture = tuple(f for f in findings if f.file == capture.path)
-        content = recording_bytes(capture, shown, datasheet, of_capture)
+        content = recording_bytes(capture, shown, sheet, of_capture)
         yield f"recordings/{stem}/{_place(capture.path)}.rrd", content
+
+
+def _motor_recording(
+    campaign: Campaign, sheet: Datasheet, shown: Sequence[Evidence], findings: Sequence[Finding]
+) -> bytes:
+    from pipeline.io.recordings.motor import motor_bytes
+
+    return motor_bytes(campaign, sheet, shown, findings)
+
+
+def _write_sealed(write: Write, name: str, content: bytes) -> None:
+    """Writes a recording and its checksum file."""
+    from pipeline.io.recordings.seal import SEAL, seal_line
+
+    write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], write(name, content)))
 
 
 def _place(path: str) -> str:

@@ -23,7 +23,7 @@ from pipeline.records.outcome import Outcome
 from pipeline.report.text.waiting import waiting
 from pipeline.settings import RunSettings
 
-LOOK_EVERY_S = 0.2
+LOOK_EVERY_S = 0.1
 """Between two looks at the folder; ten times the time of a look where that is more."""
 RETRY_S = 30.0
 """Until a pass is tried again that failed for the machine's sake, such as a full disk."""
@@ -90,7 +90,8 @@ class Watch:
                 ended_s = time.monotonic()
                 if self.arrivals.due(now, ended_s):
                     return now
-                time.sleep(max(LOOK_EVERY_S, 10.0 * (ended_s - begun_s)))
+                pause_s = max(LOOK_EVERY_S, 10.0 * (ended_s - begun_s))
+                time.sleep(max(0.0, min(pause_s, self.arrivals.rest_s(ended_s))))
 
     def _pass(self, now: Snapshot) -> Outcome:
         def surveyed() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from pipeline.io.recordings.capture_traces import (
     own_evidence,
 )
 from pipeline.io.recordings.capture_views import further_views, loupe_views, main_views
-from pipeline.io.recordings.datasheet_page import sheet_markdown
+from pipeline.io.recordings.datasheet_page import capture_markdown, sheet_markdown
 from pipeline.io.recordings.readback import entities
 from pipeline.io.recordings.seal import seal_of, verify
 from pipeline.io.recordings.stream import digest
@@ -290,9 +291,18 @@ def test_no_temporary_file_is_left(recording: Path) -> None:
 
 
 def test_the_sheet_escapes_what_markdown_would_read() -> None:
-    text = sheet_markdown(make_sheet(), PATH)
+    text = sheet_markdown(make_sheet(), ())
     assert text.startswith("# a\\|b \\*x\\*: provisional\n")
     row = "| ✗ fail | kt\\_vs\\_ke | 1.15 | 0.01 | x \\| y; suspect: 2/sqrt\\(3\\) |"
     assert row in text
     assert "| r\\_phase\\_ohm | 310.00 ± 0.80 mΩ | step |" in text
-    assert text.index("Constants from this capture") < text.index("## Checks")
+    assert text.index("## Other constants") < text.index("## Checks")
+
+
+def test_the_page_beside_a_capture_shows_nothing_that_changes_without_it() -> None:
+    """Approved, revoked or with another verdict on its model: the same page."""
+    approved = replace(make_sheet(), status="released", why=())
+    text = capture_markdown(make_sheet(), PATH)
+    assert text == capture_markdown(approved, PATH)
+    assert text.startswith("# a\\|b \\*x\\*\n")
+    assert text.index("## Constants from this capture") < text.index("## Checks")
