@@ -96,7 +96,8 @@ def deceleration(
     """
     total: Array = drag[0] + drag[1] * omega_rad_s
     for value, name in zip(drag[2:], extras, strict=True):
-        total = total + value * DRAG_FORMS[name](omega_rad_s / fastest_rad_s)
+        if value:
+            total = total + value * DRAG_FORMS[name](omega_rad_s / fastest_rad_s)
     return total
 
 
@@ -126,6 +127,32 @@ class Motion:
             out = out + value * _ripple(name, coast.theta_rad)
         predicted: Array = out
         return predicted
+
+    def jacobian(self, coasts: Sequence[Coast], parameters: Array, width: Array) -> Array:
+        """Derivatives [n, k] of what all coasts should read; `width` [k] as `_widths` gives it."""
+        rows = [self._rows(i, coast, parameters, width) for i, coast in enumerate(coasts)]
+        return np.concatenate(rows)
+
+    def _rows(self, index: int, coast: Coast, parameters: Array, width: Array) -> Array:
+        """Derivatives [n, k] of one coast, which moves with the shared drag and what is its own.
+
+        Start angle and ripple are linear; drag and start speed take central differences.
+        """
+        shared = len(SHARED) + len(self.extras)
+        own = shared + index * (2 + len(self.ripples))
+        integrated = [*range(shared), own + 1]
+
+        def moved(values: Array) -> Array:
+            changed = parameters.copy()
+            changed[integrated] = values
+            return self.predict(index, coast, changed)
+
+        rows = np.zeros((coast.t_s.size, parameters.size))
+        rows[:, integrated] = central_jacobian(moved, parameters[integrated], width[integrated])
+        rows[:, own] = float(coast.of_angle)
+        for place, name in enumerate(self.ripples, own + 2):
+            rows[:, place] = _ripple(name, coast.theta_rad)
+        return rows
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
@@ -237,7 +264,7 @@ def _solve(motion: Motion, coasts: Sequence[Coast], start: Array | None) -> Nonl
     width = _widths(motion, coasts, start)
 
     def model(parameters: Array) -> tuple[Array, Array]:
-        jacobian = central_jacobian(predict, parameters, width)
+        jacobian = motion.jacobian(coasts, parameters, width)
         return (predict(parameters) - measured) * weights, jacobian * weights[:, None]
 
     return gauss_newton(model, start, iterations=15)
@@ -268,11 +295,7 @@ def _wider(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit, level: fl
     trial = Motion(motion.extras + extras, motion.ripples, motion.fastest_rad_s)
     start = _transferred(motion, trial, fit.parameters, len(coasts))
     weights = _weights(coasts)
-
-    def predict(parameters: Array) -> Array:
-        return np.concatenate([trial.predict(i, c, parameters) for i, c in enumerate(coasts)])
-
-    jacobian = central_jacobian(predict, start, _widths(trial, coasts, start)) * weights[:, None]
+    jacobian = trial.jacobian(coasts, start, _widths(trial, coasts, start)) * weights[:, None]
     at = len(SHARED) + len(motion.extras)
     candidates = {name: jacobian[:, at + k] for k, name in enumerate(extras)}
     theta = np.concatenate([c.theta_rad for c in coasts])

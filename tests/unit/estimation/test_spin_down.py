@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.estimation.estimators.spin_down import ESTIMATOR
+from pipeline.estimation.estimators.spin_down import ESTIMATOR, Motion, _coasts
 from pipeline.estimation.mechanical.shaft_rows import shaft_rows
 from pipeline.numerics.coasting import coast_down, coasting_rows
+from pipeline.numerics.least_squares import central_jacobian
 from pipeline.records.capture import Capture
 from tests.unit.estimation.signals import capture, estimates
 
@@ -56,3 +57,17 @@ def test_every_coast_of_a_record_begins_where_its_speed_is_last_the_highest() ->
     found = coasting_rows(np.concatenate([80.0 * once, -100.0 * once, 3.0 * once]))
     assert found == [(slice(151, 251), 1), (slice(413, 513), -1)]
     assert coasting_rows(np.zeros(9)) == []
+
+
+def test_derivatives_are_those_of_what_is_predicted() -> None:
+    """Two coasts, shared drag with a bump, own starts and ripples: each column by differences."""
+    coasts = [one for held in (0.0, 1.0) for one in _coasts(coast(held, angle=True))]
+    motion = Motion(("stribeck gauss 0.008",), ("cos", "sin 2"), 100.0)
+    parameters = np.array([20.0, 0.5, 3.0, 0.1, 99.0, 0.02, 0.01, -0.2, 101.0, 0.03, -0.01])
+
+    def predict(values: np.ndarray) -> np.ndarray:
+        return np.concatenate([motion.predict(i, one, values) for i, one in enumerate(coasts)])
+
+    width = np.array([1e-3, 1e-5, 1e-3, *[1e-3, 1e-3, 1e-3, 1e-3] * 2])
+    found = motion.jacobian(coasts, parameters, width)
+    assert found == pytest.approx(central_jacobian(predict, parameters, width), abs=1e-7)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -32,6 +33,15 @@ def test_a_folder_is_due_once_it_rests_and_not_again() -> None:
     assert not arrivals.due(grown, 100.0)
     assert not arrivals.due(first, 100.0), "it changed just now"
     assert arrivals.due(first, 102.0)
+
+
+def test_a_folder_is_looked_at_again_when_its_rest_is_over() -> None:
+    """Not a look later, which would be lost time for a station that waits."""
+    arrivals, first = Arrivals(2.0), frozenset({("a.csv", 1, 1, 1)})
+    assert not arrivals.due(first, 10.0)
+    assert arrivals.rest_s(10.5) == 1.5
+    arrivals.taken = first
+    assert arrivals.rest_s(11.0) == math.inf
 
 
 @pytest.mark.parametrize("change", ["bigger", "same size", "replaced", "new", "gone", "sidecar"])
