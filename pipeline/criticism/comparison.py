@@ -27,7 +27,7 @@ from pipeline.criticism.selection.missing_data import at_ambient, idle, loaded, 
 from pipeline.criticism.selection.pruning import trimmed
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.validation.error_maps import all_maps
-from pipeline.criticism.validation.held_out import effective, run_errors, simulate, traces
+from pipeline.criticism.validation.held_out import Before, effective, run_errors, simulate, traces
 from pipeline.physics.glossary import unit_of
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import (
@@ -102,7 +102,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         maps,
         () if bare is None else bare.moved,
         None if bare is None else bare.total,
-        tuple(traces(system.fit, simulated)),
+        tuple(traces(system.fit, simulated, None if bare is None else bare.fitted)),
         reported_combinations(system, held),
         () if bare is None else bare.errors,
     )
@@ -118,13 +118,14 @@ def _nothing(
 @dataclass(frozen=True, slots=True)
 class _Bare:
     """A model less what was added: its held-out error beside that of the `whole` one, over the
-    same rows; parameters of both; its errors.
+    same rows; parameters of both; its errors; the fitted model.
     """
 
     total: float
     whole: float
     moved: tuple[Move, ...]
     errors: tuple[SignalError, ...]
+    fitted: Before
 
 
 def _bare(
@@ -145,7 +146,7 @@ def _bare(
     moved = _moves(reported_parameters(system, held), after)
     less, full = in_common((system, whole), (held, whole_held))
     errors = tuple(_errors(system, held))
-    return _Bare(less.total, full.total, moved, errors)
+    return _Bare(less.total, full.total, moved, errors, Before(system, held))
 
 
 def _moves(

@@ -189,7 +189,8 @@ class Dependence(PlainRecord):
 class Trace:
     """A signal of a capture as recorded and as the model makes it [n, unit], NaN between windows.
 
-    The model is fitted without this capture where `split` is `held_out`.
+    The model is fitted without this capture where `split` is `held_out`. `before` is what the model
+    makes without what was added to it; None where nothing was.
     """
 
     capture: str
@@ -199,6 +200,7 @@ class Trace:
     t_s: Array
     measured: Array
     model: Array
+    before: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)

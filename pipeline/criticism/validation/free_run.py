@@ -119,6 +119,49 @@ def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
     J dω/dt = T(ψ, i) − drags − T_load.
 
     """
+    moved = _response(segment, model, values)
+    if moved is None:
+        return None
+    seen = moved.inside(moved.batch.segment.recorded)
+    floor, drift = _floor(moved), _drift(moved)
+    return Run(segment.capture, moved.time(), seen, moved.inside(moved.path), floor, drift)
+
+
+def beside(run: Run, segment: Segment, model: Model, values: Values) -> dict[str, Array]:
+    """What another model makes of the windows of a free run.
+
+    Parameters
+    ----------
+    run
+        The free run of one model.
+    segment
+        Of its capture.
+    model, values
+        The other model.
+
+    Returns
+    -------
+    dict of str to array [W, N]
+        Like `run.simulated`; NaN in windows in which the other model does not settle. Empty where
+        it has no free run of these windows.
+
+    """
+    moved = _response(segment, model, values)
+    if moved is None or moved.time().shape[1] != run.t_s.shape[1]:
+        return {}
+    windows = {float(time[0]): number for number, time in enumerate(moved.time())}
+    known = [windows.get(float(time[0])) for time in run.t_s]
+    rows = np.array([-1 if number is None else number for number in known])
+    made = moved.inside(moved.path)
+    return {
+        name: np.where(rows[:, None] < 0, np.nan, made[name][rows])
+        for name in run.signals
+        if name in made
+    }
+
+
+def _response(segment: Segment, model: Model, values: Values) -> _Response | None:
+    """The trajectories of a model over the windows of a capture; None as `free_run` says."""
     use = equation_of(segment).use
     if segment.test not in use.free_runs:
         return None
@@ -133,12 +176,7 @@ def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
     if 2 * settled.sum() < batch.windows:
         return None
     names = ("id_a", "iq_a") * batch.currents + (SPEED,) * batch.shaft
-    seen = {name: _signal(batch, recorded, name)[settled] for name in names}
-    made = {name: _signal(batch, path, name)[settled] for name in names}
-    moved = _Response(batch, path, jacobian, settled, names)
-    time = recorded.get("t_s", segment.ts_s * np.arange(batch.segment.size, dtype=np.float64))
-    floor, drift = _floor(moved), _drift(moved)
-    return Run(segment.capture, batch.inside(time)[settled], seen, made, floor, drift)
+    return _Response(batch, path, jacobian, settled, names)
 
 
 def _signal(batch: Batch, signals: Mapping[str, Array], name: str) -> Array:
@@ -165,6 +203,16 @@ class _Response:
     jacobian: Jacobian
     settled: NDArray[np.bool_]
     names: tuple[str, ...]
+
+    def inside(self, signals: Mapping[str, Array]) -> dict[str, Array]:
+        """The simulated signals inside the windows that settled [W, N]."""
+        return {name: _signal(self.batch, signals, name)[self.settled] for name in self.names}
+
+    def time(self) -> Array:
+        """The instants inside those windows [W, N, s]."""
+        segment = self.batch.segment
+        even = segment.ts_s * np.arange(segment.size, dtype=np.float64)
+        return self.batch.inside(segment.recorded.get("t_s", even))[self.settled]
 
     def to(
         self, added: Mapping[str, Any], extra: tuple[Complex, Array] | None = None

@@ -18,7 +18,7 @@ from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.validation.error_maps import disjoint
-from pipeline.criticism.validation.free_run import Run, free_run
+from pipeline.criticism.validation.free_run import Run, beside, free_run
 from pipeline.physics.glossary import unit_of
 from pipeline.records.comparison import SignalError, Trace
 
@@ -151,7 +151,21 @@ def effective(residual: Array) -> float:
     return n * (1.0 - max(r, 0.0)) / (1.0 + max(r, 0.0))
 
 
-def traces(fit: Fit, simulated: Sequence[Simulated]) -> Iterator[Trace]:
+@dataclass(frozen=True, slots=True)
+class Before:
+    """The model without what was added, with its held-out parameters, for the same segments."""
+
+    system: LinearSystem
+    held: HeldOut
+
+    def values(self, number: int) -> Mapping[str, float]:
+        """The parameters that predict a segment, of its number."""
+        return values_without(number, self.system, self.held)[0]
+
+
+def traces(
+    fit: Fit, simulated: Sequence[Simulated], before: Before | None = None
+) -> Iterator[Trace]:
     """Recorded and predicted signals of simulated captures, window by window.
 
     Parameters
@@ -160,6 +174,8 @@ def traces(fit: Fit, simulated: Sequence[Simulated]) -> Iterator[Trace]:
         The fit.
     simulated
         Free runs.
+    before
+        The model without what was added; None where nothing was.
 
     Yields
     ------
@@ -171,13 +187,18 @@ def traces(fit: Fit, simulated: Sequence[Simulated]) -> Iterator[Trace]:
     for one in simulated:
         segment, run = fit.segments[one.number], one.run
         if equation_of(segment).use.currents:
-            yield from _equations(segment, fit, one)
+            yield from _equations(segment, fit, one, before)
+        known: Mapping[str, Array] = {}
+        if before is not None:
+            known = beside(run, segment, before.system.fit.model, before.values(one.number))
         for signal in run.signals:
-            recorded, made = run.recorded[signal], run.simulated[signal]
-            yield _trace(segment, signal, "free_run", one.split, (run.t_s, recorded, made))
+            columns = (run.t_s, run.recorded[signal], run.simulated[signal], known.get(signal))
+            yield _trace(segment, signal, "free_run", one.split, columns)
 
 
-def _equations(segment: Segment, fit: Fit, simulated: Simulated) -> Iterator[Trace]:
+def _equations(
+    segment: Segment, fit: Fit, simulated: Simulated, before: Before | None
+) -> Iterator[Trace]:
     """What the equations predict from the recorded state, averaged over a millisecond.
 
     Without the mean, the noise of the angle's second difference would cover the torque.
@@ -186,14 +207,19 @@ def _equations(segment: Segment, fit: Fit, simulated: Simulated) -> Iterator[Tra
     if weak is None:
         return
     residuals = residual(segment, fit.model, simulated.values)
+    less = None
+    if before is not None:
+        less = residual(segment, before.system.fit.model, before.values(simulated.number))
     width = max(2 * round(fit.policy.validation.look_s / segment.ts_s / 2) + 1, 1)
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(width // 2, weak.length, max(width // 2, 1))[None, :]
     for place, channel in enumerate(segment.channels):
         recorded = smoothed(segment.recorded[channel], width)[rows]
         model = recorded - smoothed(residuals[place], width)[rows]
+        without = None if less is None else recorded - smoothed(less[place], width)[rows]
         time = segment.recorded["t_s"][rows]
-        yield _trace(segment, channel, "equation", simulated.split, (time, recorded, model))
+        columns = (time, recorded, model, without)
+        yield _trace(segment, channel, "equation", simulated.split, columns)
 
 
 def _trace(
@@ -201,12 +227,12 @@ def _trace(
     signal: str,
     kind: Literal["equation", "free_run"],
     split: Split,
-    columns: tuple[Array, Array, Array],
+    columns: tuple[Array, Array, Array, Array | None],
 ) -> Trace:
-    """Time, recorded and predicted signal, windows [W, N] one after the other with a gap behind
-    each [W (N + 1)].
+    """Time, recorded and predicted signal, and as predicted before; windows [W, N] one after the
+    other with a gap behind each [W (N + 1)].
     """
-    time, recorded, predicted = columns
+    time, recorded, predicted, before = columns
     gap = np.full((time.shape[0], 1), np.nan)
     after = np.hstack([time, time[:, -1:] + segment.ts_s])
     return Trace(
@@ -217,4 +243,5 @@ def _trace(
         after.ravel(),
         np.hstack([recorded, gap]).ravel(),
         np.hstack([predicted, gap]).ravel(),
+        None if before is None else np.hstack([before, gap]).ravel(),
     )

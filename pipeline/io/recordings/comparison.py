@@ -4,6 +4,8 @@ A recording holds, on the timeline `t` (duration), for every capture that was si
 
     /CAPTURE/equation/SIGNAL  `measured`, `model`, `residual`: the model from the measured state
     /CAPTURE/free_run/SIGNAL  the same of the model on its own, from each window's start
+                              where effects were added, both with `before` and `residual_before`:
+                              the model without them
     /sheet                    every error beside its noise floor, as a markdown page
 """
 
@@ -15,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
 from pipeline.io.recordings.capture_views import LOUPE_SHARE, round_s
 from pipeline.io.recordings.datasheet_page import plain
@@ -30,6 +33,7 @@ from pipeline.io.recordings.stream import (
 from pipeline.io.recordings.stream import Trace as Table
 from pipeline.io.recordings.views import (
     AIR,
+    BASELINE,
     MEASURED,
     MODEL,
     RESIDUAL,
@@ -127,6 +131,8 @@ def table_of(trace: Trace) -> Table:
         "model": trace.model,
         "residual": trace.measured - trace.model,
     }
+    if trace.before is not None:
+        columns |= {"before": trace.before, "residual_before": trace.measured - trace.before}
     kept = np.unique(np.concatenate([line_points(c, MOST_POINTS) for c in columns.values()]))
     frame = pl.DataFrame({name: c[kept].astype(np.float32) for name, c in columns.items()})
     return timed(entity_of(trace), trace.t_s[kept], frame)
@@ -148,18 +154,32 @@ def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
 
 
 def _views_of(trace: Trace) -> tuple[ViewPlan, ViewPlan]:
-    """A signal, and its residual."""
+    """A signal, and its residual: without what was added, behind, and with it."""
     entity = entity_of(trace)
+    measured = Line(entity, "measured", "measured", MEASURED, WIDE)
+    model, left = Line(entity, "model", "model", MODEL), _left(trace)
+    lines: tuple[Line, ...] = (measured, model)
+    if trace.before is not None:
+        before = Line(entity, "before", "model before", BASELINE)
+        lines = (measured, before, replace(model, name="model after"))
+        without = Line(entity, "residual_before", "measured − model before", BASELINE)
+        after = replace(left.lines[0], name="measured − model after")
+        reach = max(left.reach or 0.0, _reach(trace.measured - trace.before))
+        left = replace(left, lines=(without, after), reach=reach)
     words = f"{with_unit(trace.signal)}, model {KINDS[trace.kind]}"
-    lines = (
-        Line(entity, "measured", "measured", MEASURED, WIDE),
-        Line(entity, "model", "model", MODEL),
-    )
-    left = np.abs(trace.measured - trace.model)
-    reach = AIR * float(np.nanmax(left)) if np.isfinite(left).any() else 1.0
-    line = Line(entity, "residual", "measured − model", RESIDUAL)
-    residual = ViewPlan(f"{with_unit(trace.signal)}, left over", (line,), 1.0, reach or 1.0)
-    return ViewPlan(words, lines, 2.0), residual
+    return ViewPlan(words, lines, 2.0), left
+
+
+def _left(trace: Trace) -> ViewPlan:
+    """What the model leaves, on an axis of its own size."""
+    line = Line(entity_of(trace), "residual", "measured − model", RESIDUAL)
+    words = f"{with_unit(trace.signal)}, left over"
+    return ViewPlan(words, (line,), 1.0, _reach(trace.measured - trace.model))
+
+
+def _reach(residual: NDArray[np.float64]) -> float:
+    most = float(np.max(np.abs(residual), initial=0.0, where=np.isfinite(residual)))
+    return AIR * most or 1.0
 
 
 def loupes(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
@@ -184,10 +204,8 @@ def loupes(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
     for trace in own[:MOST_LOUPES]:
         around_s = round_s(float(np.ptp(trace.t_s)) / LOUPE_SHARE)
         words = f"Loupe ±{quantity(around_s, 's', 2)}: "
-        signal, residual = _views_of(trace)
-        plans += [
-            replace(one, name=words + one.name, around_s=around_s) for one in (signal, residual)
-        ]
+        both = (_views_of(trace)[0], _left(trace))
+        plans += [replace(one, name=words + one.name, around_s=around_s) for one in both]
     return tuple(plans)
 
 

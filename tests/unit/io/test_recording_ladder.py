@@ -112,6 +112,26 @@ def test_the_page_of_a_step_says_what_came_and_every_error_so_far(ladder: Path) 
     assert page == step_markdown(make_diagnosis(), 1)
 
 
+def test_a_signal_stands_beside_the_model_before_and_after(tmp_path: Path) -> None:
+    """Both residuals on one axis that holds the larger; in the loupe what is left, large."""
+    from rerun.chunk import RrdReader
+
+    result = make_comparison(added=True)
+    write_comparison_recording(result, tmp_path / "c.rrd")
+    stream = RrdReader(str(tmp_path / "c.rrd")).stream()
+    chunks = stream.filter(content=entity_of(result.traces[0]), is_static=False)
+    back = pl.concat([pl.from_arrow(c.to_record_batch()) for c in chunks]).sort("t")
+    back = back.explode("measured", "model", "before", "residual_before").drop_nans("model")
+    far = (back["measured"] - back["before"]).to_numpy()
+    assert far == pytest.approx(back["residual_before"].to_numpy(), abs=1e-6)
+    assert far == pytest.approx(2.01, rel=1e-3)
+    signal, left = planned(result, "a/drive 0.mcap")[:2]
+    assert [line.component for line in signal.lines] == ["measured", "before", "model"]
+    assert [line.component for line in left.lines] == ["residual_before", "residual"]
+    assert left.reach == pytest.approx(1.1 * 2.01, rel=1e-3)
+    assert loupes(result, "a/drive 0.mcap")[1].reach == pytest.approx(0.011, rel=1e-3)
+
+
 def test_the_signal_farthest_over_its_floor_comes_first_and_one_without_map_last() -> None:
     assert mapped_signals(make_diagnosis()) == ("vq_v", "v_pair_v")
     assert mapped_signals(replace(make_diagnosis(), ladder=())) == ()
@@ -128,7 +148,8 @@ def test_equal_work_has_equal_content_and_no_wall_clock(ladder: Path, tmp_path: 
         assert "log_time" not in chunk.to_record_batch().schema.names
 
 
-def make_comparison() -> Comparison:
+def make_comparison(*, added: bool = False) -> Comparison:
+    """A model 10 mA or mV off; 2 more without what was `added`."""
     t = np.arange(500) * 1e-4
     told = np.sin(40 * t)
     made = told - 0.01
@@ -137,6 +158,8 @@ def make_comparison() -> Comparison:
         Trace("a/drive 0.mcap", "iq_a", "free_run", "held_out", t, told, made),
         Trace("a/drive 0.mcap", "vq_v", "equation", "held_out", t, told, made),
     )
+    if added:
+        traces = tuple(replace(one, before=made - 2.0) for one in traces)
     error = SignalError("iq_a", "a/drive 0.mcap", "held_out", 0.01, 0.002, 5, 4.0, "A", "free_run")
     return Comparison("m", "standard", (), {}, (error,), 5.0, (), traces=traces)
 
