@@ -11,10 +11,10 @@ from typing import TextIO
 
 from pipeline.cli.colour import coloured, wanted
 from pipeline.cli.commands import COMMANDS, Command, overview, program, usage
-from pipeline.cli.flags import Flags, split_flags
+from pipeline.cli.flags import Flags, asks_for_json, split_flags
 from pipeline.records.errors import PipelineError, UsageError, meant
 from pipeline.records.naming import printable
-from pipeline.records.outcome import INTERRUPTED, Outcome, first_that_applies
+from pipeline.records.outcome import INTERRUPTED, Fault, Outcome, fault_of, first_that_applies
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -25,21 +25,28 @@ def main(arguments: list[str] | None = None) -> int:
         # A sum split over threads depends on their number; results must not.
         os.environ.setdefault(name, "1")
     given = sys.argv[1:] if arguments is None else arguments
-    return _show(_guarded(lambda: _perform(given)))
+    return _show(_guarded(given))
 
 
-def _guarded(perform: Callable[[], Outcome]) -> Outcome:
-    """The outcome of a command; an expected failure becomes one line and its exit code."""
+def _guarded(arguments: Sequence[str]) -> Outcome:
+    """The outcome of a command; an expected failure becomes one line and its exit code, and with
+    `json=true` an object as well.
+    """
     try:
-        return perform()
+        return _perform(arguments)
     except PipelineError as error:
-        return Outcome(error.exit_code, errors=(f"error: {error}",))
+        failed = Outcome(error.exit_code, errors=(f"error: {error}",), faults=(fault_of(error),))
     except OSError as error:
         what = error.filename or "the system"
-        return Outcome(5, errors=(f"error: {what}: {error.strerror}",))
+        failed = Outcome(5, errors=(f"error: {what}: {error.strerror}",))
+        fault = Fault("error", str(error.strerror), file=error.filename, code="system")
+        failed = replace(failed, faults=(fault,))
     except KeyboardInterrupt:
-        again = "error: interrupted; rerun the same command to go on"
-        return Outcome(INTERRUPTED, errors=(again,))
+        again = "rerun the same command to go on"
+        failed = Outcome(INTERRUPTED, errors=(f"error: interrupted; {again}",))
+        failed = replace(failed, faults=(Fault("error", "interrupted", again, code="interrupted"),))
+    command = next((word for word in arguments if not word.startswith("-")), "")
+    return _as_json(command, failed) if asks_for_json(arguments) else failed
 
 
 def _perform(arguments: Sequence[str]) -> Outcome:
@@ -85,10 +92,10 @@ def _run(command: Command, flags: Flags, words: Sequence[str]) -> Outcome:
         outcome: Outcome = stage.main(settings)
     if not settings.timings:
         outcome = replace(outcome, timings=())
-    return _as_json(command, outcome) if settings.json else outcome
+    return _as_json(command.name, outcome) if settings.json else outcome
 
 
-def _as_json(command: Command, outcome: Outcome) -> Outcome:
+def _as_json(command: str, outcome: Outcome) -> Outcome:
     """The outcome with one JSON object for its text; errors stay on standard error as well."""
     import json
 
@@ -96,11 +103,12 @@ def _as_json(command: Command, outcome: Outcome) -> Outcome:
 
     document = {
         "schema": "outcome/1",
-        "command": command.name,
+        "command": command,
         "exit_code": outcome.exit_code,
         "result": outcome.result,
         "text": outcome.text.splitlines(),
         "messages": list(outcome.errors),
+        "errors": list(outcome.faults),
         "wrote": outcome.wrote or None,
         "next": outcome.next or None,
         "seconds": dict(outcome.timings),

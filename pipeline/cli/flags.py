@@ -92,3 +92,16 @@ def _known(typed: str) -> str:
     names = [flag.split()[0] for flag in FLAGS]
     near = get_close_matches(typed, names, 1)
     return f"did you mean {near[0]}?" if near else f"known are {', '.join(names)}"
+
+
+def asks_for_json(words: Sequence[str]) -> bool:
+    """Whether a command line asks for JSON, well formed or not otherwise.
+
+    Parameters
+    ----------
+    words
+        The command line without the program.
+
+    """
+    stated = [word.partition("=")[2] for word in words if word.startswith("json=")]
+    return bool(stated) and stated[-1].lower() in ("true", "yes", "on", "1")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from itertools import product
 
 from pipeline.cli.commands import Command
+from pipeline.cli.flags import asks_for_json
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome, first_that_applies
 
@@ -41,7 +42,7 @@ def sweep(command: Command, words: Sequence[str], run: Callable[[list[str]], Out
     runs = list(product(*choices))
     if len(runs) > MOST_RUNS:
         raise UsageError(f"--multirun: {len(runs)} runs", f"at most {MOST_RUNS}; sweep fewer keys")
-    as_json = "json=true" in words
+    as_json = asks_for_json(words)
     texts, errors, codes, results = [], [], [], []
     for combination in runs:
         name = ",".join(combination[number] for number in swept)

@@ -10,9 +10,12 @@ MOST_CHARS = 1500
 
 
 class PipelineError(Exception):
-    """Base of every error this project raises on purpose; `exit_code` is the command's."""
+    """Base of every error this project raises on purpose; `exit_code` is the command's, `file` the
+    path of the file that it is about, where it ends a command.
+    """
 
     exit_code = 5
+    file: str | None = None
 
     def __init__(self, message: str, remedy: str = "") -> None:
         super().__init__(message)

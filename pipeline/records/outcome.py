@@ -3,10 +3,69 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
+
+from pipeline.records.errors import PipelineError
+from pipeline.records.finding import Finding
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What went wrong, as `json=true` prints it under `errors`.
+
+    Attributes
+    ----------
+    severity
+        `error` where it ended the command, `refused` or `warning` as a finding.
+    message, remedy
+        What is wrong, and what to do about it.
+    file
+        Path of the file; None where it is not about one.
+    rows
+        First and last row concerned, from 0.
+    code
+        Short stable identifier.
+
+    """
+
+    severity: str
+    message: str
+    remedy: str = ""
+    file: str | None = None
+    rows: tuple[int, int] | None = None
+    code: str = ""
+
+
+def fault_of(error: PipelineError) -> Fault:
+    """An error that ended a command, as data.
+
+    Parameters
+    ----------
+    error
+        The error.
+
+    """
+    code = getattr(error, "code", type(error).__name__.removesuffix("Error").lower())
+    rows = getattr(error, "rows", None)
+    return Fault("error", error.message, error.remedy, error.file, rows, code)
+
+
+def faults_of(findings: Iterable[Finding]) -> tuple[Fault, ...]:
+    """Findings on files, as data.
+
+    Parameters
+    ----------
+    findings
+        The findings.
+
+    """
+    return tuple(
+        Fault(one.severity, one.message, one.remedy, one.file, one.rows, one.code)
+        for one in findings
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +91,8 @@ class Outcome:
         Path where results lie.
     next
         The command that a user would sensibly give next.
+    faults
+        What `errors` says of files, and of what ended the command, as plain data.
 
     """
 
@@ -43,6 +104,7 @@ class Outcome:
     result: Any = None
     wrote: str = ""
     next: str = ""
+    faults: tuple[Fault, ...] = ()
 
 
 INTERRUPTED = 130

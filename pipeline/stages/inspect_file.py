@@ -10,7 +10,7 @@ from pipeline.io.ingest.guard import ReadLimits
 from pipeline.physics.glossary import TESTS
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.naming import counted, printable
-from pipeline.records.outcome import Outcome
+from pipeline.records.outcome import Outcome, faults_of
 from pipeline.settings import InspectSettings
 from pipeline.stages import inspect_map
 from pipeline.stages.inspect_record import file_record
@@ -46,16 +46,21 @@ def main(settings: InspectSettings) -> Outcome:
         (seen,) = in_workers(look_into, [task])
     except CaptureError as error:
         message = f"{printable(settings.file)}: {error.message}"
-        raise CaptureError(error.code, message, error.remedy, error.rows) from error
+        refusal = CaptureError(error.code, message, error.remedy, error.rows)
+        refusal.file = settings.file
+        raise refusal from error
     text = render(seen.report)
     code = CaptureError.exit_code if seen.refusals else 0
+    refused = tuple(finding.line() for finding in seen.refusals)
+    faults = faults_of(seen.refusals)
     record = {"files": [file_record(seen.file, seen.report)]}
     if seen.report.shape is None and not settings.check:
         result: dict[str, object] = {**record, "asked": {}, "map": None, "motors": None}
-        return Outcome(code, text, seen.refusals, result=result)
+        return Outcome(code, text, refused, result=result, faults=faults)
     more = inspect_map.finish(settings, str(place.parent), [seen], (seen.file,))
     code = more.exit_code if settings.check else code
-    return Outcome(code, text + more.text, seen.refusals, result={**record, **more.result})
+    result = {**record, **more.result}
+    return Outcome(code, text + more.text, refused, result=result, faults=faults)
 
 
 def render(report: InspectReport) -> str:

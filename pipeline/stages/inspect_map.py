@@ -19,7 +19,7 @@ from pipeline.physics.glossary import METADATA, OHMMETER, TESTS_WITHOUT_CLOCK
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.finding import lines_of
 from pipeline.records.naming import counted, printable
-from pipeline.records.outcome import Outcome, first_that_applies
+from pipeline.records.outcome import Outcome, faults_of, first_that_applies
 from pipeline.settings import InspectSettings
 from pipeline.stages.inspect_record import file_record, motor_lines, motor_record
 
@@ -303,4 +303,6 @@ def _check(
         lines.append("no capture can be used yet")
     code = first_that_applies(3 if refused else 0, 0 if found.campaigns else 4)
     errors = tuple(lines_of(found.findings))
-    return Outcome(code, "\n".join(lines), errors, result={"motors": motors})
+    return Outcome(
+        code, "\n".join(lines), errors, result={"motors": motors}, faults=faults_of(found.findings)
+    )

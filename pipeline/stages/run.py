@@ -27,7 +27,12 @@ from pipeline.execution.outputs.publishing import (
     removed_note,
     with_folder_names,
 )
-from pipeline.execution.outputs.statuses import histories_of, status_now, with_current_statuses
+from pipeline.execution.outputs.statuses import (
+    findings_of,
+    histories_of,
+    status_now,
+    with_current_statuses,
+)
 from pipeline.execution.tasks.survey_tasks import survey_with
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
@@ -47,7 +52,7 @@ from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Event, Revocation
 from pipeline.records.naming import printable
-from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
+from pipeline.records.outcome import Outcome, Stopwatch, faults_of, first_that_applies
 from pipeline.report.text.progress import progress
 from pipeline.report.text.waiting import waiting
 from pipeline.settings import RunSettings
@@ -107,7 +112,8 @@ def main(settings: RunSettings) -> Outcome:
         outcome = _run(settings, registry, workers)
     if not settings.json:
         return outcome
-    return replace(outcome, result=[sheet.document() for sheet in read_datasheets(output)])
+    sheets = [sheet.document() for sheet in read_datasheets(output)]
+    return replace(outcome, result=sheets, faults=faults_of(findings_of(Path(output))))
 
 
 def process_motor(job: MotorJob | ModelTest | WarmUp) -> MotorResult | None:

@@ -159,16 +159,30 @@ def show_decision(registry: Registry, motor_id: str) -> tuple[str, ...]:
     return tuple((output / page).as_posix() for page in pages)
 
 
+def findings_of(output: Path) -> tuple[Finding, ...]:
+    """The findings of the last run of an output folder; none where nothing was run.
+
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+
+    """
+    try:
+        documents = json.loads((output / "findings.json").read_bytes())["findings"]
+    except FileNotFoundError:
+        return ()
+    return tuple(record_of(Finding, document) for document in documents)
+
+
 def _index(output: Path, versions: Histories) -> Iterable[str]:
     from pipeline.report.pages.fleet_page import render_fleet
 
     paths = sorted((output / "datasheets").glob("*.json"))
     sheets = [replace(read_datasheet(path), alternatives=(), captures=()) for path in paths]
     statuses = {sheet.motor_id: status_now(output, sheet, versions) for sheet in sheets}
-    documents = json.loads((output / "findings.json").read_bytes())["findings"]
-    findings = [record_of(Finding, document) for document in documents]
     links = links_of(output, INDEX)
-    after = render_fleet(sheets, findings, statuses, links).encode()
+    after = render_fleet(sheets, findings_of(output), statuses, links).encode()
     if after == (output / INDEX).read_bytes():
         return ()
     write_whole(output / INDEX, after)

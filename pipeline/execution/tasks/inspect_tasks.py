@@ -30,11 +30,11 @@ class InspectTask(OfFile):
 
 @dataclass(frozen=True, slots=True)
 class Looked:
-    """The report of one file, and the lines by which `run` would refuse it."""
+    """The report of one file, and why `run` would refuse it."""
 
     file: str
     report: InspectReport
-    refusals: tuple[str, ...]
+    refusals: tuple[Finding, ...]
 
 
 def in_workers(work: Callable[[Any], Any], tasks: Sequence[Any]) -> list[Any]:
@@ -89,7 +89,7 @@ def look_into(task: InspectTask) -> Looked:
         if not report.faults:
             faults = tuple(f"{one.message}; {one.remedy}" for one in refusals)
             report = replace(report, faults=faults)
-    return Looked(task.file, report, tuple(finding.line() for finding in refusals))
+    return Looked(task.file, report, refusals)
 
 
 def _refusals(path: Path, sources: Mapping[str, SourceMap]) -> tuple[Finding, ...]:

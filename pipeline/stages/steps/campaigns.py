@@ -22,7 +22,7 @@ from pipeline.io.maps.places import source_maps
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import MachineError, UsageError, meant
 from pipeline.records.finding import Finding, lines_of
-from pipeline.records.outcome import Outcome, first_that_applies
+from pipeline.records.outcome import Outcome, faults_of, first_that_applies
 from pipeline.report.text.console import nothing_usable
 
 
@@ -129,4 +129,5 @@ def outcome_of(
     if gathered.note:
         lines.append(f"note: {gathered.note}")
     code = first_that_applies(3 if refused else 0, 4 if undecided else 0)
-    return Outcome(code, "\n".join(texts), tuple(lines))
+    faults = faults_of(gathered.findings)
+    return Outcome(code, "\n".join(texts), tuple(lines), faults=faults)

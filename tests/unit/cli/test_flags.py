@@ -169,6 +169,50 @@ def test_json_holds_the_answer_and_the_exit_code(tmp_path: Path, capsys) -> None
     )
 
 
+def failing(capsys, *words: str) -> tuple[int, dict]:
+    """Exit code and JSON of a command that fails; standard error has a line as well."""
+    code = main([*words, "json=true"])
+    seen = capsys.readouterr()
+    assert seen.err.strip()
+    document = json.loads(seen.out)
+    assert document["exit_code"] == code
+    return code, document
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "kind"),
+    [
+        (("diagnos",), 2, "usage"),
+        (("run", "inputs=x"), 2, "usage"),
+        (("run", "input=nowhere"), 2, "usage"),
+        (("inspect", "missing.csv"), 2, "usage"),
+    ],
+)
+def test_a_command_that_fails_prints_json_with_the_remedy(words, code, kind, capsys) -> None:
+    """The same that stands on standard error, in parts; the exit code stays."""
+    ended, document = failing(capsys, *words)
+    (error,) = document["errors"]
+    assert (ended, error["severity"], error["code"]) == (code, "error", kind)
+    assert (document["command"], document["result"]) == (words[0], None)
+    assert error["message"] and error["remedy"]
+    assert f"error: {error['message']}; {error['remedy']}" == document["messages"][0]
+
+
+def test_refused_captures_are_named_in_json_with_rows_and_remedy(tmp_path: Path, capsys) -> None:
+    """A file of bytes that are no capture, alone and in a folder beside none other."""
+    bad = tmp_path / "in" / "bad.csv"
+    bad.parent.mkdir()
+    bad.write_text("# contract: 1\n# motor_id: m\n# test: drive\nt_s,vq_v\n0,1\n1,x\n")
+    code, document = failing(capsys, "compare", f"input={bad.parent}", f"output={tmp_path / 'o'}")
+    (error,) = document["errors"]
+    assert (code, error["severity"], error["file"]) == (3, "refused", "bad.csv")
+    assert error["rows"] == [1, 1]
+    assert error["remedy"]
+    code, document = failing(capsys, "inspect", str(bad))
+    (seen,) = document["errors"]
+    assert (code, seen["file"], seen["rows"], seen["code"]) == (3, "bad.csv", [1, 1], error["code"])
+
+
 def test_a_sweep_in_json_is_one_list(capsys) -> None:
     found = json.loads(printed(capsys, "calc", "kv", "kv=340,350", "--multirun", "json=true"))
     first, second = (one["result"]["lines"][0]["value"] for one in found)
