@@ -89,8 +89,7 @@ def shaft_angle(capture: Capture, t_s: Array) -> Array | None:
                 continue
             clock, values = clock[good], values[good]
             angle = values if name == "theta_mech_rad" else integral(clock, values)
-            moved: Array = np.interp(t_s, clock, angle, left=np.nan, right=np.nan)
-            return moved
+            return np.interp(t_s, clock, angle, left=np.nan, right=np.nan)
     return None
 
 

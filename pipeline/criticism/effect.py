@@ -361,8 +361,7 @@ class Operating(Samples):
             Cosine and sine.
 
         """
-        waves: tuple[Any, Any] = self.once(self.eps_rad, order, lambda: _waves(order, self.eps_rad))
-        return waves
+        return self.once(self.eps_rad, order, lambda: _waves(order, self.eps_rad))
 
     def shaft_waves(self, order: int) -> tuple[Array, Array]:
         """Cosine and sine of a multiple of the shaft angle, as a sample's torque contains them.
@@ -386,8 +385,7 @@ class Operating(Samples):
 
         """
         name = ("shaft", order, self.shaft.held)
-        waves: tuple[Array, Array] = self.once(self.theta_rad, name, lambda: self._turned(order))
-        return waves
+        return self.once(self.theta_rad, name, lambda: self._turned(order))
 
     def _turned(self, order: int) -> tuple[Array, Array]:
         angle, finer = order * self.theta_rad, self.shaft.finer > 1
@@ -434,8 +432,7 @@ class Operating(Samples):
         """Complex rotor-frame current d + jq [A]."""
         name = ("current", id(self.iq_a))
         _, current = self.once(self.id_a, name, lambda: (self.iq_a, self.id_a + 1j * self.iq_a))
-        whole: Complex = current
-        return whole
+        return current
 
     @property
     def flux_wb(self) -> Complex:
@@ -575,6 +572,7 @@ def between(signal: Any, at: Array) -> Any:
 
 
 Values = Mapping[str, float]
+Signals = Mapping[str, Array]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,22 +7,21 @@ by the machine's model, and what that shows of the model. It is one file in `equ
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.records.capture import Capture
 
-Signals = Mapping[str, Array]
 Cut = Callable[[Capture, Machine], Segment | None]
 State = Callable[[Segment, Signals, Model, Values], Operating]
 Measured = Callable[[Segment, Signals, Model, Values], Array]
 Predicted = Callable[[Segment, Operating, Pieces, Model, Values], Array]
 Reading = Callable[[Segment, str, Model, Values], Array]
-Sensed = Callable[[Segment, Array, Model, Values], Mapping[str, Array]]
+Sensed = Callable[[Segment, Array, Model, Values], Signals]
 
 
 @dataclass(frozen=True, slots=True)

@@ -149,10 +149,8 @@ def _accepted(eta: Array, tolerance: Tolerance, u: float) -> Array:
     if low > high:
         return np.zeros(eta.shape)
     if u == 0.0:
-        inside: Array = ((eta >= low) & (eta <= high)).astype(float)
-        return inside
-    taken: Array = ndtr((high - eta) / u) - ndtr((low - eta) / u)
-    return taken
+        return ((eta >= low) & (eta <= high)).astype(float)
+    return ndtr((high - eta) / u) - ndtr((low - eta) / u)
 
 
 def _nodes(start: float, end: float) -> tuple[Array, Array]:

@@ -85,8 +85,7 @@ def _best(
     at = np.argmax(torque, axis=1)[:, None]
 
     def taken(values: Array) -> Array:
-        found: Array = np.take_along_axis(values, at, axis=1)[:, 0]
-        return found
+        return np.take_along_axis(values, at, axis=1)[:, 0]
 
     most = taken(torque)
     most = np.where(np.isfinite(most), most, np.nan)

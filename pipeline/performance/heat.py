@@ -62,8 +62,7 @@ def continuous_current_a(
 
     """
     left = np.maximum(rise_k / rth_k_w - other_w, 0.0)
-    found: Array = np.sqrt(left / (1.5 * r_limit_ohm))
-    return found
+    return np.sqrt(left / (1.5 * r_limit_ohm))
 
 
 def time_to_limit_s(

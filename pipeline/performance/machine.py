@@ -138,8 +138,7 @@ def torque_nm(machine: Machine, id_a: Array, iq_a: Array) -> Array:
     """
     ld, lq = inductances_h(machine, id_a, iq_a)
     flux = _wide(machine.psi_wb, id_a) + (ld - lq) * id_a
-    found: Array = 1.5 * machine.pole_pairs * flux * iq_a
-    return found
+    return 1.5 * machine.pole_pairs * flux * iq_a
 
 
 def voltage_v(machine: Machine, id_a: Array, iq_a: Array, omega_rad_s: Array) -> Array:
@@ -171,8 +170,7 @@ def voltage_v(machine: Machine, id_a: Array, iq_a: Array, omega_rad_s: Array) ->
     r = _wide(machine.r_ohm, id_a)
     d = r * id_a - omega * lq * iq_a
     q = r * iq_a + omega * (ld * id_a + _wide(machine.psi_wb, id_a))
-    found: Array = np.hypot(d, q)
-    return found
+    return np.hypot(d, q)
 
 
 def drag_nm(machine: Machine, omega_rad_s: Array) -> Array:
@@ -204,8 +202,7 @@ def drag_nm(machine: Machine, omega_rad_s: Array) -> Array:
     speeds = np.asarray(omega_rad_s)
     coulomb = machine.coulomb_nm.reshape(-1, *([1] * speeds.ndim))
     viscous = machine.viscous_nm_s_rad.reshape(-1, *([1] * speeds.ndim))
-    found: Array = coulomb + viscous * speeds
-    return found
+    return coulomb + viscous * speeds
 
 
 def copper_w(machine: Machine, id_a: Array, iq_a: Array) -> Array:
@@ -230,8 +227,7 @@ def copper_w(machine: Machine, id_a: Array, iq_a: Array) -> Array:
     IEC 60034-2-1 (winding losses).
 
     """
-    found: Array = 1.5 * _wide(machine.r_ohm, id_a) * (id_a**2 + iq_a**2)
-    return found
+    return 1.5 * _wide(machine.r_ohm, id_a) * (id_a**2 + iq_a**2)
 
 
 def inverter_w(drop_v: float, on_ohm: float, current_a: Array) -> Array:
@@ -257,8 +253,7 @@ def inverter_w(drop_v: float, on_ohm: float, current_a: Array) -> Array:
     + r i.
 
     """
-    found: Array = 3.0 * (drop_v * 2.0 * current_a / np.pi + on_ohm * current_a**2 / 2.0)
-    return found
+    return 3.0 * (drop_v * 2.0 * current_a / np.pi + on_ohm * current_a**2 / 2.0)
 
 
 def _wide(values: Array, like: Array) -> Array:

@@ -41,8 +41,7 @@ def to_grid(values: Array, step: float) -> Array:
         Resolution [unit of the values].
 
     """
-    rounded: Array = np.round(values / step) * step
-    return rounded
+    return np.round(values / step) * step
 
 
 def first_order_lag(signal: Array, step: float) -> Array:
@@ -70,8 +69,7 @@ def first_order_lag(signal: Array, step: float) -> Array:
 
     kept = math.exp(-step)
     mean = -math.expm1(-step) / step
-    late: Array = lfilter([1.0 - mean, mean - kept], [1.0, -kept], signal - signal[0]) + signal[0]
-    return late
+    return lfilter([1.0 - mean, mean - kept], [1.0, -kept], signal - signal[0]) + signal[0]
 
 
 def scope_range(largest: float) -> float:
@@ -113,8 +111,7 @@ def late(signal: Array, t_s: Array, delay_s: float) -> Array:
     """
     if delay_s == 0.0:
         return signal
-    found: Array = np.interp(t_s - delay_s, t_s, signal)
-    return found
+    return np.interp(t_s - delay_s, t_s, signal)
 
 
 @dataclass(frozen=True, slots=True)
@@ -394,8 +391,7 @@ class Session:
             return bent
         half = 0.25 * rated
         behind = torque - played(np.ascontiguousarray(torque), half)
-        lost: Array = bent - 0.5 * bench.torque_hysteresis_rel * rated * behind / half
-        return lost
+        return bent - 0.5 * bench.torque_hysteresis_rel * rated * behind / half
 
     def temperature(self, degc: Array) -> Array:
         """A thermometer [n] with its offset.

@@ -199,8 +199,7 @@ def pair_inductance(session: Session, pair: str, eps: Array, degc: float) -> Arr
     c, s = np.cos(eps), np.sin(eps)
     w_d, w_q = c * alpha + s * beta, c * beta - s * alpha
     l = inductances(np.ascontiguousarray(eps), degc, session.plant)
-    both: Array = 1.5 * (l[:, 0] * w_d**2 + l[:, 1] * w_q**2 + 2.0 * l[:, 2] * w_d * w_q)
-    return both
+    return 1.5 * (l[:, 0] * w_d**2 + l[:, 1] * w_q**2 + 2.0 * l[:, 2] * w_d * w_q)
 
 
 def lcr(session: Session, how: protocols.Lcr) -> Recording:

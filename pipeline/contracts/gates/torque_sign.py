@@ -57,8 +57,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 def _without_drift(means: Array) -> Array:
     """Columns [n, k] less their least-squares parabola in time."""
     time = np.vander(np.linspace(-1.0, 1.0, means.shape[0]), 3)
-    left: Array = means - time @ np.linalg.lstsq(time, means, rcond=None)[0]
-    return left
+    return means - time @ np.linalg.lstsq(time, means, rcond=None)[0]
 
 
 def _promised_nm_a(vq_v: Array, omega_rad_s: Array) -> float:

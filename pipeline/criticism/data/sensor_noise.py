@@ -155,8 +155,7 @@ def unrounded(signal: Array, step: float) -> Array:
     middle = 0.5 * (signal[slow] + signal[slow + 1])
     level = np.concatenate([middle, signal[far], signal[far + 1], signal[[0, -1]]])
     order = np.argsort(known, kind="stable")
-    estimate: Array = np.interp(np.arange(signal.size), known[order], level[order])
-    return estimate
+    return np.interp(np.arange(signal.size), known[order], level[order])
 
 
 def rounding_error(signal: Array, step: float, shift: float, smooth: int) -> Array:
@@ -183,8 +182,7 @@ def rounding_error(signal: Array, step: float, shift: float, smooth: int) -> Arr
     kernel = np.full(smooth, 1.0 / smooth)
     padded = np.pad(signal / step, smooth // 2, mode="reflect", reflect_type="odd")
     even = np.convolve(padded, kernel, mode="valid") + shift
-    error: Array = (np.round(even) - even) * step
-    return error
+    return (np.round(even) - even) * step
 
 
 def rounding_step(signal: Array, policy: SensorNoise) -> float:
@@ -280,16 +278,14 @@ def _parts(signal: Array, length: int) -> Array:
     inside = np.linspace(0, length - 1, min(length, _LOOKED_AT // starts.size))
     parts = signal[starts[:, None] + inside.round().astype(np.int64)]
     span = np.ptp(parts, axis=1)
-    wide: Array = (parts - parts[:, :1])[span >= np.median(span)]
-    return wide
+    return (parts - parts[:, :1])[span >= np.median(span)]
 
 
 def _coherence(parts: Array, steps: Array) -> Array:
     """How well the phases e^{j2π x/q} of parts [parts, samples] stay together, for steps q [n]."""
-    coherence: Array = np.array(
+    return np.array(
         [np.abs(np.exp((2j * np.pi / step) * parts).mean(axis=1)).mean() for step in steps]
     )
-    return coherence
 
 
 def is_rounded(signal: Array, step: float, policy: SensorNoise) -> bool:

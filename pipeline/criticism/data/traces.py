@@ -164,8 +164,7 @@ def smoothed(signal: Array, width: int) -> Array:
         [np.full(half, signal[:half].mean()), signal, np.full(half, signal[-half:].mean())]
     )
     total = np.concatenate([[0.0], np.cumsum(padded)])
-    mean: Array = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-    return mean
+    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
 
 
 def decimated(signal: Array, factor: int) -> Array:
@@ -185,8 +184,7 @@ def decimated(signal: Array, factor: int) -> Array:
 
     """
     n = signal.size // factor * factor
-    mean: Array = signal[:n].reshape(-1, factor).mean(axis=1)
-    return mean
+    return signal[:n].reshape(-1, factor).mean(axis=1)
 
 
 def reversals(theta: Array, slack: float) -> NDArray[np.int64]:
@@ -598,8 +596,7 @@ def parabolas(signal: Array, width: int) -> Array:
     start, end = signal[:width], signal[-width:]
     middle = np.convolve(signal, weights[0][::-1], mode="valid")
     first, last = basis @ (weights @ start), basis @ (weights @ end)
-    fit: Array = np.concatenate([first[:half], middle, last[half + 1 :]])
-    return fit
+    return np.concatenate([first[:half], middle, last[half + 1 :]])
 
 
 def with_travel(columns: dict[str, Array], noise: Mapping[str, float], policy: Cutting) -> Array:

@@ -228,8 +228,7 @@ def _scanned(
         """Sums [T - 1] over what is later than each time but the last."""
         summed = np.zeros((times.size, *parts.shape[1:]))
         np.add.at(summed, bins, parts)
-        total: Array = np.cumsum(summed[::-1], axis=0)[::-1][1:]
-        return total
+        return np.cumsum(summed[::-1], axis=0)[::-1][1:]
 
     cross = after(weighted[seen] * changing[:, None])
     slopes = after(weight[seen] * changing * system.residual[seen]) - cross @ inverse @ slope

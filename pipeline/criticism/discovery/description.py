@@ -161,8 +161,7 @@ def turn_angles(orders: Sequence[float]) -> Array:
 
     """
     points = max(_TURN_POINTS, _A_WAVE * math.ceil(max(orders, default=1.0)))
-    angles: Array = 2 * np.pi * np.arange(points) / points
-    return angles
+    return 2 * np.pi * np.arange(points) / points
 
 
 def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:
@@ -179,8 +178,7 @@ def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:
         first = 2 * few.orders.index(order)
         block[:, first : first + 2] = 0.0
         block[fine.nodes.size + 2 * n, first] = block[fine.nodes.size + 2 * n + 1, first + 1] = 1.0
-    every: Array = np.asarray(np.kron(np.eye(len(pursuit.port.carriers)), block), dtype=float)
-    return every
+    return np.asarray(np.kron(np.eye(len(pursuit.port.carriers)), block), dtype=float)
 
 
 def _map_curve(pursuit: Pursuit, expression: Expression) -> tuple[CurvePoint, ...]:

@@ -146,11 +146,9 @@ class Term:
 
         """
         if self.kind in WAVES:
-            wave: Array = getattr(np, self.kind)(self.order * v)
-            return wave
+            return getattr(np, self.kind)(self.order * v)
         if self.kind == "bump":
-            bump: Array = np.exp((np.cos(v - self.centre) - 1.0) / self.scale**2)
-            return bump
+            return np.exp((np.cos(v - self.centre) - 1.0) / self.scale**2)
         size = v if self.parity == "plain" else np.abs(v)
         if self.kind in CENTRED:
             u = (size - self.centre) / self.scale

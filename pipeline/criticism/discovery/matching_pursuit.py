@@ -110,8 +110,7 @@ class Expression:
             return np.zeros(np.shape(v))
         slope = np.stack(rows)
         variance = np.einsum("iv,ij,jv->v", slope, self.covariance, slope)
-        spread: Array = np.sqrt(np.maximum(variance, 0.0))
-        return spread
+        return np.sqrt(np.maximum(variance, 0.0))
 
     def u(self, term: int, name: str) -> float:
         """Standard uncertainty of an amplitude or scale of a term.
@@ -234,10 +233,9 @@ class Pursuit:
 
         """
         normal = curves.T @ self.gram @ curves
-        amplitudes: Array = np.linalg.lstsq(
+        return np.linalg.lstsq(
             normal + _RIDGE * np.diag(np.diag(normal)), curves.T @ self.moment, rcond=1e-10
         )[0]
-        return amplitudes
 
     def curves(self, terms: Sequence[Term]) -> Array:
         """Terms as coefficients of the hats and waves of the input.
@@ -465,8 +463,7 @@ def _inverse(normal: Array) -> Array:
     if not normal.size:
         return normal
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    inverse: Array = np.linalg.pinv(unit_diagonal(normal), hermitian=True) / np.outer(scale, scale)
-    return inverse
+    return np.linalg.pinv(unit_diagonal(normal), hermitian=True) / np.outer(scale, scale)
 
 
 def curve_about(

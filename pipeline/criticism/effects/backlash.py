@@ -18,8 +18,7 @@ def _torque(x: Operating, q: Values) -> Array:
 
     def twist() -> Array:
         through = passed_on(x, share)
-        torque: Array = 0.5 * gap * side_of(through, q["torque_nm"]) + spring_twist(x, q, through)
-        return torque
+        return 0.5 * gap * side_of(through, q["torque_nm"]) + spring_twist(x, q, through)
 
     return far_drag(x, share, q["between"], twist)
 

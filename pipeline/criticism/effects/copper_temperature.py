@@ -6,8 +6,7 @@ from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Val
 
 
 def _drop(x: Operating, q: Values) -> Complex:
-    drop: Complex = x.base["r_ohm"] * q["alpha_1_k"] * x.winding_k * x.i_a
-    return drop
+    return x.base["r_ohm"] * q["alpha_1_k"] * x.winding_k * x.i_a
 
 
 EFFECT = Effect(

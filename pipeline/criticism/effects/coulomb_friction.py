@@ -8,8 +8,7 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _torque(x: Operating, q: Values) -> Array:
-    drag: Array = q["torque_nm"] * np.sign(x.omega_rad_s)
-    return drag
+    return q["torque_nm"] * np.sign(x.omega_rad_s)
 
 
 EFFECT = Effect(

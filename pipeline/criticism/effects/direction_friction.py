@@ -10,8 +10,7 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 def _torque(x: Operating, q: Values) -> Array:
     omega = x.omega_rad_s
     speed = np.abs(omega) / x.machine.scales["speed_rad_s"]
-    drag: Array = q["coulomb_nm"] * np.abs(np.sign(omega)) + q["viscous_nm"] * speed
-    return drag
+    return q["coulomb_nm"] * np.abs(np.sign(omega)) + q["viscous_nm"] * speed
 
 
 EFFECT = Effect(

@@ -10,8 +10,7 @@ from pipeline.criticism.machine.iron import PARALLEL, loss_current
 
 def _torque(x: Operating, q: Values) -> Array:
     flux = np.abs(x.flux_wb / x.base["psi_wb"]) ** (1.0 + q["steeper"])
-    drag: Array = q["drag_nm"] * np.sign(x.omega_rad_s) * flux
-    return drag
+    return q["drag_nm"] * np.sign(x.omega_rad_s) * flux
 
 
 def _parallel(x: Operating, q: Values) -> Complex:

@@ -8,8 +8,7 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _torque(x: Operating, q: Values) -> Array:
-    drag: Array = q["torque_nm"] * (_state(x, q["travel_rad"]) - np.sign(x.omega_rad_s))
-    return drag
+    return q["torque_nm"] * (_state(x, q["travel_rad"]) - np.sign(x.omega_rad_s))
 
 
 def _state(x: Operating, travel_rad: float) -> Array:
@@ -26,8 +25,7 @@ def _state(x: Operating, travel_rad: float) -> Array:
         for left in fading[:-1].tolist():
             lacks.append(2.0 - lacks[-1] * left)
         lack, sense = np.array(lacks)[x.shaft.run], np.sign(x.shaft.runs_rad)[x.shaft.run]
-    state: Array = sense * (1.0 - lack * np.exp(-x.travel_rad / travel_rad))
-    return state
+    return sense * (1.0 - lack * np.exp(-x.travel_rad / travel_rad))
 
 
 EFFECT = Effect(

@@ -23,16 +23,13 @@ def _voltage(v_v: Complex, x: Operating, q: Values, _: str) -> Complex:
     turn = x.machine.pole_pairs * x.omega_rad_s * q["delay_s"]
     if x.supply.q_alone:
         # what is turned into the q axis cannot be known without the d axis
-        late: Complex = v_v + 1j * q["delay_s"] / x.ts_s * np.gradient(v_v.imag)
-        return late
-    turned: Complex = v_v * np.exp(1j * turn)
-    return turned
+        return v_v + 1j * q["delay_s"] / x.ts_s * np.gradient(v_v.imag)
+    return v_v * np.exp(1j * turn)
 
 
 def _speed(omega: Array, q: Values, period: float) -> Array:
     back = q["of_speed"] * q["delay_s"] / period
-    late: Array = between(omega, np.arange(omega.size, dtype=np.float64) - back) if back else omega
-    return late
+    return between(omega, np.arange(omega.size, dtype=np.float64) - back) if back else omega
 
 
 EFFECT = Effect(

@@ -14,14 +14,12 @@ from pipeline.criticism.effect import Array, Complex, Effect, Operating, Paramet
 
 def _bench(x: Operating) -> NDArray[np.bool_]:
     """Whether an instrument drives each sample [n] at standstill: a step, or an LCR meter."""
-    still: NDArray[np.bool_] = (x.omega_rad_s == 0.0) & (not x.inverter)
-    return still
+    return (x.omega_rad_s == 0.0) & (not x.inverter)
 
 
 def _square(x: Operating) -> Array:
     """Square [n] of the frequency over the machine's highest."""
-    square: Array = (x.freq_hz / x.machine.scales["freq_hz"]) ** 2
-    return square
+    return (x.freq_hz / x.machine.scales["freq_hz"]) ** 2
 
 
 def _late_s(x: Operating, q: Values) -> float:
@@ -66,8 +64,7 @@ def _in_a_step(x: Operating, q: Values) -> Complex:
     moves = new * current[1:] + (1.0 - kept - new) * current[:-1]
     inwards = accumulate(moves.tolist(), lambda now, move: kept * now + move, initial=current[0])
     inside = np.fromiter(inwards, dtype=np.complex128, count=current.size)
-    voltage: Complex = _inner_h(x, q) / late * (current - inside)
-    return voltage
+    return _inner_h(x, q) / late * (current - inside)
 
 
 EFFECT = Effect(

@@ -14,8 +14,7 @@ def _torque(x: Operating, q: Values) -> Array:
     fast = np.abs(x.omega_rad_s / q["speed_rad_s"]) ** q["exponent"]
     slowed = np.log1p(q["tail"] * fast) / q["tail"] if q["tail"] > _NO_TAIL else fast
     bump = np.exp(-slowed)
-    drag: Array = q["excess_nm"] * bump * np.sign(x.omega_rad_s)
-    return drag
+    return q["excess_nm"] * bump * np.sign(x.omega_rad_s)
 
 
 EFFECT = Effect(

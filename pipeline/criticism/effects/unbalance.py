@@ -8,8 +8,7 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _torque(x: Operating, q: Values) -> Array:
-    wave: Array = q["sin_nm"] * np.sin(x.theta_rad) + q["cos_nm"] * np.cos(x.theta_rad)
-    return wave
+    return q["sin_nm"] * np.sin(x.theta_rad) + q["cos_nm"] * np.cos(x.theta_rad)
 
 
 EFFECT = Effect(

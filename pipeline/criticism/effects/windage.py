@@ -9,8 +9,7 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 def _torque(x: Operating, q: Values) -> Array:
     speed = x.omega_rad_s / x.machine.scales["speed_rad_s"]
-    drag: Array = q["drag_nm"] * speed * np.abs(speed)
-    return drag
+    return q["drag_nm"] * speed * np.abs(speed)
 
 
 EFFECT = Effect(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from pipeline.criticism.data.traces import (
     window_of,
     with_angle,
 )
-from pipeline.criticism.effect import Array, Complex, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Complex, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.signals.shaft import (
@@ -107,9 +107,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     return replace(made, unthinned=Unthinned(whole, log))
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True currents, angle and speed of a machine that a drive feeds and logs.
 
     Parameters
@@ -140,7 +138,7 @@ def state(
     return at_true_angle(segment, x.fed(volts_v=volts), model, values)
 
 
-def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+def measured(segment: Segment, signals: Signals, model: Model, values: Values) -> Array:
     """Recorded voltages, and the torque less the dynamics of its transducer.
 
     Parameters
@@ -270,8 +268,7 @@ def _reading(segment: Segment, channel: str, model: Model, values: Values) -> Ar
     """Length of the voltage [n, V], or the torque of the current's length [n, N·m]."""
     if channel == TORQUE:
         return torque_reading(segment, model, values)
-    length: Array = np.sqrt(sum(segment.recorded[name] ** 2 for name in VOLTS))
-    return length
+    return np.sqrt(sum(segment.recorded[name] ** 2 for name in VOLTS))
 
 
 EQUATION = Equation(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.settling import unexplained_voltage
 from pipeline.criticism.data.traces import smoothed, window_of
-from pipeline.criticism.effect import Array, Machine, Operating, Values, between
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values, between
 from pipeline.criticism.equation import (
     Channel,
     Equation,
@@ -82,9 +81,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     return replace(made, fixed={**made.fixed, LATE_VOLTAGE: 1.0})
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """Angle and speed [n] of the shaft; its current follows from them (`predicted`)."""
     motion = motion_of(segment, signals, model.machine)
     none = np.zeros(motion.theta_rad.size, dtype=complex)
@@ -92,12 +89,11 @@ def state(
     return at_true_angle(segment, x.fed(q_alone=True, hold_s=0.0), model, values)
 
 
-def measured(segment: Segment, signals: Mapping[str, Array], _: Model, values: Values) -> Array:
+def measured(segment: Segment, signals: Signals, _: Model, values: Values) -> Array:
     """The voltage that drives each sample's motion [1, n], with what the delay is longer."""
     volts = signals[VOLTAGE]
     late = values[LATE_VOLTAGE] / segment.ts_s
-    driving: Array = between(volts, np.arange(volts.size, dtype=np.float64) - late)[None]
-    return driving
+    return between(volts, np.arange(volts.size, dtype=np.float64) - late)[None]
 
 
 def predicted(segment: Segment, x: Operating, _: Pieces, model: Model, values: Values) -> Array:

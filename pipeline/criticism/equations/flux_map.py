@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from pipeline.criticism.data.levels import levels_of
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
-from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.policy.captures import Tables
@@ -58,18 +56,14 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     )
 
 
-def _axes_noise(
-    columns: Mapping[str, Array], names: tuple[str, ...], policy: Tables
-) -> dict[str, float]:
+def _axes_noise(columns: Signals, names: tuple[str, ...], policy: Tables) -> dict[str, float]:
     """A share of an axis's range, or a tenth of the other's at least: one instrument reads both."""
     ranges = {name: float(np.ptp(columns[name])) for name in names}
     least = policy.other_axis * max(ranges.values())
     return {name: policy.flux_share * max(own, least) for name, own in ranges.items()}
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True currents of the rows of a table.
 
     Parameters
@@ -95,7 +89,7 @@ def state(
     return operating(segment, signals, model, values, current, rest)
 
 
-def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -> Array:
+def measured(_: Segment, signals: Signals, __: Model, ___: Values) -> Array:
     """Both flux linkages [2, n, Wb]."""
     return np.stack([signals[name] for name in LINKAGES])
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from pipeline.criticism.data.traces import (
     with_angle,
     with_travel,
 )
-from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import COAST_SHARES, Model, Pieces, clock_gain
 from pipeline.criticism.signals.shaft import (
@@ -145,9 +144,7 @@ def _slow_turn(
     )
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True angle and speed of a shaft without current.
 
     Parameters
@@ -175,7 +172,7 @@ def state(
     return at_true_angle(segment, x, model, values)
 
 
-def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+def measured(segment: Segment, signals: Signals, model: Model, values: Values) -> Array:
     """Zero for a coast, whose angle is in the prediction; the torque of a slow turn.
 
     Parameters
@@ -243,8 +240,7 @@ def _further_drag(segment: Segment, x: Operating, torque_nm: Array, values: Valu
         return np.zeros_like(torque_nm)
     dry, viscous = (values[name] for name in COAST_SHARES)
     of_speed = values["b_nm_s_rad"] * x.omega_rad_s
-    further: Array = dry * (torque_nm + of_speed) - viscous * of_speed
-    return further
+    return dry * (torque_nm + of_speed) - viscous * of_speed
 
 
 EQUATION = Equation(

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
 from pipeline.criticism.data.holding_cells import holding_cells
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
-from pipeline.criticism.effect import Array, Machine, Operating, Recorded, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Recorded, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.signals.shaft import net_torque
@@ -57,9 +56,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     )
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True current of a held rotor, which creeps in the sense of its arrival.
 
     Parameters
@@ -87,7 +84,7 @@ def state(
     return operating(segment, signals, model, values, current, motion)
 
 
-def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+def measured(segment: Segment, signals: Signals, model: Model, values: Values) -> Array:
     """The true q current, in amperes of the sensor.
 
     Parameters

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
 from pipeline.criticism.data.sensor_noise import resolution
-from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes
 from pipeline.criticism.machine.model import Model, Pieces, evaluate
 from pipeline.criticism.signals.true_state import Motion, operating
@@ -68,9 +67,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     )
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """A rotor at rest at each angle [n], without current, at the meter's frequency."""
     eps = np.radians(signals["theta_elec_deg"])
     zero = np.zeros(eps.size)
@@ -79,7 +76,7 @@ def state(
     return replace(x, eps_rad=eps)
 
 
-def measured(segment: Segment, signals: Mapping[str, Array], _: Model, __: Values) -> Array:
+def measured(segment: Segment, signals: Signals, _: Model, __: Values) -> Array:
     """What the meter shows [C, n, H and ohm]."""
     return np.stack([signals[channel] for channel in segment.channels])
 
@@ -125,8 +122,7 @@ def predicted(
         "lab_h": ((sides[0].psi_wb - sides[1].psi_wb) / (2 * probe) * back).real,
         "rab_ohm": ((sides[0].drop_v - sides[1].drop_v) / (2 * probe) * back).real,
     }
-    gain: Array = (1.0 + values["gain_lcr"]) * np.stack([rows[c] for c in segment.channels])
-    return gain
+    return (1.0 + values["gain_lcr"]) * np.stack([rows[c] for c in segment.channels])
 
 
 EQUATION = Equation(

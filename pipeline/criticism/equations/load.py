@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +18,7 @@ from pipeline.criticism.data.traces import (
     window_of,
     with_angle,
 )
-from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.signals.shaft import net_torque, sensed_torque, true_load
@@ -86,9 +85,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     return replace(made, fixed={**made.fixed, **share})
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True current, angle and speed [n]."""
     motion = motion_of(segment, signals, model.machine)
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
@@ -96,7 +93,7 @@ def state(
     return at_true_angle(segment, x.fed(), model, values)
 
 
-def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+def measured(segment: Segment, signals: Signals, model: Model, values: Values) -> Array:
     """The torque less the dynamics of its transducer [1, n, N·m]."""
     return true_load(segment, signals, model, values)[None]
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.traces import thinned, window_of
 from pipeline.criticism.data.unlogged_load import runs_free
-from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
 from pipeline.criticism.machine.two_masses import reach
@@ -76,9 +74,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     )
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True current, angle and speed [n·m], m points a sample where the shaft turns fast."""
     finer = finer_of(segment, model.machine, model.policy.cutting.log_parts)
     motion = motion_of(segment, signals, model.machine, finer)
@@ -89,7 +85,7 @@ def state(
     return at_true_angle(segment, x.fed(hold_s=hold_s), model, values)
 
 
-def measured(segment: Segment, _: Mapping[str, Array], __: Model, ___: Values) -> Array:
+def measured(segment: Segment, _: Signals, __: Model, ___: Values) -> Array:
     """Nothing [1, n]: the angle is in the prediction."""
     return np.zeros((1, segment.size))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +21,7 @@ from pipeline.criticism.data.traces import (
     window_of,
     with_angle,
 )
-from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import OPEN_FLUX, Model, Pieces
 from pipeline.criticism.policy.captures import Cutting
@@ -123,9 +122,7 @@ def _steady(weak: Projection, theta: Array, policy: Cutting) -> NDArray[np.bool_
     return steady if steady.sum() >= policy.steady_windows else np.ones(steady.size, dtype=bool)
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True angle and speed [n] without current; the bench's encoder has a zero of its own."""
     motion = motion_of(segment, signals, model.machine)
     none = np.zeros(motion.theta_rad.size, dtype=complex)
@@ -136,7 +133,7 @@ def state(
     return at_true_angle(segment, x, model, values)
 
 
-def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+def measured(segment: Segment, signals: Signals, model: Model, values: Values) -> Array:
     """Line voltages [2, n, V], turned into the rotor's frame by the recorded angle."""
     lines = vector_of_lines({name: signals[name] for name in LINES_V if name in signals})
     voltage = lines * np.exp(-1j * _recorded_eps(segment, signals, model, values))
@@ -185,9 +182,7 @@ def predicted(
     return np.stack([voltage.real, voltage.imag])
 
 
-def _recorded_eps(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Array:
+def _recorded_eps(segment: Segment, signals: Signals, model: Model, values: Values) -> Array:
     eps: Array = model.machine.pole_pairs * signals["theta_mech_rad"]
     return eps if _VOLTAGE_FRAME in segment.fixed else eps - values["bench_angle_rad"]
 
@@ -195,11 +190,10 @@ def _recorded_eps(
 def _reading(segment: Segment, _: str, __: Model, ___: Values) -> Array:
     """Length [n, V] of two line voltages."""
     present = [segment.recorded[n] for n in ("vab_v", "vbc_v") if n in segment.recorded]
-    length: Array = np.sqrt(sum(column**2 for column in present))
-    return length
+    return np.sqrt(sum(column**2 for column in present))
 
 
-def _sensed(segment: Segment, left: Array, model: Model, values: Values) -> Mapping[str, Array]:
+def _sensed(segment: Segment, left: Array, model: Model, values: Values) -> Signals:
     """A residual [2, n] in the rotor's frame, turned back to each line's voltage [n]."""
     eps = _recorded_eps(segment, segment.recorded, model, values)
     winding = math.sqrt(3.0) * (left[0] + 1j * left[1]) * np.exp(1j * (eps + math.pi / 6.0))

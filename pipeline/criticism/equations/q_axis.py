@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.traces import window_of
-from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, UNSAMPLED, Model, Pieces, values_of
 from pipeline.criticism.signals.true_state import (
@@ -74,9 +73,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     return replace(made, fixed={**made.fixed, UNSAMPLED: 1.0})
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True current, angle and speed [n]; the drive's own speed where nothing records the angle.
 
     The ripple of a held vector is left out: it needs the d axis.
@@ -89,7 +86,7 @@ def state(
     return at_true_angle(segment, x.fed(q_alone=True, hold_s=0.0), model, values)
 
 
-def measured(segment: Segment, signals: Mapping[str, Array], _: Model, __: Values) -> Array:
+def measured(segment: Segment, signals: Signals, _: Model, __: Values) -> Array:
     """Voltage and speed as the drive logged them [C, n]."""
     return np.stack([signals[channel] for channel in segment.channels])
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
 from pipeline.criticism.data.levels import set_levels
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
-from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.signals.true_state import Motion, operating, table_current
@@ -74,9 +73,7 @@ def _scatter(speed: Array, volts: Array) -> float:
     return float(residual @ residual)
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True currents and speed [n] of a table's rows."""
     omega = signals["omega_mech_rad_s"]
     zero = np.zeros(omega.size)
@@ -88,7 +85,7 @@ def state(
     return operating(segment, signals, model, values, current, Motion(zero, omega, freq))
 
 
-def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -> Array:
+def measured(_: Segment, signals: Signals, __: Model, ___: Values) -> Array:
     """The q voltage [1, n, V]."""
     return signals["vq_v"][None]
 

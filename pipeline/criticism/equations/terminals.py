@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.data.segment import PAIR_RAD, Segment, segment_of
 from pipeline.criticism.data.traces import even_clock, prepared, window_of
-from pipeline.criticism.effect import Array, Machine, Operating, Recorded, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Recorded, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.signals.true_state import at_rest, operating, true_current
@@ -92,9 +91,7 @@ def _settled(weak: Projection, amps: Array, change_a: float) -> Projection:
     return weak.only(steady)
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True current [n] of a rotor at rest.
 
     Parameters
@@ -133,7 +130,7 @@ def state(
     return replace(operating(segment, signals, model, values, current, at_rest(n)), eps_rad=eps)
 
 
-def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -> Array:
+def measured(_: Segment, signals: Signals, __: Model, ___: Values) -> Array:
     """The pair's voltage [1, n, V]."""
     return signals["v_pair_v"][None]
 

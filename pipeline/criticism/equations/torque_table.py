@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.levels import levels_of
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
-from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.policy.captures import Tables
@@ -74,9 +73,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     return replace(made, sensors=replace(made.sensors, angle_step_rad=0.0))
 
 
-def state(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True currents [n] of a shaft that is clamped at the rows' angles."""
     zero = np.zeros(signals["iq_a"].size)
     theta = signals.get("theta_mech_rad", zero)
@@ -86,7 +83,7 @@ def state(
     return operating(segment, signals, model, values, current, Motion(theta, zero, zero))
 
 
-def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -> Array:
+def measured(_: Segment, signals: Signals, __: Model, ___: Values) -> Array:
     """The torque [1, n, N·m]; without time its transducer has no dynamics."""
     return signals[TORQUE][None]
 
@@ -115,11 +112,10 @@ def _parts(current: Array, policy: Tables) -> NDArray[np.int64] | None:
     if levels.max(initial=0) > 0 or reach == 0.0:
         return None
     place = (current - current.min()) / reach * policy.parts
-    parts: NDArray[np.int64] = np.minimum(place.astype(np.int64), policy.parts - 1)
-    return parts
+    return np.minimum(place.astype(np.int64), policy.parts - 1)
 
 
-def _noise(columns: Mapping[str, Array], reading: float) -> float | None:
+def _noise(columns: Signals, reading: float) -> float | None:
     """Standard deviation [N·m] of the torques about their curves; None with too few rows."""
     torque, current = columns[TORQUE], columns["iq_a"] / float(np.abs(columns["iq_a"]).max())
     angles = columns.get("theta_mech_rad")

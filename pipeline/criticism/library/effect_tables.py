@@ -208,8 +208,7 @@ def _flux_tables(effect: Effect, x: Operating, q: Values) -> list[EffectTable]:
 
 
 def _packed(flux: Any) -> Array:
-    both: Array = np.stack([flux.real, flux.imag])
-    return both
+    return np.stack([flux.real, flux.imag])
 
 
 def _at_rest(x: Operating, size: int, **changed: Array) -> Operating:

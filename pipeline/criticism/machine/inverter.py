@@ -126,8 +126,7 @@ def lost_shares(
     switched = supply.pwm_s and supply.vdc_v and inductance > 0.0
     known = switched and x.psi_wb is not None and loss_v > 0.0
     if not known:
-        share: Array = np.tanh(current_a / width)
-        return share
+        return np.tanh(current_a / width)
     induced = 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
     turn = x.once(eps_rad, "turning", lambda: turning(eps_rad))
     winding = phases_of((x.base["r_ohm"] * x.i_a + induced) * turn)
@@ -146,8 +145,7 @@ def lost_shares(
         fall = current_a + per_volt * (after - winding * (duty + dead))
         late = _passed(rise + (low - 0.5) * ramp, ramp, width)
         keeps = _passed(fall + (low_after - 0.5) * ramp, ramp, width)
-    lost: Array = late + keeps - 1.0
-    return lost
+    return late + keeps - 1.0
 
 
 def _beside(volts: Array, loss_v: float, late: Array, side: float) -> tuple[Array, Array]:
@@ -175,5 +173,4 @@ def _passed(current_a: Array, ramp_a: float, width_a: float) -> Array:
     for sign, apart in ((1.0, up), (-1.0, down)):
         near = apart < _FAR
         bent[near] += sign * np.log1p(np.exp(-2.0 * apart[near]))
-    passed: Array = 0.5 + 0.5 * width_a / ramp_a * bent
-    return passed
+    return 0.5 + 0.5 * width_a / ramp_a * bent

@@ -49,5 +49,4 @@ def loss_current(x: Operating, drag_nm: Array) -> Complex:
     psi = x.flux_wb
     if not x.inverter:
         return np.zeros_like(psi)
-    current: Complex = 1j * psi * drag_nm / (1.5 * x.machine.pole_pairs * abs(psi) ** 2)
-    return current
+    return 1j * psi * drag_nm / (1.5 * x.machine.pole_pairs * abs(psi) ** 2)

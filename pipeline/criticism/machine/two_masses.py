@@ -235,8 +235,7 @@ def spring_twist(x: Operating, q: Values, through_nm: Array) -> Array:
 
     """
     late = through_nm - q["damping_s"] / x.ts_s * np.gradient(through_nm)
-    twist: Array = q["twist_rad"] / x.machine.scales["torque_nm"] * late
-    return twist
+    return q["twist_rad"] / x.machine.scales["torque_nm"] * late
 
 
 def far_drag(x: Operating, share: float, between: float, twist_rad: Callable[[], Array]) -> Array:
@@ -303,8 +302,7 @@ def side_of(through_nm: Array, least_nm: float) -> Array:
     after = closed[np.minimum(place, closed.size - 1)]
     passed = np.clip((at - last) / np.maximum(after - last, 1), 0.0, 1.0)
     begin, end = np.sign(through_nm[last]), np.sign(through_nm[after])
-    side: Array = begin + (end - begin) * passed**2
-    return side
+    return begin + (end - begin) * passed**2
 
 
 def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:

@@ -316,8 +316,7 @@ def _beyond(u: Array, prior_precision: Array, policy: GaussNewton) -> Array:
     """
     information = np.maximum(u, 1e-300) ** -2.0 - prior_precision
     informed = information > policy.least_information * prior_precision
-    alone: Array = np.where(informed, np.maximum(information, 1e-300) ** -0.5, math.inf)
-    return alone
+    return np.where(informed, np.maximum(information, 1e-300) ** -0.5, math.inf)
 
 
 def _parameter(value: float, u: float, unit: str, known: bool, bound: bool) -> ModelParameter:

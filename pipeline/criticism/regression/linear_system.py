@@ -324,8 +324,7 @@ class LinearSystem:
         array [R]
 
         """
-        residual: Array = self.residual + self.matrix[:, places] @ step
-        return residual
+        return self.residual + self.matrix[:, places] @ step
 
     def covariance(self, places: NDArray[np.int64]) -> Array:
         """Covariance of parameters when they are fitted together.
@@ -460,8 +459,7 @@ def _over(
     edges = np.cumsum(counts)[:-1]
     parts = zip(*(np.split(one, edges) for one in (kept, before, now)), strict=True)
     each = [(*part, policy) for part in parts]
-    whole: Array = np.concatenate(on_each(whitened_anew, segments, each))
-    return whole
+    return np.concatenate(on_each(whitened_anew, segments, each))
 
 
 def _kept(

@@ -138,8 +138,7 @@ def _smoothed(segment: Segment, name: str, normal: Array) -> Array:
     if width == 1:
         return _white(segment, name) * normal
     smooth = parabolas(normal, width)
-    noise: Array = _white(segment, name) / math.sqrt(2.25 / width) * smooth
-    return noise
+    return _white(segment, name) / math.sqrt(2.25 / width) * smooth
 
 
 def _white(segment: Segment, name: str) -> float:
@@ -179,13 +178,12 @@ def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
     """
     _, _, _, groups = row_index(segment)
     scales = [channel_scale(segment, channel, model.machine, values) for channel, _ in groups]
-    floor: Array = (
+    return (
         model.policy.noise_floors.rough
         * window_gain(segment)
         / reported_unit(segment, values)
         * np.array(scales)
     )
-    return floor
 
 
 def form_tolerance(
@@ -224,8 +222,7 @@ def form_tolerance(
         count = np.bincount(group[valid], minlength=len(groups))
         total += np.bincount(group[valid], power, minlength=len(groups)) / np.maximum(count, 1)
     wrong = model.policy.noise_floors.form if share is None else share
-    floor: Array = wrong * np.sqrt(total)
-    return floor
+    return wrong * np.sqrt(total)
 
 
 def reading_error(
@@ -332,8 +329,7 @@ def _of_torque(
         kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
         jumps = kt * _jumps(segment, "id_a", "iq_a", policy)
         total = np.hypot(total, jumps[:, None])
-    error: Array = total / reported_unit(segment, values)
-    return error
+    return total / reported_unit(segment, values)
 
 
 def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
@@ -393,8 +389,7 @@ def _jumps(segment: Segment, direct: str, quadrature: str, policy: NoiseFloors) 
     bend[1:-1] = np.abs(np.diff(vector, 2)) / math.sqrt(2.0)
     bend[bend < policy.jump * noise] = 0.0
     rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
-    error: Array = policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
-    return error
+    return policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
 
 
 def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
@@ -424,8 +419,7 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
     )
     grip = np.zeros(segment.size)
     grip[creeping] = 0.5 * np.abs(onward - back) / math.sqrt(3.0)
-    out: Array = np.abs(weak.project(grip[None])[0, :, 0])
-    return out
+    return np.abs(weak.project(grip[None])[0, :, 0])
 
 
 def _lasting(which: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
@@ -452,8 +446,7 @@ def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Arr
     omega = (theta[weak.starts + weak.length - 1] - theta[weak.starts]) / span
     step = math.sqrt(12.0) * segment.sensors.noise["theta_mech_rad"]
     wave = window_gain(segment) / math.sqrt(2.0) * policy.encoder_line * step * values["j_kgm2"]
-    lines: Array = wave * (omega[:, None] * weak.orders[None, :]) ** 2
-    return lines
+    return wave * (omega[:, None] * weak.orders[None, :]) ** 2
 
 
 def offsets(

@@ -290,15 +290,13 @@ def pseudo_inverse(normal: Array) -> Array:
     power, axes = np.linalg.eigh(normal / np.outer(size, size))
     good = power > _TIE * max(float(power[-1]), 1.0)
     inverse: Array = (axes[:, good] / power[good]) @ axes[:, good].T
-    scaled: Array = inverse / np.outer(size, size)
-    return scaled
+    return inverse / np.outer(size, size)
 
 
 def _after(power: Array, slope: Array, normal: Array, step: Array) -> Array:
     """Sums of squares [G] of the residuals after a step [k]."""
     # what is left of a fit that is exact is rounding
-    after: Array = np.maximum(power + (2.0 * slope + normal @ step) @ step, 0.0)
-    return after
+    return np.maximum(power + (2.0 * slope + normal @ step) @ step, 0.0)
 
 
 def prior_costs(gradient: Array, precision: Array) -> Array:
@@ -317,8 +315,7 @@ def prior_costs(gradient: Array, precision: Array) -> Array:
         In squared standard uncertainties; 0 without a prior.
 
     """
-    costs: Array = gradient**2 / np.where(precision > 0, precision, np.inf)
-    return costs
+    return gradient**2 / np.where(precision > 0, precision, np.inf)
 
 
 def unit_diagonal(normal: Array) -> Array:
@@ -336,5 +333,4 @@ def unit_diagonal(normal: Array) -> Array:
 
     """
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    unit: Array = normal / np.outer(scale, scale)
-    return unit
+    return normal / np.outer(scale, scale)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Operating, Values
+from pipeline.criticism.effect import Array, Operating, Signals, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, Pieces, evaluate
 from pipeline.criticism.residuals.observability import hooks_in
@@ -19,7 +17,7 @@ def residual(
     segment: Segment,
     model: Model,
     values: Values,
-    recorded: Mapping[str, Array] | None = None,
+    recorded: Signals | None = None,
     beside: Operating | None = None,
 ) -> Array:
     """Recorded less predicted signals of a segment, sample by sample.
@@ -53,9 +51,7 @@ def residual(
     return seen - equation.predicted(segment, x, pieces, model, values)
 
 
-def operate(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
+def operate(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """True currents, angle and speed of a segment, the errors of its sensors taken out.
 
     Parameters
@@ -80,7 +76,7 @@ def operate(
     return equation.state(segment, signals, model, values)
 
 
-def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+def measured(segment: Segment, signals: Signals, model: Model, values: Values) -> Array:
     """Recorded signals of the channels, in the units of the prediction.
 
     Parameters

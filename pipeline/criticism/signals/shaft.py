@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Complex, Operating, Recorded, Values
+from pipeline.criticism.effect import Array, Complex, Operating, Recorded, Signals, Values
 from pipeline.criticism.machine.model import Model, Pieces, air_gap_torque, ripple, values_of
 from pipeline.criticism.signals.true_state import ahead_in
 from pipeline.criticism.signals.voltage import central
@@ -56,8 +55,7 @@ def torque_reading(segment: Segment, model: Model, values: Values) -> Array:
     """
     kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
     direct = segment.recorded.get("id_a", np.zeros(segment.size))
-    torque: Array = kt * np.hypot(direct, segment.recorded["iq_a"])
-    return torque
+    return kt * np.hypot(direct, segment.recorded["iq_a"])
 
 
 def torque_between(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> Array:
@@ -98,8 +96,7 @@ def _moved_on(segment: Segment, x: Operating, values: Values) -> Complex:
 
     """
     period = segment.ts_s * segment.size / x.theta_rad.size
-    current: Complex = values["ripple_torque"] * segment.ts_s * central(x.i_a, period)
-    return current
+    return values["ripple_torque"] * segment.ts_s * central(x.i_a, period)
 
 
 def _torque_of_current(x: Operating, pieces: Pieces, current: Complex) -> Array:
@@ -120,8 +117,7 @@ def _torque_of_current(x: Operating, pieces: Pieces, current: Complex) -> Array:
         1.5 p Im(ψ* i) [N·m].
 
     """
-    torque: Array = 1.5 * x.machine.pole_pairs * (np.conj(pieces.psi_wb) * current).imag
-    return torque
+    return 1.5 * x.machine.pole_pairs * (np.conj(pieces.psi_wb) * current).imag
 
 
 def unexplained_acceleration(
@@ -155,8 +151,7 @@ def unexplained_acceleration(
     finer = x.theta_rad.size // segment.size
     torque = _averaged(torque_nm, finer) if finer > 1 else torque_nm
     acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
-    unexplained: Array = (torque / values["j_kgm2"] - acceleration) / stretch**2
-    return unexplained
+    return (torque / values["j_kgm2"] - acceleration) / stretch**2
 
 
 def sensed_torque(
@@ -216,7 +211,7 @@ def as_sensed(torque_nm: Array, model: Model, values: Values) -> Array:
 
 def true_load(
     segment: Segment,
-    signals: Mapping[str, Array],
+    signals: Signals,
     model: Model,
     values: Values,
     *,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from pipeline.criticism.effect import (
     Operating,
     Recorded,
     ShaftState,
+    Signals,
     Supply,
     Values,
     between,
@@ -85,9 +86,7 @@ def at_rest(size: int) -> Motion:
     return Motion(zero, zero, zero)
 
 
-def motion_of(
-    segment: Segment, signals: Mapping[str, Array], machine: Machine, finer: int = 1
-) -> Motion:
+def motion_of(segment: Segment, signals: Signals, machine: Machine, finer: int = 1) -> Motion:
     """The motion of a shaft from its recorded angle.
 
     Parameters
@@ -119,8 +118,7 @@ def motion_of(
         omega = _speed(theta, segment.ts_s, finer, policy)
         return Motion(theta, omega, np.abs(omega) * pairs / (2 * math.pi))
 
-    found: Motion = segment.once(recorded, "motion", (segment.ts_s, finer, pairs, policy), motion)
-    return found
+    return segment.once(recorded, "motion", (segment.ts_s, finer, pairs, policy), motion)
 
 
 def finer_of(segment: Segment, machine: Machine, finest: int) -> int:
@@ -150,7 +148,7 @@ def finer_of(segment: Segment, machine: Machine, finest: int) -> int:
 
 def operating(
     segment: Segment,
-    signals: Mapping[str, Array],
+    signals: Signals,
     model: Model,
     values: Values,
     current: Complex,
@@ -298,7 +296,7 @@ def _in_time(segment: Segment, x: Operating, late_s: float) -> Operating:
 
 
 def drive_current(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values, size: int
+    segment: Segment, signals: Signals, model: Model, values: Values, size: int
 ) -> Complex:
     """True current of a drive's log.
 
@@ -377,9 +375,7 @@ def _speed(theta: Array, period: float, finer: int, policy: Cutting) -> Array:
     return smoothed(np.gradient(theta, period / finer), width)
 
 
-def _warmth(
-    segment: Segment, signals: Mapping[str, Array], name: str, size: int, values: Values
-) -> Array:
+def _warmth(segment: Segment, signals: Signals, name: str, size: int, values: Values) -> Array:
     if name not in signals:
         known = [UNLOGGED[name], *([UNLOGGED_AT_REST] if name == "temp_winding_degc" else [])]
         warmed = sum(values[one] for one in segment.fixed if one.startswith(tuple(known)))
@@ -388,7 +384,7 @@ def _warmth(
     return np.repeat(warm, size // warm.size)
 
 
-def _travel(signals: Mapping[str, Array], size: int) -> Array:
+def _travel(signals: Signals, size: int) -> Array:
     since = signals.get("travel_rad")
     if since is None:
         return np.full(size, np.inf)
@@ -400,19 +396,19 @@ def _travel(signals: Mapping[str, Array], size: int) -> Array:
     return np.where(known[at.astype(np.int64)], turned, np.inf)
 
 
-def _run(signals: Mapping[str, Array], size: int) -> NDArray[np.int64]:
+def _run(signals: Signals, size: int) -> NDArray[np.int64]:
     run = signals.get("run")
     if run is None:
         return np.zeros(size, dtype=np.int64)
     return np.repeat(run.astype(np.int64), size // run.size)
 
 
-def _behind(signals: Mapping[str, Array], size: int) -> Array | None:
+def _behind(signals: Signals, size: int) -> Array | None:
     behind = signals.get("behind_nm")
     return None if behind is None else np.repeat(behind, size // behind.size)
 
 
-def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> Recorded:
+def _recorded(segment: Segment, signals: Signals, model: Model) -> Recorded:
     theta, pairs = signals["theta_mech_rad"], model.machine.pole_pairs
 
     def turning() -> tuple[Array, Array]:
@@ -433,7 +429,7 @@ def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> R
 
 
 def ahead_in(
-    segment: Segment, signals: Mapping[str, Array], pole_pairs: int
+    segment: Segment, signals: Signals, pole_pairs: int
 ) -> Callable[[float], tuple[Complex, Array, Array]] | None:
     """Changes of currents, torque and angle within a delay, from the whole log of a segment.
 
@@ -479,8 +475,7 @@ def _places(rows: Array) -> Array | None:
     steps = np.diff(rows)
     if not (steps > 0.0).any():
         return None
-    places: Array = np.rint(rows / float(np.median(steps[steps > 0.0])))
-    return places
+    return np.rint(rows / float(np.median(steps[steps > 0.0])))
 
 
 def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values) -> Complex:

@@ -102,8 +102,7 @@ def _errors_of(
 
     def variable(name: str, number: int, in_capture: NDArray[np.bool_]) -> Array:
         values = variables[number].get(name, np.full(system.segments[number].size, np.nan))
-        chosen: Array = values[system.window[in_capture]]
-        return chosen
+        return values[system.window[in_capture]]
 
     names = sorted({name for number, _ in groups for name in variables[number]})
     return Errors(

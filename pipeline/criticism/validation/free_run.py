@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Complex, Values
+from pipeline.criticism.effect import Array, Complex, Signals, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.validation.trajectories import (
@@ -58,10 +58,10 @@ class Run:
 
     capture: str
     t_s: Array
-    recorded: Mapping[str, Array]
-    simulated: Mapping[str, Array]
+    recorded: Signals
+    simulated: Signals
     floor: Mapping[str, float]
-    drift: Mapping[str, Array]
+    drift: Signals
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -93,8 +93,7 @@ class Run:
             return error * floor
         axes, size, _ = np.linalg.svd((self.drift[signal] / floor).T, full_matrices=False)
         taken = axes @ ((1.0 - 1.0 / np.sqrt(1.0 + size**2)) * (axes.T @ error))
-        residual: Array = (error - taken) * floor
-        return residual
+        return (error - taken) * floor
 
 
 def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
@@ -179,7 +178,7 @@ def _response(segment: Segment, model: Model, values: Values) -> _Response | Non
     return _Response(batch, path, jacobian, settled, names)
 
 
-def _signal(batch: Batch, signals: Mapping[str, Array], name: str) -> Array:
+def _signal(batch: Batch, signals: Signals, name: str) -> Array:
     """A signal inside the windows [W, N]; the speed from the angle."""
     if name != SPEED:
         return batch.inside(signals[name])
@@ -190,8 +189,7 @@ def _signal(batch: Batch, signals: Mapping[str, Array], name: str) -> Array:
 
 def _means(error: Array) -> Array:
     window = bump(error.shape[1])
-    mean: Array = error @ window / window.sum()
-    return mean
+    return error @ window / window.sum()
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +197,7 @@ class _Response:
     """How window means of recorded less simulated move with the recording, to first order."""
 
     batch: Batch
-    path: Mapping[str, Array]
+    path: Signals
     jacobian: Jacobian
     settled: NDArray[np.bool_]
     names: tuple[str, ...]

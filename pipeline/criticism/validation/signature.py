@@ -132,8 +132,7 @@ def _of_capture(
             count: Array = count,
             seen: NDArray[np.bool_] = seen,
         ) -> Array:
-            summed: Array = np.bincount(cell, error[inside], count.size)[seen] / count[seen]
-            return summed
+            return np.bincount(cell, error[inside], count.size)[seen] / count[seen]
 
         yield _Curve(
             before.signal,
@@ -222,8 +221,7 @@ def _folded(curve: _Curve, cells: int) -> _Curve | None:
         return None
 
     def mean(values: Array) -> Array:
-        summed: Array = np.bincount(cell, curve.count * values) / count
-        return summed
+        return np.bincount(cell, curve.count * values) / count
 
     # an angle on a circle has no mean of its own where the first and the last cell meet
     at = mean(np.where(phase > TURN_RAD * (1.0 - 0.5 / _FINE), phase - TURN_RAD, phase))

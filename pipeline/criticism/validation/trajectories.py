@@ -10,7 +10,7 @@ relaxation; [2] Hairer, Lubich & Wanner, Geometric Numerical Integration (2006),
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Complex, Operating, Values
+from pipeline.criticism.effect import Array, Complex, Operating, Signals, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, air_gap_torque, evaluate
 from pipeline.criticism.regression.noise_floors import reading_error
@@ -99,8 +99,7 @@ class Batch:
             Without the surroundings.
 
         """
-        block: Array = self.folded(column)[:, self.pad : self.pad + self.length]
-        return block
+        return self.folded(column)[:, self.pad : self.pad + self.length]
 
 
 def batch_of(segment: Segment, model: Model, values: Values) -> Batch | None:
@@ -238,7 +237,7 @@ def _steps(flux: Array, drop: Array, omega_e: Array, period: float) -> tuple[Arr
     return inverse, slope - half
 
 
-def _defects(batch: Batch, signals: Mapping[str, Array]) -> tuple[Complex, Array]:
+def _defects(batch: Batch, signals: Signals) -> tuple[Complex, Array]:
     """What the equations miss by along a trajectory: voltage over the step from each sample [W, n]
     [V], and torque at each sample [W, n] [N·m].
 
@@ -272,8 +271,8 @@ def _defects(batch: Batch, signals: Mapping[str, Array]) -> tuple[Complex, Array
 def settle(
     batch: Batch,
     jacobian: Jacobian,
-    start: Mapping[str, Array],
-    given: Mapping[str, Array],
+    start: Signals,
+    given: Signals,
     rounds: int,
     extra: tuple[Complex, Array] | None = None,
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
@@ -339,14 +338,12 @@ def _first_speed(batch: Batch, theta: Array) -> Array:
     # the slope of a straight line through the samples around
     offset = np.arange(-half, half + 1)
     around = folded[:, batch.pad - half : batch.pad + half + 1]
-    slope: Array = around @ offset / float(offset @ offset) / batch.segment.ts_s
-    return slope
+    return around @ offset / float(offset @ offset) / batch.segment.ts_s
 
 
 def _central_speed(batch: Batch, theta: Array) -> Array:
     folded = batch.folded(theta)
-    slope: Array = (folded[:, batch.pad + 1] - folded[:, batch.pad - 1]) / (2 * batch.segment.ts_s)
-    return slope
+    return (folded[:, batch.pad + 1] - folded[:, batch.pad - 1]) / (2 * batch.segment.ts_s)
 
 
 def _corrected(

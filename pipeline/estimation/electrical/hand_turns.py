@@ -83,8 +83,7 @@ def turns_of(spin: Spin) -> list[Turn]:
 def _flux_of(spin: Spin, channel: Channel) -> Array:
     """Integral of a voltage [Wb], phase to star point, less the offset seen at rest."""
     v = channel.v_v - float(np.mean(channel.v_v[_at_rest(channel.v_v)]))
-    flux: Array = cubic(spin.t_s, v) / channel.gain
-    return flux
+    return cubic(spin.t_s, v) / channel.gain
 
 
 def _at_rest(v: Array) -> NDArray[np.bool_]:

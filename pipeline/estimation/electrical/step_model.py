@@ -194,8 +194,7 @@ def _covered(time: Array) -> Array:
 
     Negative where two edges of a trial cross; so far back as to overflow no trial is worth it.
     """
-    covered: Array = -np.expm1(-np.maximum(time, -30.0))
-    return covered
+    return -np.expm1(-np.maximum(time, -30.0))
 
 
 def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:

@@ -158,10 +158,7 @@ def _spikes(signal: Array) -> NDArray[np.bool_]:
     padded = np.pad(signal, 2, mode="edge")
     middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
     noise = noise_of(signal)
-    found: NDArray[np.bool_] = np.abs(signal - middle) > policy().steps.spike_sigmas * max(
-        noise.sigma, noise.step
-    )
-    return found
+    return np.abs(signal - middle) > policy().steps.spike_sigmas * max(noise.sigma, noise.step)
 
 
 def integrated_form(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] | None:
@@ -229,7 +226,4 @@ def _cuts(size: int, wave: Waveform) -> NDArray[np.intp]:
         return cuts
     near = np.flatnonzero(np.diff(wave.level_of)) + 1
     around = (near[:, None] + np.arange(-2, 3)).ravel()
-    found: NDArray[np.intp] = np.unique(
-        np.concatenate([cuts, around[(around > 0) & (around < size)]])
-    )
-    return found
+    return np.unique(np.concatenate([cuts, around[(around > 0) & (around < size)]]))

@@ -151,5 +151,4 @@ def bridged(t_s: Array, values: Array) -> Array:
     there = np.isfinite(values)
     if not there.any():
         return values
-    drawn: Array = np.interp(t_s, t_s[there], values[there])
-    return drawn
+    return np.interp(t_s, t_s[there], values[there])

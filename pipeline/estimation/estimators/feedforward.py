@@ -74,8 +74,7 @@ class Part:
         gaps = np.diff(self.t_s, prepend=-np.inf)
         first = gaps > 0.25 * float(np.ptp(self.t_s[: int(self.weak.sizes[0])]))
         begins = np.maximum.accumulate(np.where(first, np.arange(self.t_s.size), 0))
-        since: Array = self.t_s - self.t_s[begins]
-        return since
+        return self.t_s - self.t_s[begins]
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,8 +125,7 @@ class Motion:
         out = own[0] + theta if coast.of_angle else speed
         for value, name in zip(own[2:], self.ripples, strict=True):
             out = out + value * _ripple(name, coast.theta_rad)
-        predicted: Array = out
-        return predicted
+        return out
 
     def jacobian(self, coasts: Sequence[Coast], parameters: Array, width: Array) -> Array:
         """Derivatives [n, k] of what all coasts should read; `width` [k] as `_widths` gives it."""
@@ -244,8 +243,7 @@ def _coast(path: str, t: Array, y: Array, sense: int, speed: Array, of_angle: bo
 
 def _ripple(name: str, theta: Array) -> Array:
     order = 2.0 if name.endswith("2") else 1.0
-    wave: Array = np.cos(order * theta) if name.startswith("cos") else np.sin(order * theta)
-    return wave
+    return np.cos(order * theta) if name.startswith("cos") else np.sin(order * theta)
 
 
 def _weights(coasts: Sequence[Coast]) -> Array:
@@ -375,8 +373,7 @@ def _form(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> Array:
         values.append(_solve(plain, halves, start).parameters[:2])
     apart = np.abs(values[1] - values[0])
     beside = np.abs(0.5 * (values[0] + values[1]) - fit.parameters[:2])
-    allowance: Array = np.maximum(apart, beside)
-    return allowance
+    return np.maximum(apart, beside)
 
 
 def _evidence(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> tuple[Evidence, ...]:

@@ -79,8 +79,7 @@ def _common_scatter(covariance: Array) -> Array:
     """Independent sources [k, k] of a covariance [k, k], the first constant's being the first."""
     sizes = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     ties = covariance / np.outer(sizes, sizes) + 1e-12 * np.eye(sizes.size)
-    found: Array = sizes[:, None] * np.linalg.cholesky(ties)
-    return found
+    return sizes[:, None] * np.linalg.cholesky(ties)
 
 
 def heat_balance(t_s: Array, losses_w: Array, rise_k: Array) -> Array:
@@ -152,8 +151,7 @@ def _losses_w(record: HeatRecord, known: Constants) -> Array:
         return 1.5 * record.r_phase_ohm * record.square_a2
     coefficient = COPPER_COEFFICIENT_25_1_K if alpha is None else alpha.number
     r_ohm = r25.number * (1.0 + coefficient * (record.temp_winding_degc - 25.0))
-    losses: Array = 1.5 * r_ohm * record.square_a2
-    return losses
+    return 1.5 * r_ohm * record.square_a2
 
 
 def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | None:
@@ -378,8 +376,7 @@ def network(t_s: Array, losses_w: Array, variants: Array) -> Array:
     for row, watt in enumerate(means):
         state = np.einsum("mij,mj->mi", exponential[row], state) + drive[row] * watt
         course[row + 1] = state
-    turned: Array = course.transpose(2, 1, 0)
-    return turned
+    return course.transpose(2, 1, 0)
 
 
 def _estimates(
@@ -434,12 +431,10 @@ def _by_offset(
     moved = [_balance(record, losses_w, ambient + side * u_degc) for side in (-1.0, 1.0)]
     low, high = (None if one is None else one.values for one in moved)
     if low is not None and high is not None and low.size == high.size == balance.values.size:
-        shift: Array = 0.5 * (low - high)
-        return shift
+        return 0.5 * (low - high)
     rise = float(record.temp_winding_degc.max()) - ambient
     signs = np.array([1.0, -1.0, 0.0, 0.0])[: balance.values.size]
-    usual: Array = balance.values * signs * u_degc / rise
-    return usual
+    return balance.values * signs * u_degc / rise
 
 
 def _evidence(balance: Balance, record: HeatRecord) -> Evidence:

@@ -200,8 +200,7 @@ def _regress(points: Sequence[Point], alpha_1_k: float, chosen: Sequence[str]) -
 def _sigma(points: Sequence[Point]) -> Array:
     """Relative weights: the noise of a mean falls with the root of its rows."""
     rows = _column(points, "rows")
-    sigma: Array = np.sqrt(rows.mean() / rows)
-    return sigma
+    return np.sqrt(rows.mean() / rows)
 
 
 def _estimates(

@@ -158,8 +158,7 @@ class DragFit:
         scale = np.sqrt(np.maximum(np.diag(joint), 1e-300))
         correlation = joint / np.outer(scale, scale) + 1e-12 * np.eye(3)
         values, vectors = np.linalg.eigh(correlation)
-        factor: Array = vectors * np.sqrt(np.maximum(values, 0.0)) * scale[:, None]
-        return factor
+        return vectors * np.sqrt(np.maximum(values, 0.0)) * scale[:, None]
 
     def curve(self, rows: ShaftRows) -> tuple[Array, Array, Array]:
         """Drag over speed, for a plot.
@@ -454,8 +453,7 @@ def _implausible(
 def _drag_part(design: Array, fit: LinearFit, names: Sequence[str]) -> Array:
     """Drag [w] in torque that a fit gives each row: its drag columns over g."""
     mine = [k for k, name in enumerate(names) if name in _DRAG_NAMES]
-    part: Array = design[:, mine] @ fit.coefficients[mine] / fit.coefficients[0]
-    return part
+    return design[:, mine] @ fit.coefficients[mine] / fit.coefficients[0]
 
 
 def _low_end(curve: Array, fastest: float) -> tuple[float, float]:

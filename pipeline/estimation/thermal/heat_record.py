@@ -267,8 +267,7 @@ def _unbroken(t_s: Array, size: int) -> NDArray[np.bool_]:
     """Which blocks of `size` rows of a clock [n, s] take no more than `GAP` times what is usual."""
     last = t_s[size - 1 :: size]
     spans = last - t_s[::size][: last.size]
-    usual: NDArray[np.bool_] = spans <= GAP * np.median(spans)
-    return usual
+    return spans <= GAP * np.median(spans)
 
 
 def _bridged(data: dict[str, Array], name: str) -> bool:

@@ -275,10 +275,8 @@ class _Pass:
     def places(self, rows: Integers | None) -> Integers:
         """Byte positions in the buffer of the messages `rows`."""
         if rows is None:
-            start: Integers = self.origin + self.at
-            return start
-        places: Integers = self.origin[rows] + self.at[rows]
-        return places
+            return self.origin + self.at
+        return self.origin[rows] + self.at[rows]
 
     def align(self, width: int, rows: Integers | None, only: Any = True) -> None:
         to = min(width, self.align_most)

@@ -74,5 +74,4 @@ def spread(start: Integers, count: Integers, width: int) -> Integers:
     """
     total = int(count.sum())
     first = np.repeat(start - width * (np.cumsum(count) - count), count)
-    positions: Integers = first + width * np.arange(total, dtype=np.int64)
-    return positions
+    return first + width * np.arange(total, dtype=np.int64)

@@ -417,8 +417,7 @@ def _as_type(values: NDArray[np.uint64], dtype: str) -> NDArray[Any]:
     """Varint values read as their field's type (two's complement or zigzag)."""
     if dtype.startswith("zigzag"):
         unsigned = (values >> np.uint64(1)) ^ (~(values & np.uint64(1)) + np.uint64(1))
-        signed: NDArray[Any] = unsigned.view(np.int64).astype(_storage(dtype))
-        return signed
+        return unsigned.view(np.int64).astype(_storage(dtype))
     if dtype == "?":
         return np.asarray(values != 0)
     return np.asarray(values.astype(dtype))

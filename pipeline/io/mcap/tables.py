@@ -287,8 +287,7 @@ def _place(batch: Batch, names: Leaf, counts: Integers, joint: str | None) -> In
             "check the joint's name with `inspect`",
             (row, row),
         )
-    chosen: Integers = place[same].astype(np.int64)
-    return chosen
+    return place[same].astype(np.int64)
 
 
 _SLACK = 1.05

@@ -72,8 +72,7 @@ def _unzstd(packed: memoryview, chunk: Chunk) -> bytes:
         frame = zstandard.get_frame_parameters(packed)
         known = chunk.size and frame.content_size == chunk.size
         if known and frame.window_size <= _ZSTD_MAX_WINDOW_BYTES:
-            plain: bytes = zstandard.ZstdDecompressor().decompress(packed, allow_extra_data=False)
-            return plain
+            return zstandard.ZstdDecompressor().decompress(packed, allow_extra_data=False)
         reader = zstandard.ZstdDecompressor(max_window_size=_ZSTD_MAX_WINDOW_BYTES).stream_reader(
             packed, read_across_frames=True
         )

@@ -197,8 +197,7 @@ def nanoseconds(t_s: Array) -> NDArray[np.int64]:
         In ns.
 
     """
-    whole: NDArray[np.int64] = np.rint(t_s * 1e9).astype(np.int64)
-    return whole
+    return np.rint(t_s * 1e9).astype(np.int64)
 
 
 def send_trace(stream: RecordingStream, trace: Trace) -> None:

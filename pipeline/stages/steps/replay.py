@@ -51,8 +51,7 @@ class _Windows:
 
     def rate(self, values: Array) -> Array:
         """Rates [w, 1/s] from the ends of the windows; no derivative is taken."""
-        ends: Array = np.diff(values[self.edges]) / np.diff(self.t_s[self.edges])
-        return ends
+        return np.diff(values[self.edges]) / np.diff(self.t_s[self.edges])
 
 
 def replay(capture: Capture, datasheet: Datasheet) -> tuple[Evidence, ...]:
@@ -141,8 +140,7 @@ def _jumps(
     step = np.abs(np.diff(torque, prepend=torque[:1], append=torque[-1:]))
     most = float(np.abs(record["torque_shaft_nm"]).max())
     jumping = np.maximum(step[1:], step[:-1]) > JUMP_SHARE * most
-    near: NDArray[np.bool_] = np.interp(record["t_s"], cut.middle_s, jumping) > 0.0
-    return near
+    return np.interp(record["t_s"], cut.middle_s, jumping) > 0.0
 
 
 def _evidence(capture: Capture, name: str, series: Series, caption: str) -> Evidence:
