@@ -189,10 +189,7 @@ class Aims:
 
 
 def make_plan(
-    known: Known,
-    ways: Iterable[Way],
-    check_tests: Mapping[str, tuple[str, ...]],
-    aims: Aims,
+    known: Known, ways: Iterable[Way], check_tests: Mapping[str, tuple[str, ...]], aims: Aims
 ) -> Plan:
     """Tests in the order in which they resolve most, each counted for what is left by then.
 

@@ -79,9 +79,7 @@ Recall = Callable[[Estimator, Constants, Mapping[str, float], Callable[[], Fit]]
 
 
 def fit_all(
-    campaign: Campaign,
-    options: Mapping[str, Mapping[str, float]],
-    recall: Recall | None = None,
+    campaign: Campaign, options: Mapping[str, Mapping[str, float]], recall: Recall | None = None
 ) -> tuple[Constants, tuple[Evidence, ...], tuple[Failure, ...]]:
     """Runs every estimator on one motor's campaign, or recalls what it gave before.
 

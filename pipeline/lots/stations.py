@@ -238,10 +238,7 @@ def _solve(
 
 
 def _chi_squared(
-    blocks: Iterable[Sequence[Reading]],
-    column: Mapping[str, int],
-    solution: Array,
-    floor: float,
+    blocks: Iterable[Sequence[Reading]], column: Mapping[str, int], solution: Array, floor: float
 ) -> float:
     """Sum of squares of the weighted residuals."""
     total = 0.0

@@ -200,13 +200,7 @@ def windings(flux: Pair, mechanics: Mechanics, volt: Pair, warm: Pair, p: Plant)
 
 
 @njit(cache=True)
-def net_torque(
-    mechanics: Mechanics,
-    bristle: float,
-    field: Field,
-    warm: Pair,
-    p: Plant,
-) -> float:
+def net_torque(mechanics: Mechanics, bristle: float, field: Field, warm: Pair, p: Plant) -> float:
     """Torque on the rotor, the coupling's and the load's not in, from what `windings` gave.
 
     Parameters

@@ -186,10 +186,7 @@ def _decided(output: Path, shown: Sequence[Path]) -> list[str]:
 
 
 def _text(
-    settings: ReviewSettings,
-    chosen: Opened,
-    ports: tuple[int, int],
-    catalogues: Sequence[str],
+    settings: ReviewSettings, chosen: Opened, ports: tuple[int, int], catalogues: Sequence[str]
 ) -> str:
     """The opened recordings, their addresses, and the command for another machine."""
     page, table = ports

@@ -130,10 +130,7 @@ def _scale(name: str, sheets: Sequence[Datasheet]) -> Scale | None:
 
 
 def _row(
-    sheet: Datasheet,
-    current: CurrentStatus,
-    columns: Sequence[Column],
-    reasons: Sequence[Reason],
+    sheet: Datasheet, current: CurrentStatus, columns: Sequence[Column], reasons: Sequence[Reason]
 ) -> MotorRow:
     failed = tuple((c.name, c.status) for c in sheet.checks if c.status in ("fail", "marginal"))
     common = {reason.text: number for number, reason in enumerate(reasons, 1)}

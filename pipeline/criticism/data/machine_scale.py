@@ -108,10 +108,7 @@ def _unlogged(campaign: Campaign) -> dict[str, tuple[str, str]]:
 
 
 def _scales(
-    campaign: Campaign,
-    start: Constants,
-    known: Mapping[str, tuple[float, float]],
-    pole_pairs: int,
+    campaign: Campaign, start: Constants, known: Mapping[str, tuple[float, float]], pole_pairs: int
 ) -> dict[str, float]:
     """Typical size of each quantity: the largest on record, 1 where there is none.
 

@@ -263,11 +263,7 @@ def travel(theta: Array, slack: float) -> tuple[Array, Array, Array]:
 
 
 def thinned(
-    columns: Mapping[str, Array],
-    keep: NDArray[np.bool_],
-    length: int,
-    most: int,
-    pad: int = PAD,
+    columns: Mapping[str, Array], keep: NDArray[np.bool_], length: int, most: int, pad: int = PAD
 ) -> tuple[dict[str, Array], NDArray[np.int64]]:
     """Signals cut to an even selection of windows.
 

@@ -58,10 +58,7 @@ class Plan:
 
 
 def separations(
-    effect: Effect,
-    wide: LinearSystem,
-    offered: Sequence[Candidate],
-    remedies: Mapping[str, str],
+    effect: Effect, wide: LinearSystem, offered: Sequence[Candidate], remedies: Mapping[str, str]
 ) -> tuple[Separation, ...]:
     """Experiments that would separate an effect from its alternatives, the best first.
 

@@ -197,12 +197,7 @@ def _found(
 
 
 def _scanned(
-    system: LinearSystem,
-    rows: _Rows,
-    seen: NDArray[np.bool_],
-    place: int,
-    times: Array,
-    least: int,
+    system: LinearSystem, rows: _Rows, seen: NDArray[np.bool_], place: int, times: Array, least: int
 ) -> tuple[int, list[str]]:
     """Number of the last time before the best change, and the captures that have the later value.
 

@@ -55,10 +55,7 @@ class RankedInput:
 
 
 def unknown_structure(
-    system: LinearSystem,
-    signals: Sequence[str],
-    name: str = "unknown",
-    in_parts: bool = False,
+    system: LinearSystem, signals: Sequence[str], name: str = "unknown", in_parts: bool = False
 ) -> tuple[UnknownStructure | None, float]:
     """What the structure that no effect explains depends on, as curve, expression and effect file.
 

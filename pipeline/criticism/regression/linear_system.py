@@ -422,9 +422,7 @@ def _placed(columns: Sequence[Column], new: Sequence[Column], made: Array) -> Ar
 
 
 def _with_known(
-    now: LinearSystem,
-    before: LinearSystem,
-    known: Mapping[ColumnKey, Array],
+    now: LinearSystem, before: LinearSystem, known: Mapping[ColumnKey, Array]
 ) -> LinearSystem:
     """The system with the `known` columns of the one `before` put where its matrix is still open:
     over the noise of now, and those of a free shaft by its inertia of now.

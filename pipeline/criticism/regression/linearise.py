@@ -113,11 +113,7 @@ class Rows:
 
 
 def linearise(
-    segment: Segment,
-    model: Model,
-    values: Values,
-    columns: Sequence[Column],
-    floor: Floor,
+    segment: Segment, model: Model, values: Values, columns: Sequence[Column], floor: Floor
 ) -> Rows:
     """Whitened residual and columns of one segment.
 

@@ -210,12 +210,7 @@ def as_sensed(torque_nm: Array, model: Model, values: Values) -> Array:
 
 
 def true_load(
-    segment: Segment,
-    signals: Signals,
-    model: Model,
-    values: Values,
-    *,
-    inverter: bool = False,
+    segment: Segment, signals: Signals, model: Model, values: Values, *, inverter: bool = False
 ) -> Array:
     """Recorded torque, the dynamics of its transducer taken out.
 

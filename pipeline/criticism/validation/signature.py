@@ -61,8 +61,7 @@ class _Curve:
 
 
 def signature(
-    steps: tuple[LadderStep, LadderStep],
-    records: tuple[StepRecord, StepRecord],
+    steps: tuple[LadderStep, LadderStep], records: tuple[StepRecord, StepRecord]
 ) -> Signature | None:
     """The curve in which two neighbouring steps differ most clearly; None where none has cells.
 

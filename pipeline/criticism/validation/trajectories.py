@@ -347,11 +347,7 @@ def _central_speed(batch: Batch, theta: Array) -> Array:
 
 
 def _corrected(
-    batch: Batch,
-    jacobian: Jacobian,
-    voltage: Complex,
-    torque: Array,
-    speed: Array,
+    batch: Batch, jacobian: Jacobian, voltage: Complex, torque: Array, speed: Array
 ) -> tuple[Complex, Array]:
     """Corrections of current [W, n] [A] and angle [W, n] [rad], zero up to the windows' start.
 

@@ -107,10 +107,7 @@ def part_orders(
 
 
 def peak_orders(
-    lines: Sequence[OrderLine],
-    spec: Spectrum,
-    teeth: Sequence[int],
-    sides: Sequence[OrderLine],
+    lines: Sequence[OrderLine], spec: Spectrum, teeth: Sequence[int], sides: Sequence[OrderLine]
 ) -> list[OrderLine]:
     """The orders that the peak is made of: what the motor can make, and others past doubt.
 

@@ -156,9 +156,7 @@ def _of_known_temperature(groups: Sequence[Group]) -> list[Group]:
 
 
 def _flux_estimates(
-    groups: Sequence[Group],
-    notes: Sequence[str],
-    options: Mapping[str, float],
+    groups: Sequence[Group], notes: Sequence[str], options: Mapping[str, float]
 ) -> dict[str, Estimate]:
     used = tuple({g.capture.path: g.capture for g in groups}.values())
     psi = np.array([g.flux.psi_wb for g in groups])

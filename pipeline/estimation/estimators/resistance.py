@@ -160,10 +160,7 @@ class DirectCurrentFit:
 
 
 def fit_direct_current(
-    points: Sequence[Point],
-    columns: Columns,
-    u_alpha_rel: float,
-    alpha_rel: float = 0.0,
+    points: Sequence[Point], columns: Columns, u_alpha_rel: float, alpha_rel: float = 0.0
 ) -> DirectCurrentFit:
     """Weighted least squares of `terminal_voltage` over the plateaus of all pairs.
 

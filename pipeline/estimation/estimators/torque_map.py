@@ -351,10 +351,7 @@ def _slope(
 
 
 def _note(
-    captures: Sequence[Capture],
-    table: PointTable,
-    points: Sequence[Point],
-    chosen: Sequence[str],
+    captures: Sequence[Capture], table: PointTable, points: Sequence[Point], chosen: Sequence[str]
 ) -> str:
     words = [table.note()]
     if not _d_logged(points):

@@ -126,11 +126,7 @@ def check(job: MotorJob, campaign: Campaign, constants: Constants, watch: Stopwa
 
 
 def with_verdict(
-    job: MotorJob,
-    campaign: Campaign,
-    judged: Judged,
-    verdicts: Verdicts | None,
-    watch: Stopwatch,
+    job: MotorJob, campaign: Campaign, judged: Judged, verdicts: Verdicts | None, watch: Stopwatch
 ) -> Judged:
     """Compares the model with the captures, unless `verdicts` has cached what that comes to.
 

@@ -138,11 +138,7 @@ Ask = Callable[[Sequence[Question]], Sequence[Answer]]
 
 
 def survey(
-    folder: Path,
-    sources: Mapping[str, SourceMap],
-    ask: Ask | None = None,
-    *,
-    recover: bool = False,
+    folder: Path, sources: Mapping[str, SourceMap], ask: Ask | None = None, *, recover: bool = False
 ) -> Survey:
     """Looks at every file of a folder once, in the order of its path.
 

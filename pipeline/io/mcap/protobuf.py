@@ -177,12 +177,7 @@ class _Pass:
         return events
 
     def nested(
-        self,
-        part: Message,
-        prefix: str,
-        seen: _Events,
-        rows: int,
-        counts: Integers | None,
+        self, part: Message, prefix: str, seen: _Events, rows: int, counts: Integers | None
     ) -> None:
         """A message field: merged into its owner's row, or one row an element if repeated."""
         owner, start, length = _joined(seen)
@@ -199,11 +194,7 @@ class _Pass:
         self.message(part, prefix, start, start + length, elements, order.size, per_message)
 
     def events(
-        self,
-        fields: dict[int, Scalar | Message],
-        start: Integers,
-        end: Integers,
-        owner: Integers,
+        self, fields: dict[int, Scalar | Message], start: Integers, end: Integers, owner: Integers
     ) -> dict[int, _Events]:
         """Step all cursors through their spans and note the occurrences of `fields`."""
         events = {number: _Events() for number in fields}

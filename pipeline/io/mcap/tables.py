@@ -127,9 +127,7 @@ def read_tables(layout: Layout, wanted: WantedIn, joint: str | None = None) -> l
 
 
 def _stream(
-    streams: dict[tuple[str, str, Schema | None], _Stream],
-    definitions: Definitions,
-    number: int,
+    streams: dict[tuple[str, str, Schema | None], _Stream], definitions: Definitions, number: int
 ) -> _Stream:
     channel = definitions.channel(number)
     schema = definitions.schemas.get(channel.schema_id)

@@ -255,10 +255,7 @@ def _shown(
 
 
 def _capture_recordings(
-    campaign: Campaign,
-    sheet: Datasheet,
-    shown: Sequence[Evidence],
-    findings: Sequence[Finding],
+    campaign: Campaign, sheet: Datasheet, shown: Sequence[Evidence], findings: Sequence[Finding]
 ) -> Iterator[tuple[str, bytes]]:
     """Name and content of the recording of each capture."""
     from pipeline.io.recordings.capture import recording_bytes

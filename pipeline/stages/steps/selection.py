@@ -148,9 +148,7 @@ def _of_code(newest: Mapping[str, Mapping[str, Sheet]], same: Sequence[str]) -> 
 
 
 def _versions(
-    newest: Mapping[str, Mapping[str, Sheet]],
-    same: Sequence[str],
-    queries: Mapping[str, Query],
+    newest: Mapping[str, Mapping[str, Sheet]], same: Sequence[str], queries: Mapping[str, Query]
 ) -> Chosen:
     base, candidate = newest["baseline"], newest["candidate"]
     pairs = tuple(
