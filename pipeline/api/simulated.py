@@ -20,13 +20,7 @@ from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.settings import SimulateSettings, named_file
 from pipeline.simulator.bench import CAMPAIGN, campaign
-from pipeline.simulator.catalogue import (
-    bench_from,
-    fleet_from,
-    motor_from,
-    seed_of,
-    with_effects,
-)
+from pipeline.simulator.catalogue import bench_from, fleet_from, motor_from, seed_of, with_effects
 from pipeline.simulator.design import EXACT, Bench, Motor, Recording
 from pipeline.simulator.outside import with_unknown
 from pipeline.simulator.truth import truth

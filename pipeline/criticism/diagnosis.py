@@ -20,10 +20,7 @@ from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import (
-    HeldOut,
-    over_floor,
-)
+from pipeline.criticism.regression.goodness import HeldOut, over_floor
 from pipeline.criticism.regression.identifiability import against_stated, reported_combinations
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import hum_notes

@@ -13,12 +13,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from pipeline.physics.suspects import (
-    MOST_SUSPECTS,
-    Quantity,
-    convention_suspect,
-    conventions_hit,
-)
+from pipeline.physics.suspects import MOST_SUSPECTS, Quantity, convention_suspect, conventions_hit
 from pipeline.records.datasheet import Check, CheckStatus
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import (

@@ -20,13 +20,7 @@ from pipeline.physics.notation import quantity
 from pipeline.records.diagnosis_summary import DiagnosisSummary
 from pipeline.records.limits import ConstantLimits, Limits
 from pipeline.records.lot_constant import ConstantResult, Verdict
-from pipeline.records.lot_regression import (
-    EffectChange,
-    Group,
-    LimitsUsed,
-    LotRegression,
-    Outlier,
-)
+from pipeline.records.lot_regression import EffectChange, Group, LimitsUsed, LotRegression, Outlier
 
 WORDS: Mapping[Verdict, str] = {
     "pass": "the same as the baseline",

@@ -16,12 +16,7 @@ from numpy.typing import NDArray
 from pipeline.performance.blanks import NO_CONDITIONS, losses_not_known
 from pipeline.performance.draws import interval, uniform_draws
 from pipeline.performance.efficiency import efficiency_map
-from pipeline.performance.envelope import (
-    Point,
-    most_torque,
-    regime_of,
-    shaft_torque_nm,
-)
+from pipeline.performance.envelope import Point, most_torque, regime_of, shaft_torque_nm
 from pipeline.performance.heat import Heat, continuous_current_a, time_to_limit_s
 from pipeline.performance.machine import Machine, drag_nm, voltage_v
 from pipeline.performance.sources import (
@@ -38,13 +33,7 @@ from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import ModelVerdict
-from pipeline.records.performance import (
-    Blank,
-    Curve,
-    Derived,
-    Operation,
-    Performance,
-)
+from pipeline.records.performance import Blank, Curve, Derived, Operation, Performance
 
 Array = NDArray[np.float64]
 SPEEDS, CURRENTS = 33, 21

@@ -7,12 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
-from pipeline.records.uncertainty import (
-    Budget,
-    effective_dof,
-    propagate,
-    standard_uncertainty,
-)
+from pipeline.records.uncertainty import Budget, effective_dof, propagate, standard_uncertainty
 
 Status = Literal["measured", "derived", "assumed", "stated", "not_identifiable"]
 Conditions = Mapping[str, float | int | str]

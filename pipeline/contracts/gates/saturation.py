@@ -8,13 +8,7 @@ import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed, span_of, warning
 from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES
-from pipeline.contracts.waveform import (
-    Array,
-    Rows,
-    longest_likely_run,
-    rows_of_runs,
-    runs_of_equal,
-)
+from pipeline.contracts.waveform import Array, Rows, longest_likely_run, rows_of_runs, runs_of_equal
 from pipeline.physics.glossary import TESTS
 from pipeline.records.capture import Capture, Mask
 from pipeline.records.errors import CaptureError

@@ -6,15 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import (
-    Array,
-    Complex,
-    Effect,
-    Operating,
-    Parameter,
-    Values,
-    between,
-)
+from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values, between
 
 
 def _voltage(v_v: Complex, x: Operating, q: Values, _: str) -> Complex:

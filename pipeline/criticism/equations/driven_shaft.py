@@ -11,14 +11,7 @@ from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.settling import unexplained_voltage
 from pipeline.criticism.data.traces import smoothed, window_of
 from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values, between
-from pipeline.criticism.equation import (
-    Channel,
-    Equation,
-    NamedCombination,
-    Observes,
-    Sensing,
-    Use,
-)
+from pipeline.criticism.equation import Channel, Equation, NamedCombination, Observes, Sensing, Use
 from pipeline.criticism.machine.model import LATE_VOLTAGE, STATE, Model, Pieces, evaluate
 from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
 from pipeline.criticism.signals.voltage import recorded_voltage

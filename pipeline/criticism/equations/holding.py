@@ -12,12 +12,7 @@ from pipeline.criticism.effect import Array, Machine, Operating, Recorded, Signa
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.signals.shaft import net_torque
-from pipeline.criticism.signals.true_state import (
-    Motion,
-    operating,
-    table_current,
-    true_current,
-)
+from pipeline.criticism.signals.true_state import Motion, operating, table_current, true_current
 from pipeline.records.capture import Capture
 
 _CRAWL = 1e-9

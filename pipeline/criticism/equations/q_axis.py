@@ -12,18 +12,8 @@ from pipeline.criticism.data.traces import window_of
 from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, UNSAMPLED, Model, Pieces, values_of
-from pipeline.criticism.signals.true_state import (
-    at_true_angle,
-    drive_current,
-    motion_of,
-    operating,
-)
-from pipeline.criticism.signals.voltage import (
-    central,
-    recorded_voltage,
-    rotor_voltage,
-    unresolved,
-)
+from pipeline.criticism.signals.true_state import at_true_angle, drive_current, motion_of, operating
+from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage, unresolved
 from pipeline.numerics.projection import projection, window_starts
 from pipeline.records.capture import Capture
 

@@ -30,12 +30,7 @@ from pipeline.criticism.machine.model import (
     zero,
 )
 from pipeline.criticism.policy.regression import NoiseFloors
-from pipeline.criticism.regression.noise_floors import (
-    Floor,
-    offsets,
-    reading_error,
-    window_gain,
-)
+from pipeline.criticism.regression.noise_floors import Floor, offsets, reading_error, window_gain
 from pipeline.criticism.residuals.channels import of_acceleration, reported_unit
 from pipeline.criticism.residuals.observability import hooks_in, observes, observes_sensor
 from pipeline.criticism.residuals.residual import measured, operate, predicted, residual

@@ -14,12 +14,7 @@ from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.effect import UNLOGGED, Machine
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equation_of, equations
-from pipeline.criticism.machine.model import (
-    COAST_SHARES,
-    LATE_SPEED,
-    OPEN_FLUX,
-    UNLOGGED_AT_REST,
-)
+from pipeline.criticism.machine.model import COAST_SHARES, LATE_SPEED, OPEN_FLUX, UNLOGGED_AT_REST
 from pipeline.numerics.coast_setups import Limits, Setup, coast_setups
 from pipeline.records.capture import Campaign, Capture
 

@@ -6,10 +6,7 @@ from collections.abc import Iterable
 
 from pipeline.estimation.electrical.terminals import first_temperature
 from pipeline.estimation.policy import policy
-from pipeline.estimation.uncertainty.instruments import (
-    instrument_uncertainties,
-    temperature_source,
-)
+from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, temperature_source
 from pipeline.records.capture import Capture
 
 UNLOGGED = "assumed:temp_magnet_degc"

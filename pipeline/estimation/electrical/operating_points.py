@@ -12,10 +12,7 @@ from numpy.typing import NDArray
 from pipeline.estimation.electrical.magnet_temperature import assumed_temperature, magnet_source
 from pipeline.estimation.electrical.terminals import bridged
 from pipeline.estimation.policy import policy
-from pipeline.estimation.uncertainty.instruments import (
-    current_source,
-    torque_source,
-)
+from pipeline.estimation.uncertainty.instruments import current_source, torque_source
 from pipeline.estimation.uncertainty.instruments import voltage_source as source_of_voltage
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import find_plateaus, white_noise_sigma

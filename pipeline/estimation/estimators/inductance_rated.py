@@ -8,12 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.electrical.flux_pairs import (
-    Flux,
-    flux_pairs,
-    frame_of,
-    instant_voltage,
-)
+from pipeline.estimation.electrical.flux_pairs import Flux, flux_pairs, frame_of, instant_voltage
 from pipeline.estimation.electrical.operating_points import Point, operating_points, pole_pairs_of
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy

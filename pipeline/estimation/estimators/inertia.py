@@ -8,10 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.electrical.magnet_temperature import (
-    magnet_source,
-    magnet_uncertainties,
-)
+from pipeline.estimation.electrical.magnet_temperature import magnet_source, magnet_uncertainties
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.mechanical.drag import (
     DRAG_FORMS,

@@ -8,11 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.electrical.back_emf import (
-    flux_of,
-    read_spin,
-    steady_stretches,
-)
+from pipeline.estimation.electrical.back_emf import flux_of, read_spin, steady_stretches
 from pipeline.estimation.electrical.magnet_temperature import (
     assumed_temperature,
     magnet_column,

@@ -17,11 +17,7 @@ from pipeline.estimation.electrical.direct_current import (
 from pipeline.estimation.estimators.resistance import columns_of, fit_direct_current
 from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.uncertainty.instruments import (
-    Shift,
-    contributions,
-    unstated_note,
-)
+from pipeline.estimation.uncertainty.instruments import Shift, contributions, unstated_note
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 

@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from pipeline.estimation.electrical.magnet_temperature import (
-    magnet_uncertainties,
-    unlogged_note,
-)
+from pipeline.estimation.electrical.magnet_temperature import magnet_uncertainties, unlogged_note
 from pipeline.estimation.electrical.operating_points import (
     Point,
     PointTable,

@@ -6,12 +6,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from pipeline.io.maps.source_map import (
-    SourceMap,
-    find_maps,
-    load_source_file,
-    load_source_maps,
-)
+from pipeline.io.maps.source_map import SourceMap, find_maps, load_source_file, load_source_maps
 from pipeline.settings import configuration_folder
 
 AUTO = "auto"

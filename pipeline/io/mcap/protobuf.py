@@ -14,14 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.io.mcap.leaf import Leaf, Wanted, spread
 from pipeline.io.mcap.messages import Batch
-from pipeline.io.mcap.protobuf_plan import (
-    FIXED32,
-    FIXED64,
-    LENGTH,
-    VARINT,
-    Message,
-    Scalar,
-)
+from pipeline.io.mcap.protobuf_plan import FIXED32, FIXED64, LENGTH, VARINT, Message, Scalar
 from pipeline.io.mcap.protobuf_rows import even_shape, shaped_rows
 from pipeline.io.mcap.walk import Bytes, Integers, view_at_every_byte
 from pipeline.records.errors import CaptureError

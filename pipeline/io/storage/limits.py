@@ -10,14 +10,7 @@ from typing import Any
 from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.errors import CaptureError, UsageError
-from pipeline.records.limits import (
-    RULES,
-    Amount,
-    ConstantLimits,
-    Limits,
-    amount_from,
-    number_from,
-)
+from pipeline.records.limits import RULES, Amount, ConstantLimits, Limits, amount_from, number_from
 from pipeline.settings import named_file
 
 KEYS = ("about", "required", "model_gates", "rules", "golden", "constants")
