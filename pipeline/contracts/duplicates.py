@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 from pipeline.records.finding import Finding
 
-Array = NDArray[np.float64]
 CODE = "duplicate_rows"
 
 

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES
 from pipeline.physics.frames import space_vector
 from pipeline.physics.units import TURN_RAD
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 
-Array = NDArray[np.float64]
 BLOCKS = 200
 VectorOf = Callable[[Capture], tuple[Array, NDArray[np.complex128]] | None]
 

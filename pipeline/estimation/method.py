@@ -13,12 +13,10 @@ from pipeline.estimation.protocol import Fit
 from pipeline.estimation.uncertainty.instruments import budget_of
 from pipeline.numerics.plateaus import decimated
 from pipeline.physics.glossary import CONSTANTS, Term
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 from pipeline.records.estimate import Conditions, Estimate, not_identifiable, not_there
 from pipeline.records.evidence import Evidence, PlotKind, Series
 from pipeline.records.uncertainty import Contribution
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

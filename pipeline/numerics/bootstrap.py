@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.numerics.least_squares import autocorrelation_time
-
-Array = NDArray[np.float64]
+from pipeline.numerics.least_squares import Array, autocorrelation_time
 
 
 def block_length(series: Array) -> int:

@@ -11,14 +11,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed
-from pipeline.records.capture import Capture
-
-Array = NDArray[np.float64]
+from pipeline.records.capture import Array, Capture
 
 REMEDY = (
     "give each set-up a motor_id of its own (`per_file` in a source map, or manifest.csv), or "

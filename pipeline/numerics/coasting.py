@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.numerics.plateaus import true_runs
+from pipeline.numerics.plateaus import Array, true_runs
 
-Array = NDArray[np.float64]
 Deceleration = Callable[[Array], Array]
 
 GRID = 3000

@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics.harmonics import harmonic_design
-from pipeline.numerics.least_squares import linear_fit
+from pipeline.numerics.least_squares import Array, linear_fit
 from pipeline.physics.units import TURN_RAD
 
-Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 NEIGHBOURS = 10

@@ -11,14 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.performance.blanks import NO_CONDITIONS, losses_not_known
 from pipeline.performance.draws import interval, uniform_draws
 from pipeline.performance.efficiency import efficiency_map
 from pipeline.performance.envelope import Point, most_torque, regime_of, shaft_torque_nm
 from pipeline.performance.heat import Heat, continuous_current_a, time_to_limit_s
-from pipeline.performance.machine import Machine, drag_nm, voltage_v
+from pipeline.performance.machine import Array, Machine, drag_nm, voltage_v
 from pipeline.performance.sources import (
     COPPER,
     ELECTRICAL,
@@ -35,7 +34,6 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.performance import Blank, Curve, Derived, Operation, Performance
 
-Array = NDArray[np.float64]
 SPEEDS, CURRENTS = 33, 21
 FASTEST = 4.0
 """The curve ends at this many corner speeds where field weakening has no end of its own."""

@@ -10,11 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.performance.machine import Machine, drag_nm, inductances_h, torque_nm, voltage_v
+from pipeline.performance.machine import (
+    Array,
+    Machine,
+    drag_nm,
+    inductances_h,
+    torque_nm,
+    voltage_v,
+)
 
-Array = NDArray[np.float64]
 COARSE_DEG, FINER, ROUNDS = 3.0, ((3.0, 41), (0.15, 13)), 8
 LEAST_DEG, MOST_DEG = -45.0, 90.0
 CLOSE = 2e-3

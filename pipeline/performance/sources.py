@@ -6,18 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.performance.draws import joint_draws, uniform_draws
 from pipeline.performance.heat import Heat
 from pipeline.performance.machine import Machine
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K, Array
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.estimate import Estimate
 from pipeline.records.performance import Blank
 from pipeline.records.uncertainty import type_b
 
-Array = NDArray[np.float64]
 SEEN = 2.0
 """Standard deviations from which on an inductance is seen to go with the current."""
 ELECTRICAL = ("r_phase_ohm", "ld_h", "lq_h", "psi_pm_wb", "pole_pairs")

@@ -6,14 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pipeline.records.error_map import ErrorMap
+from pipeline.records.error_map import Array, ErrorMap
 from pipeline.records.plain_form import PlainRecord, plain_of
 from pipeline.records.policy import Overrides
 
-Array = NDArray[np.float64]
 SIGNALS = (
     "vd_v",
     "vq_v",

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from pipeline.simulator.field import SQRT3, current, magnet, torque_of
+from pipeline.simulator.field import SQRT3, Array, current, magnet, torque_of
 from pipeline.simulator.motion import bristle_after, coupling, dragged, extra, heat, passive
 from pipeline.simulator.plant import Plant
 
@@ -39,7 +38,6 @@ COLUMNS = (
     "work_copper",
     "work_switches",
 )
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 Mechanics = tuple[float, float, float, float]
 Field = tuple[float, float, float, float, float, float, float, float, float]

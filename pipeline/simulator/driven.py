@@ -7,16 +7,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.simulator import protocols
 from pipeline.simulator.design import Recording
-from pipeline.simulator.sensors import Session, grid, late, to_grid
+from pipeline.simulator.sensors import Array, Session, grid, late, to_grid
 
 if TYPE_CHECKING:
     from pipeline.simulator.converter import Control
 
-Array = NDArray[np.float64]
 TIMINGS = ("centred", "held", "instant")
 
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from pipeline.simulator.converter import resistance_rise
-from pipeline.simulator.field import current, magnet, stiffness
+from pipeline.simulator.field import Array, current, magnet, stiffness
 from pipeline.simulator.plant import Plant
 
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 

@@ -6,13 +6,11 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from pipeline.simulator.field import cogging
+from pipeline.simulator.field import Array, cogging
 from pipeline.simulator.plant import Plant
 
 TURN = 2.0 * math.pi
-Array = NDArray[np.float64]
 
 
 @njit(cache=True)

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.simulator import protocols
 from pipeline.simulator.design import Recording
-from pipeline.simulator.sensors import Session, grid, to_grid
+from pipeline.simulator.sensors import Array, Session, grid, to_grid
 
-Array = NDArray[np.float64]
 ROOT3 = math.sqrt(3.0)
 # tanh(8) is 1 to 2e-7
 _CRAWL = 8.0

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.simulator import protocols
 from pipeline.simulator.design import Recording
 from pipeline.simulator.effects import cogging_order
-from pipeline.simulator.sensors import Session
+from pipeline.simulator.sensors import Array, Session
 from pipeline.simulator.standing import nice_rate
-
-Array = NDArray[np.float64]
 
 
 def _terminal_voltages(

@@ -8,8 +8,8 @@ import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed
 from pipeline.contracts.requirements import LINE_CURRENTS
-from pipeline.contracts.rotation import Array, line_current_vector, turning
-from pipeline.records.capture import Capture
+from pipeline.contracts.rotation import line_current_vector, turning
+from pipeline.records.capture import Array, Capture
 from pipeline.records.errors import CaptureError
 
 CODE = "swapped_phases"

@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.numerics.weak_rows import smooth_speed
 from pipeline.physics.conventions import copper_resistance_ohm
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
-
-Array = NDArray[np.float64]
 
 NAME = "power_balance"
 COLUMNS = ("t_s", "vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm")

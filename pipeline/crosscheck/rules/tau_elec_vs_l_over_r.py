@@ -7,20 +7,18 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.physics.conventions import copper_resistance_ohm, terminal_inductance_h
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
 from pipeline.records.uncertainty import propagate, type_a
 
 NAME = "tau_elec_vs_l_over_r"
-Array = NDArray[np.float64]
 
 
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:

@@ -7,16 +7,14 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.physics.units import TURN_RAD
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
 
-Array = NDArray[np.float64]
 NAME = "time_base"
 TESTS = ("spin_down", "drive", "open_circuit", "torque_map", "cogging", "hand_turn")
 COLUMNS = ("t_s", "theta_mech_rad", "omega_mech_rad_s")

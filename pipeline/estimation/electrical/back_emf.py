@@ -22,9 +22,8 @@ from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import true_runs, white_noise_sigma
 from pipeline.physics.conventions import PAIR_AXES_RAD
 from pipeline.physics.units import TURN_RAD
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Rows = NDArray[np.intp]
 

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.terminals import (
     bridged,
@@ -26,12 +25,11 @@ from pipeline.estimation.uncertainty.instruments import (
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import find_plateaus
 from pipeline.physics.glossary import OHMMETER
-from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.capture import Array, Campaign, Capture, CaptureMeta
 
 TEST = "resistance"
 UNLOGGED = "assumed:temp_winding_degc"
 POINT_OPTIONS = {"zero_crossing": 0.03, "temp_assumed_degc": 25.0}
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.back_emf import Channel, Spin
 from pipeline.numerics.integrals import REST, cubic
-from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
+from pipeline.numerics.least_squares import Array, LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import white_noise_sigma
 from pipeline.physics.units import TURN_RAD
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

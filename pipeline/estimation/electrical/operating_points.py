@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.magnet_temperature import assumed_temperature, magnet_source
 from pipeline.estimation.electrical.terminals import bridged
@@ -16,10 +15,9 @@ from pipeline.estimation.uncertainty.instruments import current_source, torque_s
 from pipeline.estimation.uncertainty.instruments import voltage_source as source_of_voltage
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import find_plateaus, white_noise_sigma
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 from pipeline.records.constants import Constants
 
-Array = NDArray[np.float64]
 MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
 TURN_RAD = 2.0 * np.pi
 

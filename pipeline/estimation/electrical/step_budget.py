@@ -6,10 +6,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.step_fit import AXES, Solution
-from pipeline.estimation.electrical.step_model import LD, LQ, StepModel
+from pipeline.estimation.electrical.step_model import LD, LQ, Array, StepModel
 from pipeline.estimation.electrical.step_record import StepRecord, rotor_angle_rad
 from pipeline.estimation.uncertainty.instruments import (
     current_source,
@@ -18,8 +17,6 @@ from pipeline.estimation.uncertainty.instruments import (
     voltage_source,
 )
 from pipeline.records.uncertainty import Contribution
-
-Array = NDArray[np.float64]
 
 
 def gains(name: str, solution: Solution) -> list[Contribution]:

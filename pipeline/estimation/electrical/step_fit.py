@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from pipeline.estimation.electrical.step_model import LD, LQ, SHARED, TERMS, StepModel, start_of
 from pipeline.estimation.electrical.step_wave import BETWEEN, Noise
 from pipeline.estimation.policy import policy
-from pipeline.numerics.least_squares import NonlinearFit, autocorrelation_time, gauss_newton
+from pipeline.numerics.least_squares import Array, NonlinearFit, autocorrelation_time, gauss_newton
 
 AXES: Mapping[str, tuple[int, tuple[int, ...]]] = {
     "ld_h": (LD, tuple(range(LD + 1, LD + 1 + TERMS))),
     "lq_h": (LQ, tuple(range(LQ + 1, LQ + 1 + TERMS))),
 }
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Offer = tuple[float, int, float]
 Sigmas = Sequence[tuple[float, float]]

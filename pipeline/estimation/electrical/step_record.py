@@ -15,9 +15,7 @@ from pipeline.estimation.policy import policy
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.physics.conventions import PAIR_AXES_RAD
-from pipeline.records.capture import Capture
-
-Array = NDArray[np.float64]
+from pipeline.records.capture import Array, Capture
 
 
 @dataclass(frozen=True, slots=True)

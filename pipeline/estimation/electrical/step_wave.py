@@ -26,9 +26,8 @@ from pipeline.numerics.quantisation import (
     resolution,
     rounding_rms,
 )
-from pipeline.records.capture import VoltageTiming
+from pipeline.records.capture import Array, VoltageTiming
 
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 BETWEEN = -1
 """Level of a sample that was taken while the voltage rose."""

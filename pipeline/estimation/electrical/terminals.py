@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 
-Array = NDArray[np.float64]
 PAIRS = ("ab", "bc", "ca")
 
 

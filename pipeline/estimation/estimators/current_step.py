@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.step_budget import (
     birge_ratio,
@@ -39,7 +38,7 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import unstated_note
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import decimated
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
@@ -50,7 +49,6 @@ EXPERIMENT = (
     "record current_step captures with the rotor locked on d and on q (pair ab: theta_elec_deg -30 "
     "and 60), both senses of current, two or more amplitudes"
 )
-Array = NDArray[np.float64]
 
 
 def inductances(shared: Array, flux_d: Array, flux_q: Array) -> tuple[Array, Array]:

@@ -37,13 +37,11 @@ from pipeline.numerics.selection import needed_columns
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import Term
 from pipeline.physics.units import REFERENCE_DEGC
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Contribution
-
-Array = NDArray[np.float64]
 
 STANDBY = Term(
     "standby_w", "W", "power that the drive takes from its supply at rest", "constant", -1e4, 1e4

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.magnet_temperature import (
     magnet_source,
@@ -36,13 +35,11 @@ from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.estimation.uncertainty.regimes import Disagreement, Regression, disagreement, scatter
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Contribution, propagate
-
-Array = NDArray[np.float64]
 
 METHOD = Method("drive_torque")
 GIVES = ("kt_peak_nm_a",)

@@ -37,13 +37,11 @@ from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, lin
 from pipeline.numerics.selection import needed_columns
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Budget, Contribution, propagate
-
-Array = NDArray[np.float64]
 
 METHOD = Method("drive_voltage")
 GIVES = ("ke_phase_peak_v_s_rad", "r_phase_ohm")

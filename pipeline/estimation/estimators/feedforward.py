@@ -31,13 +31,11 @@ from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.physics.glossary import Term
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Contribution
-
-Array = NDArray[np.float64]
 
 TERMS = (
     Term("ks_v", "V", "q voltage against dry friction: R T_c / Kt", "constant", -1e3, 1e3),

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
@@ -26,7 +25,7 @@ from pipeline.estimation.uncertainty.instruments import (
     voltage_source,
 )
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
-from pipeline.records.capture import Campaign
+from pipeline.records.capture import Array, Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
@@ -38,7 +37,6 @@ EXPERIMENT = (
     "record a heat_run: steady current on a locked rotor until the winding is 20 K warmer, with "
     "temp_winding_degc, voltage and current"
 )
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

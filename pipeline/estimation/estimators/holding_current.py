@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.estimators.cogging import name_orders, part_orders, spectrum_bars
 from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
@@ -35,13 +34,11 @@ from pipeline.numerics.orders import (
 from pipeline.physics.glossary import Term
 from pipeline.physics.mechanics import cogging_order
 from pipeline.physics.units import TURN_RAD
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Contribution, propagate
-
-Array = NDArray[np.float64]
 
 RESIDUAL = Term(
     "holding_residual_a",

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.flux_pairs import Flux, flux_pairs, frame_of, instant_voltage
 from pipeline.estimation.electrical.operating_points import Point, operating_points, pole_pairs_of
@@ -19,13 +18,11 @@ from pipeline.estimation.uncertainty.instruments import (
     instrument_uncertainties,
     unstated_note,
 )
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Contribution
-
-Array = NDArray[np.float64]
 
 METHOD = Method("inductance_rated")
 GIVES = ("ld_rated_h", "lq_rated_h")

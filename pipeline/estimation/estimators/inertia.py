@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.magnet_temperature import magnet_source, magnet_uncertainties
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
@@ -36,13 +35,11 @@ from pipeline.estimation.uncertainty.instruments import (
 from pipeline.estimation.uncertainty.regimes import Disagreement
 from pipeline.numerics.coast_setups import Setup, setup_words
 from pipeline.numerics.least_squares import linear_fit
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import BETWEEN, Budget, Contribution, propagate
-
-Array = NDArray[np.float64]
 
 METHOD = Method("inertia")
 GIVES = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.terminals import PAIRS
 from pipeline.estimation.method import Method, over_x
@@ -21,7 +20,7 @@ from pipeline.estimation.uncertainty.instruments import (
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.physics.conventions import PAIR_AXES_RAD, unaligned_inductances_h
 from pipeline.physics.glossary import Term
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
@@ -46,7 +45,6 @@ TERMS = (
 )
 GIVES = ("ld_h", "lq_h", *(term.name for term in TERMS))
 METHOD = Method("lcr", TERMS)
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

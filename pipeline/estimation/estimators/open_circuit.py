@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.back_emf import flux_of, read_spin, steady_stretches
 from pipeline.estimation.electrical.magnet_temperature import (
@@ -29,7 +28,7 @@ from pipeline.estimation.uncertainty.instruments import (
 from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.physics.conventions import COUPLINGS, CouplingName, coupling_as
 from pipeline.physics.glossary import Term
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
@@ -48,7 +47,6 @@ KE_NAMES: tuple[CouplingName, ...] = (
     "ke_ll_peak_v_krpm",
     "kv_ll_peak_rpm_v",
 )
-Array = NDArray[np.float64]
 
 TERMS = (
     *(

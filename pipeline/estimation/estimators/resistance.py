@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.direct_current import (
     POINT_OPTIONS,
@@ -34,7 +33,7 @@ from pipeline.physics.conventions import (
     phase_resistances_ohm,
 )
 from pipeline.physics.glossary import Term
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Conditions, Estimate
 from pipeline.records.evidence import Evidence
@@ -46,7 +45,6 @@ EXPERIMENT = (
 )
 COPPER_SOURCE = "assumed:temp_coeff_copper_1_k"
 RANGE_OF_THREE = 3.314 / (1.960 * math.sqrt(2.0))
-Array = NDArray[np.float64]
 
 TERMS = (
     *(

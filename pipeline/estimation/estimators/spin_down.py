@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.mechanical.drag import DRAG_FORMS, STRIBECK
 from pipeline.estimation.mechanical.setups import setups_of
@@ -28,13 +27,11 @@ from pipeline.numerics.plateaus import block_means, white_noise_sigma
 from pipeline.numerics.selection import needed_columns
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed
 from pipeline.physics.glossary import Term
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Contribution
-
-Array = NDArray[np.float64]
 
 TERMS = (
     Term("coast_coulomb_rad_s2", "rad/s²", "Coulomb friction over inertia, from coasting",

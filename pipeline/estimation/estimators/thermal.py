@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
@@ -35,7 +34,7 @@ from pipeline.numerics.least_squares import (
 from pipeline.numerics.plateaus import white_noise_sigma
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import Term
-from pipeline.records.capture import Campaign
+from pipeline.records.capture import Array, Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
@@ -54,7 +53,6 @@ EXPERIMENT = (
     "record a heat_run of at least three thermal time constants with temp_winding_degc, "
     "temp_ambient_degc or ambient_degc, and temp_case_degc or temp_magnet_degc"
 )
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from pipeline.estimation.electrical.magnet_temperature import magnet_uncertainties, unlogged_note
@@ -31,13 +30,11 @@ from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.selection import needed_columns
 from pipeline.physics.glossary import Term
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Budget, Contribution, propagate
-
-Array = NDArray[np.float64]
 
 RELUCTANCE = Term(
     "kt_reluctance_nm_a2",

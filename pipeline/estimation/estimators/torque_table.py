@@ -30,12 +30,10 @@ from pipeline.estimation.uncertainty.instruments import (
 from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.numerics.selection import needed_columns
 from pipeline.physics.units import REFERENCE_DEGC
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Contribution, propagate
-
-Array = NDArray[np.float64]
 
 METHOD = Method("torque_table")
 GIVES = ("kt_peak_nm_a",)

@@ -6,17 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.estimation.policy import policy
 from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.numerics.clusters import cluster_covariance
-from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
+from pipeline.numerics.least_squares import Array, LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns
-
-Array = NDArray[np.float64]
 
 # Shares of the highest speed, denser where friction bends. Chords of a square of speed are off by
 # a quarter of the square of their width: by 1.2 % of the largest drag at most, within

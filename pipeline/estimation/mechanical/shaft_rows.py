@@ -20,9 +20,7 @@ from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
-from pipeline.records.capture import Capture
-
-Array = NDArray[np.float64]
+from pipeline.records.capture import Array, Capture
 
 DRIVE, COAST = 0, 1
 ACCELERATION_NOISE, CURRENT_NOISE = "acceleration noise", "current noise"

@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.operating_points import Point
 from pipeline.estimation.policy import policy
-from pipeline.numerics.least_squares import linear_fit
-
-Array = NDArray[np.float64]
+from pipeline.numerics.least_squares import Array, linear_fit
 
 
 @dataclass(frozen=True, slots=True)

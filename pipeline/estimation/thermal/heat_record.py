@@ -18,11 +18,10 @@ from pipeline.estimation.policy import policy
 from pipeline.numerics.integrals import GAP
 from pipeline.numerics.plateaus import block_means, find_plateaus
 from pipeline.physics.conventions import phase_from_line
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, derived
 
-Array = NDArray[np.float64]
 DQ = ("vd_v", "vq_v", "id_a", "iq_a")
 TURNING = ("psi_pm_wb", "pole_pairs", "ld_h", "lq_h")
 REFERENCE = ("r_phase_ohm", "r_a_ohm", "r_b_ohm", "r_c_ohm", "angle_offset_elec_rad")

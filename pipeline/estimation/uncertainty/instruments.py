@@ -10,14 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pipeline.records.capture import UNSTATED_U, Capture, CaptureMeta
+from pipeline.records.capture import UNSTATED_U, Array, Capture, CaptureMeta
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import Budget, Contribution, propagate
 
-Array = NDArray[np.float64]
 Shift = Mapping[str, float]
 
 

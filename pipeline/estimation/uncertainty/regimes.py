@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.policy import policy
 from pipeline.numerics.clusters import cluster_covariance
-from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
+from pipeline.numerics.least_squares import Array, LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.random_effects import Between, between
 from pipeline.records.uncertainty import BETWEEN, Contribution
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 

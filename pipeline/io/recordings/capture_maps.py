@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 
 from pipeline.numerics.cell_means import cell_means, visits_of
 from pipeline.physics.glossary import unit_of
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 from pipeline.records.error_map import Bins, ErrorMap
 from pipeline.records.evidence import Evidence
-
-Array = NDArray[np.float64]
 
 SPEED_CELLS, CURRENT_CELLS = 24, 16
 MOST_ANGLE_CELLS, SAMPLES_A_CELL = 180, 8

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
 from pipeline.io.recordings.datasheet_page import plain
 from pipeline.io.recordings.font import drawable, in_headings
@@ -71,7 +70,6 @@ if TYPE_CHECKING:
     from rerun import RecordingStream
     from rerun.blueprint import Blueprint
 
-Array = NDArray[np.float64]
 DIGITS = 5
 """Significant digits of a constant in the table of motors."""
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
-from pipeline.io.recordings.stream import Trace
+from pipeline.io.recordings.stream import Array, Trace
 from pipeline.io.recordings.views import BASELINE, CANDIDATE
 from pipeline.physics.notation import Scale, scale_for
 from pipeline.records.lot_constant import ConstantResult, Side
 from pipeline.records.lot_regression import CoggingBand, LotRegression
-
-Array = NDArray[np.float64]
 
 PLACE = "place"
 MOTORS = "/motors"

@@ -41,7 +41,7 @@ from pipeline.io.recordings.stream import (
     send_trace,
 )
 from pipeline.numerics.thinning import line_points
-from pipeline.records.capture import Campaign
+from pipeline.records.capture import Array, Campaign
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
@@ -50,7 +50,6 @@ from pipeline.records.naming import file_stem
 if TYPE_CHECKING:
     from rerun import RecordingStream
 
-Array = NDArray[np.float64]
 
 POINTS_A_SERIES = 400
 WAVE_CELLS, PREVIEW_PERIODS = 720, 4

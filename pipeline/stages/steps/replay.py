@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.physics.machine import DqMeans, air_gap_torque, dq_voltages
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.evidence import Evidence, Series
-
-Array = NDArray[np.float64]
 
 NAME = "datasheet"
 TITLE = "Against the datasheet"
