@@ -577,7 +577,7 @@ Signals = Mapping[str, Array]
 
 @dataclass(frozen=True, slots=True)
 class FullLog:
-    """All of one drive log, with what the fitted model gives for it.
+    """All of one drive log, with what the fitted model gives for it at its samples.
 
     Attributes
     ----------
@@ -586,7 +586,7 @@ class FullLog:
     drag_nm
         Torque of everything else in the model [n].
     shaft_nm
-        True torque at the sensor of the shaft [n].
+        True torque at the sensor of the shaft [n]; zero of a free shaft without a sensor.
     good
         Samples that were recorded well [n].
     u_theta_rad, u_shaft_nm, u_air_gap_nm
@@ -605,11 +605,11 @@ class FullLog:
 
 @dataclass(frozen=True, slots=True)
 class Discrimination:
-    """Which of the effects that share a discriminator it is, and parameters with their standard
-    uncertainties, in their own units.
+    """Which of the effects that share a discriminator it is, None where full logs exclude one of the
+    fitted size; and parameters with their standard uncertainties, in their own units.
     """
 
-    name: str
+    name: str | None
     values: Mapping[str, tuple[float, float]]
 
 

@@ -313,14 +313,15 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
     logs
         Whole logs with currents, angle and the load's torque.
     q
-        `share` of the inertia at the far end [1], and whether the transducer is `between`.
+        `share` of the inertia at the far end [1], whether the transducer is `between`, and the
+        `twist_rad` or `gap_rad` of the fit.
 
     Returns
     -------
     Discrimination or None
         A gap if it is significant, and wider than the spring's twist at the torque passed on; a
-        spring if such a gap is excluded; else None. The limit is `sure_u` standard
-        uncertainties.
+        spring if such a gap is excluded; nothing if those of the fit are; else None. The limit is
+        `sure_u` standard uncertainties.
 
     """
     between, share = q["between"] > 0.0, q["share"]
@@ -328,14 +329,38 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
         return None
     law = _law(logs, between, share)
     if law is None or not between:
+        if law is not None and _excluded(law, logs[0], share, q):
+            return Discrimination(None, {})
         return None if law is None else _discriminated(law, logs[0], share)
     return _in_coupling(law, logs[0], (1.0 - share) * logs[0].x.base["j_kgm2"])
 
 
+def _excluded(law: Law, log: FullLog, part: float, q: Values) -> bool:
+    """Whether a law, `part` of the twist in it, shows less of the fit's twist and gap than a share,
+    and nothing of what the fit has not.
+    """
+    machine = log.x.machine
+    policy = machine.policy.torsion
+    softness = part * q.get("twist_rad", 0.0) / machine.scales["torque_nm"]
+    gap = part * q.get("gap_rad", 0.0)
+    return all(
+        found < policy.sure_u * u
+        if size == 0.0
+        else found + policy.sure_u * u < policy.least_shown * size
+        for size, found, u in (
+            (softness, law.softness, law.u_softness),
+            (gap, law.gap_rad, law.u_gap_rad),
+        )
+    )
+
+
 def _law(logs: Sequence[FullLog], between: bool, share: float) -> Law | None:
-    """The law of twist in logs, of enough windows; None without."""
+    """The law of twist in logs, of enough windows; None without. Where the transducer is `between`,
+    of logs with a transducer.
+    """
     policy = logs[0].x.machine.policy.torsion
-    law = law_of_twist((_shaft(one, between, share) for one in logs), policy)
+    used = (one for one in logs if not (between and one.x.shaft.alone))
+    law = law_of_twist((_shaft(one, between, share) for one in used), policy)
     return None if law is None or law.windows < policy.windows else law
 
 

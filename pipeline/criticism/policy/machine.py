@@ -67,6 +67,11 @@ class Torsion:
         3.5, "standard uncertainties", "distance of a gap or softness from what it is held against",
         why="chance passes it once in four thousand",
     )  # fmt: skip
+    least_shown: float = chosen(
+        0.5, "1", "share of a fit's twist or gap that full logs show at the least",
+        why="damping and drags move what they show by some per cent; another cause than a twist "
+        "leaves a tenth of it",
+    )  # fmt: skip
     windows: int = chosen(
         6, "windows", "windows with torque of both signs that a look needs",
         why="their scatter is the uncertainty, and of fewer it is not known",

@@ -15,6 +15,7 @@ from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import measured, operate
+from pipeline.criticism.signals.shaft import averaged
 
 
 def discriminate(fit: Fit, effect: Effect) -> Discrimination | None:
@@ -61,13 +62,18 @@ def _whole(segment: Segment, model: Model, fit: Fit) -> FullLog:
     full = replace(segment, recorded=signals, weak=None)
     x = operate(full, signals, model, values)
     drag = evaluate(model, x, values).drag_nm
+    finer = x.shaft.finer
+    if finer > 1:
+        torque, drag = averaged(x.torque_nm, finer), averaged(drag, finer)
+        x = x.at(finer * np.arange(full.size))
+        x.torque_em_nm = torque
     shaft = _true_torque(measured(full, signals, model, values)[-1], model, values)
     kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
     noise = segment.sensors.noise
-    u_air_gap = kt * math.hypot(noise["id_a"], noise["iq_a"]) / math.sqrt(2.0)
-    return FullLog(
-        x, drag, shaft, good, noise["theta_mech_rad"], noise["torque_shaft_nm"], u_air_gap
-    )
+    axes = [noise[name] for name in ("id_a", "iq_a") if name in noise]
+    u_air_gap = kt * math.hypot(*axes) / math.sqrt(2.0)
+    u_shaft = noise.get("torque_shaft_nm", 0.0)
+    return FullLog(x, drag, shaft, good, noise["theta_mech_rad"], u_shaft, u_air_gap)
 
 
 def _true_torque(recorded: Array, model: Model, values: Values) -> Array:

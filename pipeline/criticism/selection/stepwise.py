@@ -26,7 +26,7 @@ from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.regression.normal_equations import NormalEquations
 from pipeline.criticism.selection.changed_between import with_free_shares
 from pipeline.criticism.selection.choices import reconsidered
-from pipeline.criticism.selection.discrimination import renamed
+from pipeline.criticism.selection.discrimination import discriminate, renamed
 from pipeline.criticism.selection.far_starts import with_starts
 from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.log_start import with_log_start
@@ -309,7 +309,7 @@ def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np
 def _sure(system: LinearSystem) -> bool:
     """Whether some amplitude of the newest effect differs significantly from zero: two standard
     uncertainties away, whichever capture is left out. Of a coupling, its twist or gap must be so as
-    well, by the fit or by full logs.
+    well, by the fit or by full logs, and full logs must leave room for it.
 
     A counterexample: a drag below the lowest speed of any capture can mend how friction changes
     sense at a reversal, while its own size is not known at all.
@@ -321,7 +321,9 @@ def _sure(system: LinearSystem) -> bool:
     nonzero = [p for p in known if f"{effect.name}.{p.name}" in sure or 0.0 < least * p.u < size(p)]
     twists = [p for p in known if p.negligible > 0 and not p.amplitude]
     coupled = effect.discriminator is None or not twists or any(p in nonzero for p in twists)
-    return coupled and any(p.amplitude for p in nonzero)
+    seen = discriminate(system.fit, effect) if coupled else None
+    excluded = seen is not None and seen.name is None
+    return coupled and not excluded and any(p.amplitude for p in nonzero)
 
 
 def _same_hook(effect: Effect, added: Sequence[Effect]) -> list[Effect]:

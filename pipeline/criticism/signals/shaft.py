@@ -143,13 +143,15 @@ def unexplained_acceleration(
     array [n], rad/s²
         By the recorded clock.
 
-    Notes ----- (T/J − d²θ/dt²)/stretch². It is reported in the angle sensor's units, since a
+    Notes
+    -----
+    (T/J − d²θ/dt²)/stretch². It is reported in the angle sensor's units, since a
     torque's noise floor would shrink with the inertia, and by the recorded clock, since a gain must
     not win by making its residual small.
 
     """
     finer = x.theta_rad.size // segment.size
-    torque = _averaged(torque_nm, finer) if finer > 1 else torque_nm
+    torque = averaged(torque_nm, finer) if finer > 1 else torque_nm
     acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
     return (torque / values["j_kgm2"] - acceleration) / stretch**2
 
@@ -180,7 +182,7 @@ def sensed_torque(
 
     """
     finer = x.theta_rad.size // segment.size
-    torque = _averaged(torque_nm, finer) if finer > 1 else torque_nm
+    torque = averaged(torque_nm, finer) if finer > 1 else torque_nm
     acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
     return as_sensed(torque - values["j_kgm2"] * acceleration, model, values)
 
@@ -258,10 +260,24 @@ def _second_difference(theta: Array, period: float) -> Array:
     return bend
 
 
-def _averaged(fine: Array, finer: int) -> Array:
-    """Means [n] of a signal [n·m] under a triangle of two samples around each sample.
+def averaged(fine: Array, finer: int) -> Array:
+    """Means of a signal under a triangle of two samples around each sample.
 
+    Parameters
+    ----------
+    fine
+        A signal at some points a sample [n·m].
+    finer
+        Points m a sample [1].
+
+    Returns
+    -------
+    array [n]
+
+    Notes
+    -----
     The second difference of the angle over T² is the mean acceleration under that triangle.
+
     """
     ramp = np.arange(finer) / finer**2
     cells = fine.reshape(-1, finer)

@@ -12,9 +12,11 @@ import pipeline
 from pipeline.criticism.diagnosis import base_fit
 from pipeline.criticism.effect import ShaftState
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import zero
 from pipeline.criticism.machine.two_masses import far_drag, linear_far_drag, passed_on, reach
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.discrimination import discriminate
 from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.score_test import Score, candidates, widened
 from pipeline.execution.tasks.start import start_constants
@@ -73,6 +75,17 @@ def test_a_rigid_shaft_has_none_and_is_at_its_floor():
     assert coupling(system) is None
     assert not significant_groups(system).any()
     assert system.fit.values["j_kgm2"] == pytest.approx(MOTOR.j_rotor_kgm2, rel=2e-3)
+
+
+@pytest.mark.parametrize(("coupled", "name"), [(True, "compliance"), (False, None)])
+def test_whole_logs_without_a_transducer_say_whether_the_shaft_twists(coupled, name):
+    fit, effect = base(coupled).fit, effects()["compliance"]
+    twist = parameters("compliance", MOTOR, SOFT)["size"] * fit.machine.scales["torque_nm"]
+    soft = {"compliance.share": 0.35, "compliance.twist_rad": twist}
+    model = fit.model.with_effects(effect)
+    with_twist = replace(fit, model=model).at({**zero(effect, model), **soft})
+    found = discriminate(with_twist, effect)
+    assert found is not None and found.name == name
 
 
 def finer(x, points):

@@ -166,6 +166,21 @@ def test_the_closer_look_names_the_form(gap: float, name: str, between: float):
         assert not found.values, "the fit knows the spring better: its damping is in it"
 
 
+def test_a_rigid_shaft_leaves_no_room_for_a_twist():
+    """The angle of one mass under the same torques: a fit may have taken another error for soft."""
+    one = whole(0.0, 0.004, False)
+    t = TS * np.arange(one.good.size)
+    angle = np.cumsum(np.cumsum(driving(t) - load(t))) * TS**2 / J
+    rigid = replace(one, x=replace(one.x, theta_rad=np.round(angle / ENCODER_RAD) * ENCODER_RAD))
+    torque = one.x.machine.scales["torque_nm"]
+    fitted = {"share": SHARE, "between": 0.0, "twist_rad": 0.004 * torque}
+    assert discriminator([rigid, rigid], fitted) == Discrimination(None, {})
+    gap = {"share": SHARE, "between": 0.0, "gap_rad": 0.003}
+    assert discriminator([rigid, rigid], gap) == Discrimination(None, {})
+    found = discriminator([one, one], fitted)
+    assert found is not None and found.name == "compliance"
+
+
 def test_a_torque_of_one_sign_parts_nothing():
     """A gap stays closed: what the log shows is a spring, or a spring behind a gap."""
     one = whole(0.003, 0.004, True)
