@@ -605,8 +605,8 @@ class FullLog:
 
 @dataclass(frozen=True, slots=True)
 class Discrimination:
-    """Which of the effects that share a discriminator it is, None where full logs exclude one of the
-    fitted size; and parameters with their standard uncertainties, in their own units.
+    """Which of the effects that share a discriminator it is, and parameters with their standard
+    uncertainties, in their own units; no name where full logs exclude one of the fitted size.
     """
 
     name: str | None

@@ -309,7 +309,7 @@ def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np
 def _sure(system: LinearSystem) -> bool:
     """Whether some amplitude of the newest effect differs significantly from zero: two standard
     uncertainties away, whichever capture is left out. Of a coupling, its twist or gap must be so as
-    well, by the fit or by full logs, and full logs must leave room for it.
+    well, by the fit or by full logs, and full logs must not exclude it.
 
     A counterexample: a drag below the lowest speed of any capture can mend how friction changes
     sense at a reversal, while its own size is not known at all.

@@ -12,14 +12,16 @@ from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.mechanical.drag import (
     DRAG_FORMS,
     DragFit,
+    coasts_decide,
     drag_of,
     drag_words,
     too_short,
     torque_is_separable,
 )
+from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.setups import another_setup, setups_of
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
-from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
+from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, SAMPLED, ShaftRows, shaft_rows
 from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
@@ -227,6 +229,7 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
         return METHOD.nothing(GIVES, f"{missing}; {EXPERIMENT}")
     nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
     nuisances += [] if torque.reluctance_known else [RELUCTANCE]
+    nuisances += [SAMPLED] if coasts_decide(rows) else []
     y, driving = rows.acceleration_rad_s2, driving_torque(rows, torque, {})
     if float(np.ptp(driving)) == 0.0:
         return METHOD.nothing(GIVES, f"the drive log holds no torque; {EXPERIMENT}")
@@ -240,7 +243,8 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
     if strange > policy().drag.loaded_share and not _load_logged(rows):
         return METHOD.nothing(GIVES, f"{_of_no_torque(strange)}; {LOAD}")
     doubts = Doubts(strange, drag_disagreements(rows, found, options["level"]))
-    estimates = _estimates(rows, torque, found, doubts, _left_out(rows, campaign))
+    sampled = () if coasts_decide(rows) else sampling_drag(rows.captures, torque.kt_nm_a, known)
+    estimates = _estimates(rows, torque, found, doubts, _left_out(rows, campaign), sampled)
     if strange > policy().drag.unexplained_share and not _load_logged(rows):
         drags = METHOD.nothing(GIVES[1:], f"{_of_no_torque(strange)}; {LOAD}").estimates
         estimates = (estimates[0], *drags)
@@ -345,9 +349,14 @@ def _orders(known: Constants, campaign: Campaign) -> tuple[tuple[int, ...], tupl
 
 
 def _estimates(
-    rows: ShaftRows, torque: Torque, found: DragFit, doubts: Doubts, left_out: Sequence[str]
+    rows: ShaftRows,
+    torque: Torque,
+    found: DragFit,
+    doubts: Doubts,
+    left_out: Sequence[str],
+    sampled: Budget,
 ) -> tuple[Estimate, ...]:
-    """J, T_c and B with their budgets."""
+    """J, T_c and B with their budgets; that of B with what a `sampled` current makes."""
 
     def values(shift: Mapping[str, float]) -> Array:
         return found.constants(found.refit(driving_torque(rows, torque, shift)))
@@ -374,6 +383,7 @@ def _estimates(
         ]
         parts.append(Contribution("assumed:drag_form", float(found.u_form[i]), "B"))
         parts += doubts.parts(i, float(constants[i]), logged)
+        parts += sampled if name == "b_visc_nm_s_rad" else ()
         parts += _of_a_speed(rows, float(constants[i]))
         parts += _of_a_d_current(rows, float(per_kt[i]) * torque.kt_nm_a)
         budget = propagate(

@@ -16,6 +16,7 @@ from pipeline.estimation.electrical.operating_points import (
     pole_pairs_of,
 )
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, angle_doubt, standstill_words
+from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d
 from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.policy import policy
@@ -109,7 +110,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     chosen = _chosen(points, alpha, options["level"])
     model = _regress(points, alpha, chosen)
     still = angle_doubt(points, model.kt_nm_a, pairs, known)
-    estimates = _estimates(captures, points, table, model, chosen, alpha, alpha_parts, still)
+    estimates = _estimates(captures, points, table, model, chosen, alpha, alpha_parts, still, known)
     return Fit(estimates, _evidence(points, model, alpha, chosen))
 
 
@@ -206,6 +207,7 @@ def _estimates(
     alpha: float,
     alpha_parts: Budget,
     still: Budget,
+    known: Constants,
 ) -> tuple[Estimate, ...]:
     used = {p.capture.path: p.capture for p in points}.values()
     gains = instrument_uncertainties(used, ("current", "torque")) | magnet_uncertainties(used)
@@ -242,6 +244,7 @@ def _estimates(
         why = f"d current did not vary enough to show reluctance torque; {EXPERIMENT}"
         found.append(METHOD.missing(GIVES[1], why))
     drag, covariance, dof, why = _drag(points, model)
+    type_b[3] += sampling_drag([*used], slope_k.kt_nm_a, known)
     if why:
         return (*found, *(METHOD.missing(name, why) for name in DRAG))
     for index, name in enumerate(DRAG):
@@ -391,7 +394,8 @@ ESTIMATOR = Estimator(
     tests=("torque_map",),
     experiment=EXPERIMENT,
     fit=fit,
-    uses=("pole_pairs", "temp_coeff_magnet_1_k", *HARMONICS),
+    uses=("pole_pairs", "temp_coeff_magnet_1_k", "lq_h", *HARMONICS),
+    aids=("lq_h",),
     rank=5,
     terms=(RELUCTANCE,),
     clock_powers={"b_visc_nm_s_rad": 1},

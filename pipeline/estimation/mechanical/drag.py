@@ -271,7 +271,19 @@ def freedom(rows: ShaftRows) -> int:
 
 def _drive_columns(rows: ShaftRows) -> int:
     """Columns that drives determine: g, and drag's two where no coast-down fixes them."""
-    return 1 if np.count_nonzero(rows.kind == COAST) >= policy().drag.enough_coasting_rows else 3
+    return 1 if coasts_decide(rows) else 3
+
+
+def coasts_decide(rows: ShaftRows) -> bool:
+    """Whether there are coasts enough to show drag by themselves.
+
+    Parameters
+    ----------
+    rows
+        Windows of drives and coast-downs.
+
+    """
+    return bool(np.count_nonzero(rows.kind == COAST) >= policy().drag.enough_coasting_rows)
 
 
 def too_short(rows: ShaftRows) -> str:
@@ -383,7 +395,7 @@ def _form_fails(
     by more than that share of itself (rms over the rows).
     """
     coasting = rows.kind == COAST
-    if np.count_nonzero(coasting) >= policy().drag.enough_coasting_rows:
+    if coasts_decide(rows):
         straight_fit = linear_fit(design, y, _balanced(rows, design, y))
         left = np.sqrt(np.mean(straight_fit.residuals[coasting] ** 2))
         return bool(left > policy().drag.material_share * np.sqrt(np.mean(y[coasting] ** 2)))

@@ -25,6 +25,9 @@ from pipeline.records.capture import Array, Capture
 DRIVE, COAST = 0, 1
 ACCELERATION_NOISE, CURRENT_NOISE = "acceleration noise", "current noise"
 """Columns of a window's noise [rad/s², A], for fits that have these signals among their columns."""
+SAMPLED = "sampled current"
+"""Column of a current that is sampled off the middle of its pulse: by a dead time pulses are late,
+and the back-EMF moves the current on in proportion to speed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,6 +295,7 @@ def _nuisances(part: _Part) -> dict[str, Array]:
     torque = np.abs(part.current) * np.sign(part.speed)
     return {
         "offset": np.full(weak.count, driven),
+        SAMPLED: weak.integral(part.theta, 1) * driven,
         "load friction": weak.integral(torque),
         "d current": weak.integral(part.direct),
         "d q current": weak.integral(part.direct * part.current),

@@ -98,6 +98,10 @@ class Drag:
         source="where a controller works against a load, 1/J comes out too small by this share at "
         "most, which is in u; a tenth is five times what leaves drags alone",
     )  # fmt: skip
+    sampling_u_s: float = chosen(
+        0.5e-6, "s", "standard uncertainty of where in its pulse a drive's current is sampled",
+        why="half of a dead time, and of what filters delay; dead times are 0.5 to 2 µs",
+    )  # fmt: skip
     speed_share: float = chosen(
         0.02, "1",
         "relative standard uncertainty of J, T_c and B where a bench's own speed is the only "

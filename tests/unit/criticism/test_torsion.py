@@ -166,7 +166,7 @@ def test_the_closer_look_names_the_form(gap: float, name: str, between: float):
         assert not found.values, "the fit knows the spring better: its damping is in it"
 
 
-def test_a_rigid_shaft_leaves_no_room_for_a_twist():
+def test_a_rigid_shaft_excludes_a_twist():
     """The angle of one mass under the same torques: a fit may have taken another error for soft."""
     one = whole(0.0, 0.004, False)
     t = TS * np.arange(one.good.size)

@@ -35,9 +35,9 @@ def fitted(estimator: Estimator, captures: Campaign, known: Constants | None = N
     return estimator.fit(captures, known or Constants(), estimator.options)
 
 
-def chain(captures: Campaign, *estimators: Estimator) -> Constants:
-    """Estimators one after the other, each seeing what those before it found."""
-    known = Constants()
+def chain(captures: Campaign, *estimators: Estimator, known: Constants | None = None) -> Constants:
+    """Estimators one after the other, each seeing what is known and what those before it found."""
+    known = known or Constants()
     for estimator in estimators:
         known = known.adding(fitted(estimator, captures, known).estimates)
     return known

@@ -1,0 +1,45 @@
+"""Viscous drag that a current seems to make that is not sampled in the middle of its pulse."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipeline.estimation.policy import policy
+from pipeline.records.capture import Capture
+from pipeline.records.constants import Constants
+from pipeline.records.uncertainty import Contribution
+
+
+def sampling_drag(
+    captures: Sequence[Capture], kt_nm_a: float, known: Constants
+) -> tuple[Contribution, ...]:
+    """Contribution to viscous friction of torque under a drive's own current.
+
+    Parameters
+    ----------
+    captures
+        Those with currents.
+    kt_nm_a
+        Torque constant K [N·m/A].
+    known
+        With `lq_h`.
+
+    Returns
+    -------
+    tuple of Contribution
+        Empty where no drive recorded the current, or its inductance is not known.
+
+    Notes
+    -----
+    A drive samples once a period, in the middle of its pulses as they are commanded. A dead time
+    moves them, and over the time τ between the current goes on by p ω ψ τ/L_q. With K = 1.5 p ψ
+    that is a torque (K²/(1.5 L_q)) τ ω. Of coasts none is needed: they show drag without current.
+
+    """
+    inductance = known.best("lq_h")
+    driven = any(c.meta.voltage_kind == "commanded" for c in captures)
+    if inductance is None or not driven:
+        return ()
+    per_second = kt_nm_a**2 / (1.5 * inductance.number)
+    u = per_second * policy().drag.sampling_u_s
+    return (Contribution("assumed:sampled_current", u, "B"),)
