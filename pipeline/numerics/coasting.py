@@ -102,21 +102,18 @@ def coast_down(
 
 def _inverse(deceleration: Array) -> Array:
     floor = 1e-9 * max(float(np.max(deceleration)), 1e-300)
-    inverse: Array = 1.0 / np.maximum(deceleration, floor)
-    return inverse
+    return 1.0 / np.maximum(deceleration, floor)
 
 
 def _simpson(at: Array, mid: Array, width: float) -> Array:
     pieces = width / 6.0 * (at[:-1] + 4.0 * mid + at[1:])
-    total: Array = np.concatenate([[0.0], np.cumsum(pieces)])
-    return total
+    return np.concatenate([[0.0], np.cumsum(pieces)])
 
 
 def _hermite(x: Array, step: Array, y0: Array, y1: Array, d0: Array, d1: Array) -> Array:
-    value: Array = (
+    return (
         (1.0 + 2.0 * x) * (1.0 - x) ** 2 * y0
         + x * (1.0 - x) ** 2 * step * d0
         + x**2 * (3.0 - 2.0 * x) * y1
         + x**2 * (x - 1.0) * step * d1
     )
-    return value

@@ -58,8 +58,7 @@ def whole_cycles(phase_rad: Array, cycles: float = 1.0) -> NDArray[np.intp]:
     advance = np.abs(phase_rad - phase_rad[0]) / (2.0 * math.pi * cycles)
     monotonic = np.maximum.accumulate(advance)
     marks = np.arange(0.0, math.floor(float(monotonic[-1])) + 1.0)
-    cuts: NDArray[np.intp] = np.unique(np.searchsorted(monotonic, marks - 1e-12))
-    return cuts
+    return np.unique(np.searchsorted(monotonic, marks - 1e-12))
 
 
 def hermite(nodes: Array, values: Array, x: Array) -> tuple[Array, Array]:

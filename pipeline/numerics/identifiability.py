@@ -133,8 +133,7 @@ def within(u: Array, sizes: Array) -> NDArray[np.bool_]:
         True where the half width of the 95 % interval, `REACH` u, is below the size.
 
     """
-    known: NDArray[np.bool_] = REACH * u < sizes
-    return known
+    return REACH * u < sizes
 
 
 def identify(rows: Array, sizes: Array) -> Identified:
@@ -201,15 +200,13 @@ def identify(rows: Array, sizes: Array) -> Identified:
 def _complement(rows: Array) -> Array:
     """Orthonormal columns [p, p − r] of the directions that r orthonormal rows [r, p] leave."""
     _, _, right = np.linalg.svd(rows, full_matrices=True)
-    left: Array = right[rows.shape[0] :].T
-    return left
+    return right[rows.shape[0] :].T
 
 
 def _one_size(directions: Array) -> Array:
     """Directions [p, k] in sizes, each scaled so that its largest part is one."""
     largest = np.abs(directions).max(axis=0, initial=0.0)
-    scaled: Array = directions / np.where(largest > 0.0, largest, 1.0)
-    return scaled
+    return directions / np.where(largest > 0.0, largest, 1.0)
 
 
 @dataclass(frozen=True, slots=True)

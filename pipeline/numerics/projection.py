@@ -62,8 +62,7 @@ class Projection:
         """
         windows = sliding_window_view(residuals, self.length, axis=1)[:, self.starts, :]
         by_window = np.ascontiguousarray(windows.transpose(1, 2, 0))
-        projected: Array = np.matmul(self.functions, by_window).transpose(2, 0, 1)
-        return projected
+        return np.matmul(self.functions, by_window).transpose(2, 0, 1)
 
     def means(self, signals: Array) -> Array:
         """Means over each window, weighted with the plain window.
@@ -82,8 +81,7 @@ class Projection:
         plain = self.functions[:, :1, :]
         weights = plain / plain.sum(axis=2, keepdims=True)
         windows = sliding_window_view(signals, self.length, axis=1)[:, self.starts, :]
-        averaged: Array = np.matmul(weights, windows.transpose(1, 2, 0))[:, 0, :].T
-        return averaged
+        return np.matmul(weights, windows.transpose(1, 2, 0))[:, 0, :].T
 
     def only(self, windows: NDArray[np.bool_]) -> Projection:
         """The same test functions over some of the windows.
@@ -114,8 +112,7 @@ def bump(length: int) -> Array:
 
     """
     u = (2.0 * np.arange(length) + 1.0) / length - 1.0
-    window: Array = (1.0 - u * u) ** 4
-    return window
+    return (1.0 - u * u) ** 4
 
 
 def window_starts(

@@ -101,5 +101,4 @@ def stretches(
 
 def _means(values: Array, starts: NDArray[np.int64]) -> Array:
     lengths = np.diff(np.append(starts, values.size))
-    means: Array = np.add.reduceat(values, starts) / lengths
-    return means
+    return np.add.reduceat(values, starts) / lengths

@@ -96,8 +96,7 @@ def _basis(design: Array) -> Array:
     """Orthonormal columns that span the design's."""
     norm = np.linalg.norm(design, axis=0)
     left, singular, _ = np.linalg.svd(design / np.where(norm > 0, norm, 1.0), full_matrices=False)
-    basis: Array = left[:, singular > 1e-10 * singular.max(initial=0.0)]
-    return basis
+    return left[:, singular > 1e-10 * singular.max(initial=0.0)]
 
 
 def _without(values: Array, basis: Array) -> Array:

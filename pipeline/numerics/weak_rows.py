@@ -75,8 +75,7 @@ class WeakRows:
         if self.members.size == 0:
             views = np.lib.stride_tricks.sliding_window_view(signal, kernel.size)[self.starts]
             centred = views - views.mean(axis=1, keepdims=True) if order else views
-            even: Array = centred @ kernel
-            return even
+            return centred @ kernel
         part = signal[self.members]
         if order:
             means = _sums(part, self.sizes) / self.sizes
@@ -171,8 +170,7 @@ def weak_rows(t_s: Array, width_s: float, overlap: float = 0.5) -> WeakRows:
 
 def _sums(values: Array, sizes: NDArray[np.int64]) -> Array:
     """Sums over consecutive stretches of `sizes` values."""
-    totals: Array = np.add.reduceat(values, np.cumsum(sizes) - sizes)
-    return totals
+    return np.add.reduceat(values, np.cumsum(sizes) - sizes)
 
 
 def _kernels(t_s: Array, sizes: NDArray[np.int64]) -> Array:
@@ -189,8 +187,7 @@ def _kernels(t_s: Array, sizes: NDArray[np.int64]) -> Array:
     second = cell * (48.0 * u**2 * inside**2 - 8.0 * inside**3)
 
     def spread(per_window: Array) -> Array:
-        wide: Array = np.repeat(per_window, sizes)
-        return wide
+        return np.repeat(per_window, sizes)
 
     zero = zero / spread(_sums(zero, sizes))
     first = first - spread(_sums(first, sizes) / sizes)
@@ -236,8 +233,7 @@ def smooth_speed(t_s: Array, angle: Array, width_s: float) -> Array:
     if t_s.size < size:
         raise ValueError("the record is shorter than the window of its speed")
     slopes = _slopes(t_s, angle, size)
-    centred: Array = slopes[np.clip(np.arange(t_s.size) - reach, 0, slopes.size - 1)]
-    return centred
+    return slopes[np.clip(np.arange(t_s.size) - reach, 0, slopes.size - 1)]
 
 
 def _slopes(t_s: Array, y: Array, size: int) -> Array:
@@ -252,15 +248,12 @@ def _slopes(t_s: Array, y: Array, size: int) -> Array:
     def stretches(values: Array) -> Array:
         whole = np.pad(values, (0, -count % step), mode="edge")
         rows = np.lib.stride_tricks.sliding_window_view(whole, length)[::step]
-        about: Array = rows - rows.mean(axis=1, keepdims=True)
-        return about
+        return rows - rows.mean(axis=1, keepdims=True)
 
     def means(values: Array) -> Array:
         running = np.cumsum(np.pad(values, ((0, 0), (1, 0))), axis=1)
-        mean: Array = ((running[:, size:] - running[:, :-size]) / size).ravel()[:count]
-        return mean
+        return ((running[:, size:] - running[:, :-size]) / size).ravel()[:count]
 
     t, x = stretches(t_s), stretches(y)
     mean_t = means(t)
-    slopes: Array = (means(t * x) - mean_t * means(x)) / (means(t * t) - mean_t**2)
-    return slopes
+    return (means(t * x) - mean_t * means(x)) / (means(t * t) - mean_t**2)

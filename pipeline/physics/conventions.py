@@ -389,8 +389,7 @@ def copper_resistance_ohm(
     scale = (COPPER_ZERO_K + np.asarray(temp_degc, dtype=np.float64)) / (
         COPPER_ZERO_K + np.asarray(reference_degc, dtype=np.float64)
     )
-    scaled: Array = np.asarray(r_ohm, dtype=np.float64) * scale
-    return scaled
+    return np.asarray(r_ohm, dtype=np.float64) * scale
 
 
 def copper_temperature_degc(r_ohm: float, r_reference_ohm: float, reference_degc: float) -> float:
@@ -533,8 +532,7 @@ def terminal_inductance_h(
 
     """
     swing = np.cos(2.0 * (np.asarray(theta_elec_rad, dtype=np.float64) - PAIR_AXES_RAD[pair]))
-    read: Array = (ld_h + lq_h) + (ld_h - lq_h) * swing
-    return read
+    return (ld_h + lq_h) + (ld_h - lq_h) * swing
 
 
 class UnalignedInductances(NamedTuple):

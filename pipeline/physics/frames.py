@@ -45,12 +45,11 @@ def space_vector(a: ArrayLike, b: ArrayLike, c: ArrayLike) -> Complex:
     (2+0j)
 
     """
-    vector: Complex = (2.0 / 3.0) * (
+    return (2.0 / 3.0) * (
         np.asarray(a, dtype=np.float64)
         + np.asarray(b, dtype=np.float64) * _THIRD
         + np.asarray(c, dtype=np.float64) * _THIRD.conjugate()
     )
-    return vector
 
 
 def vector_of_lines(lines: Mapping[str, Array]) -> Complex:
@@ -90,5 +89,4 @@ def vector_of_lines(lines: Mapping[str, Array]) -> Complex:
         lines = {name: line - mean for name, line in lines.items()}
     ab = lines["vab_v"] if "vab_v" in lines else -lines["vbc_v"] - lines["vca_v"]
     bc = lines["vbc_v"] if "vbc_v" in lines else -lines["vab_v"] - lines["vca_v"]
-    vector: Complex = (2 * ab + bc) / 3.0 + 1j * bc / math.sqrt(3)
-    return vector
+    return (2 * ab + bc) / 3.0 + 1j * bc / math.sqrt(3)

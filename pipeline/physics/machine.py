@@ -97,5 +97,4 @@ def air_gap_torque(
     6.0
 
     """
-    torque: Array = kt_nm_a * iq_a + 1.5 * pole_pairs * saliency_h * id_a * iq_a
-    return torque
+    return kt_nm_a * iq_a + 1.5 * pole_pairs * saliency_h * id_a * iq_a

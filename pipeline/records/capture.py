@@ -302,21 +302,19 @@ class Capture:
     def _on_clock(self, name: str, home: int) -> Array:
         table = self.tables[home]
         if name in table.columns:
-            column: Array = table[name].to_numpy().astype(np.float64, copy=False)
-            return column
+            return table[name].to_numpy().astype(np.float64, copy=False)
         for index, other in enumerate(self.tables):
             if name in other.columns and "t_s" in other.columns and "t_s" in table.columns:
                 keep = self.kept(index) & np.isfinite(other[name].to_numpy())
                 if not keep.any():
                     return np.full(table.height, np.nan)
-                moved: Array = np.interp(
+                return np.interp(
                     table["t_s"].to_numpy(),
                     other["t_s"].to_numpy()[keep],
                     other[name].to_numpy()[keep],
                     left=np.nan,
                     right=np.nan,
                 )
-                return moved
         raise KeyError(f"{self.path} holds no column {name}")
 
 

@@ -106,8 +106,7 @@ def section(kind: type[Made]) -> Made:
         The class of the section.
 
     """
-    made: Made = field(default_factory=kind)
-    return made
+    return field(default_factory=kind)
 
 
 def _field(value: Number, unit: str, meaning: str, origin: Origin) -> Any:
@@ -240,5 +239,4 @@ def _finite(value: Any, name: str) -> float | int:
 def _replaced(policy: Made, path: list[str], value: Number) -> Made:
     head, rest = path[0], path[1:]
     new = _replaced(getattr(policy, head), rest, value) if rest else value
-    changed: Made = replace(policy, **{head: new})  # type: ignore[type-var]
-    return changed
+    return replace(policy, **{head: new})  # type: ignore[type-var]
