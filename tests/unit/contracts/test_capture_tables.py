@@ -20,6 +20,8 @@ from pipeline.records.errors import CaptureError
 from tests.unit.contracts.signals import OPTIONS
 from tests.unit.contracts.test_gate_limits import GATES, capture
 
+CLOCK = np.arange(0.0, 1.0, 1e-3)
+
 
 def test_slow_streams_have_a_table_of_their_own() -> None:
     """Half of the rows is dense; a value in every row of a part is no slow stream."""
@@ -128,3 +130,17 @@ def test_a_drive_of_torque_and_motion_says_how_its_torque_is_a_current() -> None
         check_columns(capture("drive", torque_shaft_nm=np.ones(9), **columns))
     with pytest.raises(CaptureError, match="record what is missing"):
         check_columns(capture("drive", **columns))
+
+
+@pytest.mark.parametrize(
+    ("angle", "words"),
+    [({}, "nothing of the motor"), ({"theta_elec_rad": CLOCK}, "where its zero is known")],
+)
+def test_line_currents_of_a_drive_say_what_is_to_be_logged(angle, words) -> None:
+    """Without an angle they show the electrical speed alone; id_a and iq_a are never made up."""
+    lines = {name: np.sin(CLOCK + shift) for name, shift in (("ia_a", 0.0), ("ib_a", -2.1))}
+    with pytest.raises(CaptureError) as refused:
+        check_columns(capture("drive", t_s=CLOCK, **lines, **angle))
+    assert "needs iq_a" in refused.value.message
+    assert words in refused.value.remedy
+    assert "iq_a" in refused.value.remedy
