@@ -79,7 +79,7 @@ def _command(word: str) -> Command:
 
 def _run(command: Command, flags: Flags, words: Sequence[str]) -> Outcome:
     """One run of a command: its settings made, and its stage performed."""
-    from pipeline.cli.configuration import load_settings, origin_text, settings_text
+    from pipeline.cli.configuration import load_settings, origin_text, settings_text, with_source
     from pipeline.report.text.waiting import waiting
 
     settings = load_settings(command, words, flags.config_dir)
@@ -92,6 +92,8 @@ def _run(command: Command, flags: Flags, words: Sequence[str]) -> Outcome:
         outcome: Outcome = stage.main(settings)
     if not settings.timings:
         outcome = replace(outcome, timings=())
+    if outcome.next:
+        outcome = replace(outcome, next=with_source(outcome.next, settings))
     return _as_json(command.name, outcome) if settings.json else outcome
 
 

@@ -7,6 +7,7 @@ Text keys are taken as typed, because an override grammar would turn serial numb
 from __future__ import annotations
 
 import re
+import shlex
 import typing
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
@@ -242,3 +243,20 @@ def _is_text(kind: Any) -> bool:
 def _unquoted(value: str) -> str:
     quoted = len(value) >= 2 and value[0] == value[-1] and value[0] in "'\""
     return value[1:-1] if quoted else value
+
+
+def with_source(command: str, settings: Settings) -> str:
+    """A command that reads captures, with the source map that this one read them by.
+
+    Parameters
+    ----------
+    command
+        Command and keys, as printed after a command.
+    settings
+        Of the command that was given.
+
+    """
+    source = getattr(settings, "source", "auto")
+    if source == "auto" or " input=" not in command:
+        return command
+    return f"{command} source={shlex.quote(source)}"

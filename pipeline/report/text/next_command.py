@@ -19,6 +19,7 @@ def next_command(
     """What most motors need: missing effects added, a diagnosis, an approval, an export.
 
     Effects that half of the motors lack are the design's; of fewer, one motor is looked at closely.
+    Where no constant is determined by itself, `compare` says which combinations are.
 
     Parameters
     ----------
@@ -44,6 +45,10 @@ def next_command(
         else statuses[sheet.motor_id].status
         for sheet in datasheets
     }
+    if datasheets and not any(
+        one.known for sheet in datasheets for one in sheet.constants.values()
+    ):
+        return f"compare input={shlex.quote(folder)}{where}"
     # a motor that awaits nothing but a person goes before one that a check has refused
     for group in lacking_alike(datasheets):
         useful = [sheet for sheet in group if states[sheet.motor_id] != "refused"]

@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.__main__ import main
 from pipeline.cli.commands import COMMANDS, Command
-from pipeline.cli.configuration import load_settings
+from pipeline.cli.configuration import load_settings, with_source
 from pipeline.criticism.library.registry import effects
 from pipeline.records.errors import UsageError
 from pipeline.settings import ModelSettings, OperateSettings, RunSettings, result_document
@@ -229,3 +229,19 @@ def test_where_to_and_how_fast_are_no_part_of_the_digest() -> None:
     other = RunSettings(input="c", output="d", workers=2, timings=True)
     assert result_document(one) == result_document(other)
     assert result_document(one) != result_document(RunSettings(release="auto"))
+
+
+@pytest.mark.parametrize(
+    ("command", "source", "printed"),
+    [
+        (
+            "diagnose input=in motor=a",
+            "my map.yaml",
+            "diagnose input=in motor=a source='my map.yaml'",
+        ),
+        ("diagnose input=in motor=a", "auto", "diagnose input=in motor=a"),
+        ("registry show a", "map.yaml", "registry show a"),
+    ],
+)
+def test_the_next_command_reads_captures_by_the_map_of_this_one(command, source, printed) -> None:
+    assert with_source(command, RunSettings(source=source)) == printed

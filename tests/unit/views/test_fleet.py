@@ -185,6 +185,8 @@ def test_the_next_command_is_what_most_motors_need() -> None:
     lacking = replace(fine, why=(AWAITS_APPROVAL, "missing: ld_h (record current steps)"))
     assert next_command([lacking, refused], "in", "out") == "plan motor=fine output=out"
     assert next_command([], "in", "out") == ""
+    bare = replace(fine, constants={}, alternatives=())
+    assert next_command([bare], "in", "out") == "compare input=in output=out"
 
 
 def test_a_batch_of_partial_logs_shows_what_they_give() -> None:
