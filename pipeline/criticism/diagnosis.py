@@ -34,6 +34,7 @@ from pipeline.criticism.selection.missing_data import (
     loaded,
     mixed,
     unexcited,
+    unrecorded,
     unused,
 )
 from pipeline.criticism.selection.one_capture import rests_on
@@ -198,6 +199,7 @@ def _notes(
         *(note for note in ladder.cut.values() if note),
         *_rests_on_one(ladder),
         *((_STATELESS,) if stateless else ()),
+        *(unrecorded(campaign, last.segments) if verdict == "unknown" else ()),
         *ladder.held[0].notes,
     )
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from pipeline.criticism.data.drive_log import drive_log
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.data.settling import unexplained_voltage
@@ -166,18 +168,55 @@ def at_ambient(fit: Fit) -> tuple[str, ...]:
                 u_k = model.priors()[UNLOGGED[name]][1]
                 notes.append(f"no {name}, taken to be at ambient temperature ± {u_k:g} K: {where}")
                 notes += [
-                    f"{path} is as a {name} of {warmer:+.0f} K beside the other captures makes it, "
-                    "which none of these records: log it"
+                    f"{path} is as a {name} of about {warmer:+.0f} K beside the other captures "
+                    "makes it, which none of these records: log it"
                     for path, warmer in _warmer(fit, name).items()
                     if abs(warmer) > u_k
                 ]
     return tuple(dict.fromkeys(notes))
 
 
+def unrecorded(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str, ...]:
+    """Notes of the signals that captures do not record, and that were taken as none or as another.
+
+    Parameters
+    ----------
+    campaign
+        Captures of the motor.
+    cut_segments
+        The segments that are made of them.
+
+    Returns
+    -------
+    tuple of str
+        One a signal: what it was taken as, and in which captures.
+
+    """
+    used = {segment.capture for segment in cut_segments}
+    captures = [one for one in campaign.captures if one.path in used and one.has("t_s")]
+    without_d = [one.path for one in captures if one.has("iq_a") and not one.has("id_a")]
+    by_speed = [
+        one.path
+        for one in captures
+        if one.has("omega_mech_rad_s")
+        and not (one.has("theta_mech_rad") or one.has("theta_elec_rad"))
+    ]
+    taken = (("id_a", "taken as zero", without_d), ("angle", "known by omega_mech_rad_s", by_speed))
+    return tuple(
+        f"what is left may be of an {name} that was not recorded, and is {how}: log it in "
+        + ", ".join(sorted(paths))
+        for name, how, paths in taken
+        if paths
+    )
+
+
 def _warmer(fit: Fit, name: str) -> dict[str, float]:
-    """How much warmer [K] each capture without this temperature is fitted than all of them."""
+    """How much warmer [K] each capture without this temperature is fitted than most of them."""
     known = fit.model.machine.unlogged
-    return {path: fit.values[key] for key, (one, path) in known.items() if one == name}
+    own = {path: fit.values[key] for key, (one, path) in known.items() if one == name}
+    # what all have in common is in the shared nuisance, or in theirs
+    usual = float(np.median(list(own.values()))) if own else 0.0
+    return {path: value - usual for path, value in own.items()}
 
 
 def unexcited(

@@ -13,6 +13,7 @@ from pipeline.criticism.comparison import compare
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of, pole_pairs_of
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.residuals.segments import segments
+from pipeline.criticism.selection.missing_data import unrecorded
 from pipeline.execution.tasks.start import start_constants
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
@@ -124,3 +125,22 @@ def test_pole_pairs_that_no_spin_tells_are_estimated_from_the_other_captures():
     known = start_constants(blind).best("pole_pairs")
     assert known is not None
     assert known.number == pytest.approx(7)
+
+
+@pytest.mark.parametrize(
+    ("lost", "words"),
+    [
+        (("id_a", "vd_v"), "id_a that was not recorded, and is taken as zero"),
+        (ANGLES, "angle that was not recorded, and is known by omega_mech_rad_s"),
+    ],
+)
+def test_what_was_not_recorded_is_named_beside_what_is_left(lost, words) -> None:
+    part = replace(without({"drive": lost}), captures=without({"drive": lost}).of("drive"))
+    machine = machine_of(part, start_constants(part))
+    assert machine is not None
+    cut = segments(part, machine)
+    (note,) = unrecorded(part, cut)
+    assert words in note
+    assert all(segment.capture in note for segment in cut)
+    whole = replace(shipped(), captures=shipped().of("drive"))
+    assert unrecorded(whole, segments(whole, machine)) == ()
