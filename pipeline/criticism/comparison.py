@@ -105,6 +105,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         tuple(traces(system.fit, simulated, None if bare is None else bare.fitted)),
         reported_combinations(system, held),
         () if bare is None else bare.errors,
+        () if bare is None else bare.added,
     )
 
 
@@ -118,7 +119,7 @@ def _nothing(
 @dataclass(frozen=True, slots=True)
 class _Bare:
     """A model less what was added: its held-out error beside that of the `whole` one, over the
-    same rows; parameters of both; its errors; the fitted model.
+    same rows; parameters of both; its errors; the fitted model; what it is without.
     """
 
     total: float
@@ -126,6 +127,7 @@ class _Bare:
     moved: tuple[Move, ...]
     errors: tuple[SignalError, ...]
     fitted: Before
+    added: tuple[str, ...]
 
 
 def _bare(
@@ -146,7 +148,7 @@ def _bare(
     moved = _moves(reported_parameters(system, held), after)
     less, full = in_common((system, whole), (held, whole_held))
     errors = tuple(_errors(system, held))
-    return _Bare(less.total, full.total, moved, errors, Before(system, held))
+    return _Bare(less.total, full.total, moved, errors, Before(system, held), tuple(gone))
 
 
 def _moves(

@@ -229,6 +229,8 @@ class Comparison:
         What is known of parameters that are not, one by one.
     before
         Errors of the equations without the effects that were added.
+    added
+        The effects that `before` is without.
 
     """
 
@@ -246,6 +248,7 @@ class Comparison:
     traces: tuple[Trace, ...] = field(default=(), repr=False)
     combinations: tuple[KnownCombination, ...] = field(default=())
     before: tuple[SignalError, ...] = field(default=())
+    added: tuple[str, ...] = field(default=())
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`, schema model-comparison/1.

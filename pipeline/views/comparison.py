@@ -122,15 +122,20 @@ def headline(result: Comparison) -> str:
     """
     if not result.errors:
         return "; ".join(result.notes)
-    effects = ", ".join(result.effects) or "no effects"
     out = any(error.split == "held_out" for error in result.errors)
     what = "held-out error" if out else "error of the fit, none held out,"
-    summary = (
-        f"model {result.name} with {effects}: {what} {result.held_out:.4g} (1 is the noise floor)"
-    )
     if result.bare is not None:
-        summary += f"; without what was added: {number(result.bare)}"
-    return summary
+        falls = "falls" if result.held_out < result.bare else "goes"
+        names = result.added or result.effects
+        added = " and ".join(name.replace("_", " ") for name in names)
+        return (
+            f"with {added} the {what} {falls} from {number(result.bare)} to "
+            f"{number(result.held_out)} (1 is the noise floor)"
+        )
+    return (
+        f"model {result.name} with {', '.join(result.effects) or 'no effects'}: {what} "
+        f"{number(result.held_out)} (1 is the noise floor)"
+    )
 
 
 def ratio_of(error: SignalError) -> float:

@@ -76,7 +76,7 @@ def test_from_a_hidden_effect_to_the_page_that_shows_it_gone(
     assert total["without_effects"] > 2.0
     assert total["held_out"] < 1.0
     shown = html.unescape((output / "comparison" / f"{MOTOR}.html").read_text())
-    assert f"without what was added: {number(total['without_effects'])}" in shown
+    assert f"the held-out error falls from {number(total['without_effects'])} to" in shown
     assert "stribeck" in shown
     assert done == adding, "what explains the captures goes into the datasheet"
 

@@ -54,10 +54,15 @@ class _Curve:
 
     @property
     def contrast(self) -> float:
-        """Rms change of the error over what is left and what noise makes of the means."""
+        """Rms change of the error over what is left and what noise makes of the means.
+
+        Changes of neighbouring cells are multiplied with each other: over the variable that the
+        effect depends on they are alike, over any other one that few windows fill they are not.
+        """
         change = self.before - self.after
-        variance = self.after**2 + self.noise**2
-        return math.sqrt(float(self.count @ change**2) / max(float(self.count @ variance), 1e-300))
+        alike = float(np.minimum(self.count[1:], self.count[:-1]) @ (change[1:] * change[:-1]))
+        variance = self.count @ (self.after**2 + self.noise**2)
+        return math.sqrt(max(alike, 0.0) / max(float(variance), 1e-300))
 
 
 def signature(

@@ -151,3 +151,20 @@ def test_what_an_effect_explains_wholly_comes_before_what_it_only_lessens(
 
 def test_without_cells_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found_in(monkeypatch, []) is None
+
+
+def test_few_windows_are_drawn_over_what_the_error_is_a_curve_of(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A window a cell leaves nothing over any variable: over the current it is no curve."""
+    rng = np.random.default_rng(3)
+    few = np.linspace(-30.0, 30.0, 24)
+    at = {"omega_mech_rad_s": few, "iq_a": rng.uniform(-9.0, 9.0, few.size)}
+    rest = (np.full(few.size, 1e-4), np.zeros(few.size, dtype=int), np.arange(few.size))
+    before = Errors("torque_shaft_nm", np.sign(few) * np.exp(-np.abs(few) / 8.0), *rest, at)
+    left = 1e-4 * np.argsort(np.argsort(-np.abs(at["iq_a"]))) / few.size
+    told = iter([[before], [replace(before, error=left)]])
+    monkeypatch.setattr(module, "window_errors", lambda *_: next(told))
+    found = signature(twice("a.mcap", fit=SimpleNamespace(values={})), (EMPTY, EMPTY))
+    assert found is not None
+    assert found.variable == "omega_mech_rad_s"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from html import escape, unescape
 from pathlib import Path
@@ -106,18 +106,15 @@ ALL_WRONG = """<!doctype html><body><p style="width:600px">beyond</p>
 <svg viewBox="0 0 100 20" width="200"><text x="90" y="10">off the drawing</text></svg>"""
 
 
-@pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What the browser says of each page at each width."""
+def measure(pages: Mapping[str, str], folder: Path) -> dict[str, Any]:
+    """What the browser says of pages, by `NAME WIDTH`: how wide, what scrolls, what is cut off."""
     browser = browser_path()
-    pages = {name: page() for name, page in PAGES.items()} | {WRONG: ALL_WRONG}
     frames = "".join(
         f'<iframe title="{name} {width}" style="width:{width}px;height:900px;border:0" '
         f'srcdoc="{escape(page)}"></iframe>'
         for name, page in pages.items()
         for width in (WIDE, NARROW)
     )
-    folder = tmp_path_factory.mktemp("browser")
     whole = folder / "pages.html"
     script = f"<script>addEventListener('load', () => {{{MEASURE}}})</script>"
     whole.write_text(f"<!doctype html><meta charset=utf-8><body>{frames}{script}", "utf-8")
@@ -131,6 +128,13 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     assert found is not None, done.stderr[-2000:]
     told: dict[str, Any] = json.loads(unescape(found[1]))
     return told
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What the browser says of each page at each width."""
+    pages = {name: page() for name, page in PAGES.items()} | {WRONG: ALL_WRONG}
+    return measure(pages, tmp_path_factory.mktemp("browser"))
 
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])

@@ -259,8 +259,7 @@ def test_the_comparison_in_words_names_errors_places_and_moves() -> None:
         )
     )
     rows = text.splitlines()
-    assert "held-out error 3.5" in rows[0]
-    assert "without what was added: 20" in text
+    assert "with dead time the held-out error falls from 20 to 3.5" in rows[0]
     assert re.search(r"vq_v +35.4 mV +10.0 mV +3.5 +1 of 2 +b.mcap \(4.0\)", text)
     assert "iq_a, on its own" in text
     assert "vq_v depends on iq_a (80 %); worst at 100 to 200 rad/s, -15 to -5 A: −210 mV" in text
