@@ -1,4 +1,4 @@
-"""Every page of a real run in a browser, wide and narrow, light and dark: measured, and by axe-core.
+"""Every page of a real run in a browser, wide, narrow, light and dark: measured, and by axe-core.
 
 Other tests hold pages of made-up motors to the same, which is quick; here are those of the demo.
 """
