@@ -21,9 +21,12 @@ from pipeline.records.outcome import Outcome
 from pipeline.settings import ExportSettings
 from pipeline.views.status_text import exported, not_exported
 
+MOST_LINES = 200
+"""Lines of a configuration that are printed; tables of effects run to thousands."""
+
 
 def main(settings: ExportSettings) -> Outcome:
-    """Prints the configuration and writes it to `export/` of output.
+    """Writes the configuration to `export/` of output, and prints it unless it is long.
 
     Parameters
     ----------
@@ -59,8 +62,9 @@ def main(settings: ExportSettings) -> Outcome:
     write_whole(path, text.encode())
     which = f"note: {exported(version)}"
     left = tuple(f"note: not in {exporter.name}: {line}" for line in exporter.omits(source))
+    lines = text.count("\n")
     return Outcome(
-        text=text,
+        text=text if lines <= MOST_LINES else f"{lines} lines, in {path.as_posix()}",
         errors=(which, *notes, *left, f"note: wrote {path.as_posix()}"),
         result={"path": path, "content": text},
     )

@@ -82,7 +82,10 @@ def test_from_a_hidden_effect_to_the_page_that_shows_it_gone(
 
 
 def test_from_a_registered_datasheet_to_its_export(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Plan where constants are missing; else show, approve, export: each as the last one named."""
     output = tmp_path / "out"
@@ -97,7 +100,11 @@ def test_from_a_registered_datasheet_to_its_export(
     assert approving[:3] == ["registry", "approve", MOTOR]
     exporting = following(told(capsys, *approving))
     assert exporting[:3] == ["export", "json", MOTOR]
-    told(capsys, *exporting)
+    printed = told(capsys, *exporting)
     (path,) = (output / "export").iterdir()
     exported = json.loads(path.read_text())
+    lines = path.read_text().count("\n")
+    assert printed.strip() == f"{lines} lines, in {path}"
+    monkeypatch.setattr("pipeline.stages.export.MOST_LINES", lines)
+    assert told(capsys, *exporting).strip() == path.read_text().strip()
     assert exported["constants"]["cogging_order"]["value"] == 84
