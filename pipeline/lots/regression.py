@@ -21,6 +21,7 @@ from pipeline.records.diagnosis_summary import DiagnosisSummary
 from pipeline.records.limits import ConstantLimits, Limits
 from pipeline.records.lot_constant import ConstantResult, Verdict
 from pipeline.records.lot_regression import EffectChange, Group, LimitsUsed, LotRegression, Outlier
+from pipeline.records.model_verdict import number
 
 WORDS: Mapping[Verdict, str] = {
     "pass": "the same as the baseline",
@@ -243,7 +244,7 @@ def _outliers(constants: Sequence[ConstantResult]) -> tuple[Outlier, ...]:
             one.unit,
             motor.z or 0.0,
             motor.capture,
-            f"{quantity(motor.value, one.unit)} is {abs(motor.z or 0.0):.1f} robust standard "
+            f"{quantity(motor.value, one.unit)} is {number(abs(motor.z or 0.0))} robust standard "
             f"deviations {'above' if (motor.z or 0.0) > 0 else 'below'} its lot's median",
         )
         for one in constants

@@ -21,6 +21,7 @@ import numpy as np
 
 from pipeline.export.curves import Array, Bump, Wave, bump_of, drag_polynomial, waves
 from pipeline.export.protocol import Exporter, Options, Source, Values, number_option
+from pipeline.physics.notation import quantity
 from pipeline.physics.units import REFERENCE_DEGC
 
 PEAK_POWER = 1.5
@@ -52,8 +53,8 @@ def _shaft(source: Source) -> _Shaft:
         bump = bump_of(table)
         polynomial = None if bump else drag_polynomial(table)
         if bump is not None and shaft.bump is None:
-            shaft.bump = bump
-            shaft.notes.append(f"{table.effect}: lugre misses its curve by {bump.miss_nm:.2g} N·m")
+            shaft.bump, missed = bump, quantity(bump.miss_nm, "N·m", 2)
+            shaft.notes.append(f"{table.effect}: lugre misses its curve by {missed}")
         elif polynomial is not None:
             shaft.drag += polynomial
         else:

@@ -160,6 +160,7 @@ def test_mujoco_takes_friction_cogging_drag_and_travel() -> None:
     assert (height, order, further.attrib["input"]) == (pytest.approx(0.0004), 168.0, "none")
     assert "not in here: sample_delay" in text
     assert "not in here: stribeck: it" not in text
+    assert re.search(r"stribeck: lugre misses its curve by [\d.]+ [mµn]N·m", text)
 
 
 def test_mujoco_has_dry_friction_of_the_joint_and_heat_where_they_are_known() -> None:

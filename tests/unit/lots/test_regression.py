@@ -287,6 +287,9 @@ def test_an_outlier_is_named_with_its_capture() -> None:
         "psi_pm_wb",
         "N-4/test_0.mcap",
     )
+    first = found.outliers[0]
+    assert first.z > 10.0
+    assert f"is {first.z:.0f} robust standard deviations above" in first.why, "no decimals"
 
 
 def _cogging(lot: str, orders: dict[int, float], rng: np.random.Generator, motors: int = 12):
