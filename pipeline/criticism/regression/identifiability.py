@@ -101,6 +101,33 @@ class Known:
         form = float(np.linalg.norm(self.form_error_factor @ pull))
         return math.hypot(max(noise, between), float(self.rest @ gradient), form)
 
+    def excludes_zero(
+        self, value: float, gradient: Array, least: float, bent: bool = False
+    ) -> bool:
+        """Whether a function of the parameters differs significantly from zero.
+
+        Parameters
+        ----------
+        value
+            Of the function.
+        gradient
+            By the parameters [own].
+        least
+            Standard uncertainties that it must be away from zero.
+        bent
+            Whether the function is not linear.
+
+        Returns
+        -------
+        bool
+            A step that a bound prevents is no doubt where it leads away from zero.
+
+        """
+        u, step = self.u_of(gradient, bent), float(self.rest @ gradient)
+        if step * value > 0.0:
+            u = math.sqrt(max(0.0, u * u - step * step))
+        return abs(value) > least * u
+
     @property
     def u(self) -> Array:
         """Standard uncertainty [own] of every parameter."""
@@ -178,21 +205,53 @@ def significantly_nonzero(system: LinearSystem, held: HeldOut, least: float) -> 
     -------
     set of str
         Names. A coast shows that there is windage though it shows no more than windage over
-        inertia.
+        inertia. And a spring that is softer for less inertia behind it is at least as soft as it is
+        with most of the inertia behind it.
 
     """
-    own = system.model_columns.size
     fit = known(system, held)
     values = np.array([system.fit.values[c.name] for c in system.columns])
+    inward = _inward(system)
     below = [n for n, c in enumerate(system.columns) if c.name in POSITIVE and values[n] > 0.0]
     sure = set()
     for n, column in enumerate(system.columns):
-        over = {j: fit.u_of(_over(values, n, j), bent=True) for j in below if j != n}
-        sizes = [(values[n] / values[j], u) for j, u in over.items()]
-        sizes.append((values[n], fit.u_of(np.eye(own)[n])))
-        if any(abs(size) > least * u for size, u in sizes):
+        gradient = _towards_zero(fit.identified.covariance, values, n, inward)
+        if fit.excludes_zero(values[n], gradient, least) or any(
+            fit.excludes_zero(values[n] / values[j], _over(values, n, j), least, bent=True)
+            for j in below
+            if j != n
+        ):
             sure.add(column.name)
     return sure
+
+
+def _inward(system: LinearSystem) -> Array:
+    """Senses [own] in which a fit's own parameters can leave the bounds they stand at, else 0."""
+    fit = system.fit
+    limits = limits_of(fit.model)
+    inward = np.zeros(system.model_columns.size)
+    for n, column in enumerate(system.columns[: inward.size]):
+        value, bounds = fit.values[column.name], limits.get(column.name)
+        if bounds is not None and _at(value, bounds):
+            inward[n] = 1.0 if value - bounds[0] < bounds[1] - value else -1.0
+    return inward
+
+
+def _towards_zero(covariance: Array, values: Array, one: int, inward: Array) -> Array:
+    """Gradient [own] of a parameter, without what others at a bound would move it away from zero.
+
+    Such another one can only go one way. Where the parameter grows with that, zero is as far as
+    with the other one at its bound.
+    """
+    gradient = np.zeros(inward.size)
+    gradient[one] = 1.0
+    for other in np.flatnonzero(inward):
+        variance = covariance[other, other]
+        if other != one and variance > 0.0:
+            along = covariance[one, other] / variance
+            if along * inward[other] * values[one] > 0.0:
+                gradient[other] -= along
+    return gradient
 
 
 def _over(values: Array, one: int, other: int) -> Array:
