@@ -180,16 +180,21 @@ def _chosen(
     predicted fall and differs significantly from zero.
 
     That fit is finished with columns of its own, and without terms that are not worth their
-    penalty.
+    penalty. Where one that explains more by over a `tie` is not sure of its size, no other is named
+    in its place.
     """
-    policy = wide.policy.selection
+    policy, least = wide.policy.selection, math.inf
     for first in range(0, min(len(passing), policy.refit_rounds * policy.refits), policy.refits):
         batch = list(passing[first : first + policy.refits])
         while (best := _refit_best(wide, batch, added)) is not None:
             named = [effect.name for effect in best.fit.model.effects]
             finished = trimmed(gauss_newton(with_all_terms(best.fit), before=best), named)
+            cost = finished.deviance + math.log(wide.size) * finished.model_columns.size
+            if cost > least + policy.tie:
+                return None
             if _sure(linear_system(finished.fit)):
                 return finished
+            least = min(least, cost)
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
     return None
 

@@ -176,3 +176,13 @@ def test_an_effect_is_material_by_its_amplitude_and_by_shapes_that_have_a_least(
     assert not judged("compliance", share=0.3, twist_rad=1e-4, **rigid)
     assert not judged("compliance", share=0.01, twist_rad=0.005, **rigid)
     assert judged("torque_lag", lag_s=1e-3, late=-0.4, stamped=0.0)
+
+
+def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkeypatch):
+    def unsure(system):
+        return system.fit.model.effects[-1].name != "windage"
+
+    hidden = tuple(with_drag(curved(0.1), seed) for seed in (5, 6))
+    assert search(fitted(hidden), LIBRARY)[-1].added == ("windage",)
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise._sure", unsure)
+    assert search(fitted(hidden), LIBRARY)[-1].added == ()
