@@ -49,6 +49,7 @@ def test_what_one_day_lacks_the_other_gives(bench: Path, tmp_path: Path) -> None
     assert len({monday["version"], tuesday["version"], both["version"]}) == 3
 
 
+@pytest.mark.slow
 def test_a_repeated_day_narrows_the_scatter_and_not_the_gain(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -245,6 +245,7 @@ def test_lq_95_per_cent_low_because_of_ten_spikes_in_the_current() -> None:
     assert near(found["lq_h"], LQ)
 
 
+@pytest.mark.slow
 def test_a_current_that_no_locked_rotor_makes_gives_no_number() -> None:
     """The rotor turns away and its back-EMF swings: ten times the noise of any step."""
     sound = [on_a_scope(axis, 12.0, k, rate_hz=2e4) for k, axis in enumerate("dq")]
