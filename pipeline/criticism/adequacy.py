@@ -110,6 +110,8 @@ def _named(tested: ModelVerdict, diagnosis: Diagnosis) -> ModelVerdict:
         verdict=diagnosis.verdict,
         missing=missing,
         note="; ".join(u.words for u in unseen) if diagnosis.verdict == "insufficient" else "",
+        # both over what every step of the ladder can hold out, as a diagnosis has them
+        held_out=diagnosis.ladder[0].held_out if missing else tested.held_out,
         held_out_with=diagnosis.ladder[-1].held_out if missing else None,
         unknown="" if unknown is None else f"{unknown.signal}, {unknown.shape}",
         unexcited=unseen,
