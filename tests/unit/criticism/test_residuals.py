@@ -16,7 +16,7 @@ from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linearise import effect_columns, linearise
 from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error
 from pipeline.criticism.residuals.residual import residual
-from pipeline.criticism.signals.shaft import _averaged
+from pipeline.criticism.signals.shaft import averaged
 from pipeline.criticism.signals.true_state import finer_of
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, coasting, log, machine, operating
@@ -271,7 +271,7 @@ def test_a_coasting_sample_is_averaged_over_parts_enough(turn_rad):
     finer = finer_of(segment, machine(), DEFAULT.cutting.coast_parts)
     turned = np.arange(40 * finer) * turn_rad / order / finer
     x = replace(operating(), theta_rad=turned, inverter=False, shaft=ShaftState(finer=finer))
-    mean = _averaged(x.shaft_waves(order)[0], finer)
+    mean = averaged(x.shaft_waves(order)[0], finer)
     true = np.sinc(turn_rad / (2 * np.pi)) ** 2 * np.cos(order * theta)
     assert mean[2:-2] == pytest.approx(true[2:-2], abs=0.004)
     assert finer <= max(8, np.ceil(turn_rad / 3.0))
