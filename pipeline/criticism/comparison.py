@@ -90,15 +90,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         (*_errors(system, held), *run_errors(simulated)),
         held.total if bare is None else bare.whole,
         tuple(_where(maps)),
-        (
-            *unused(campaign, system.segments),
-            *loaded(campaign, machine),
-            *mixed(campaign, machine),
-            *at_ambient(system.fit),
-            *against_stated(system, held),
-            *hum_notes(base.hum),
-            *held.notes,
-        ),
+        (*_notes(campaign, system, held), *hum_notes(base.hum), *held.notes),
         maps,
         () if bare is None else bare.moved,
         None if bare is None else bare.total,
@@ -106,6 +98,18 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         reported_combinations(system, held),
         () if bare is None else bare.errors,
         () if bare is None else bare.added,
+    )
+
+
+def _notes(campaign: Campaign, system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
+    """What a reader should know of the captures of a comparison."""
+    machine = system.fit.machine
+    return (
+        *unused(campaign, system.segments),
+        *loaded(campaign, machine),
+        *mixed(campaign, machine),
+        *at_ambient(system.fit),
+        *against_stated(system, held),
     )
 
 

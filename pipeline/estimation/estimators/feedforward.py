@@ -278,8 +278,7 @@ def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Esti
     deviation, dof = scatter(regression, found, policy().shaft_rows.overlap)
     values = [*(float(c) for c in found.coefficients[:3]), solved.delay_s]
     split = partial(_partitions, rows, [c.path for c in used])
-    gains = instrument_uncertainties(used, ("voltage",))
-    shares = {s: np.mean([voltage_source(c.meta) == s for c in used]) for s in gains}
+    gains = _gains(used)
     notes = [
         f"{rows.voltage_v.size} windows, {np.std(found.residuals):.2g} V left; at the temperatures "
         "and the load of the log",
@@ -288,17 +287,16 @@ def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Esti
     at = {"omega_mech_rad_s": float(np.max(np.abs(rows.design[:, 1])))}
     seen = found.coefficients[:3] > policy().evidence.sigmas * deviation[:3]
     if not seen[1]:
-        return [
-            METHOD.missing(n, f"voltage and speed do not go together; {EXPERIMENT}") for n in GIVES
-        ]
+        why = f"voltage and speed do not go together; {EXPERIMENT}"
+        return [METHOD.missing(name, why) for name in GIVES]
     clear = seen[2] and _resolved(parts, values) and all(p.quiet for p in parts)
     missing = {} if clear else _hidden(parts)
     estimates = []
     for k, (name, value) in enumerate(zip(GIVES, values, strict=True)):
         u = float(deviation[k])
         if name in missing:
-            note = f"{value:.3g} ± {u:.2g} {METHOD.unit(name)} by the fit; {missing[name]}"
-            estimates.append(METHOD.missing(name, note))
+            fitted = f"{value:.3g} ± {u:.2g} {METHOD.unit(name)} by the fit"
+            estimates.append(METHOD.missing(name, f"{fitted}; {missing[name]}"))
             continue
         contributions = [METHOD.scatter(name, u, float(dof[k]))]
         doubt = disagreement(regression, k, split, level) if k < 3 else None
@@ -309,11 +307,17 @@ def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Esti
         if k == 3:
             between = float(np.mean([_between_rows_s(part) for part in parts]))
             contributions.append(Contribution("instant of the voltage's steps", between, "B"))
-        if k < 3:
-            scaled = {s: value * u_rel * float(shares[s]) for s, u_rel in gains.items()}
-            contributions += [Contribution(s, u_gain, "B") for s, u_gain in scaled.items()]
+        else:
+            contributions += [Contribution(s, value * u_rel, "B") for s, u_rel in gains.items()]
         estimates.append(METHOD.measured(name, value, contributions, used, at, [*words, *notes]))
     return estimates
+
+
+def _gains(used: Sequence[Capture]) -> dict[str, float]:
+    """Relative standard uncertainty of each voltmeter's gain, times its share of the captures."""
+    gains = instrument_uncertainties(used, ("voltage",))
+    sources = [voltage_source(c.meta) for c in used]
+    return {s: u_rel * sources.count(s) / len(sources) for s, u_rel in gains.items()}
 
 
 def _between_rows_s(part: Part) -> float:

@@ -369,18 +369,15 @@ def _estimates(
     constants = doubts.middle(logged) * found.constants(found.coefficients)
     scatter = found.scatter()
     paths = sorted(c.path for c in rows.captures)
-    words = [*_words(rows, torque, found), *_load_words(rows, doubts.share, left_out)]
+    words = (*_words(rows, torque, found), *_load_words(rows, doubts.share, left_out))
     note = "; ".join([*doubts.words(logged), *words])
     at = {"omega_mech_rad_s": rows.fastest_rad_s, "temp_magnet_degc": 25.0}
     estimates = []
     for i, name in enumerate(GIVES):
-        reason = found.reasons[i]
-        if reason:
-            estimates.append(METHOD.missing(name, reason))
+        if found.reasons[i]:
+            estimates.append(METHOD.missing(name, found.reasons[i]))
             continue
-        parts = [
-            METHOD.scatter(f"{k}", float(scatter[i, k]), found.dof) for k in range(scatter.shape[1])
-        ]
+        parts = [METHOD.scatter(f"{k}", float(u), found.dof) for k, u in enumerate(scatter[i])]
         parts.append(Contribution("assumed:drag_form", float(found.u_form[i]), "B"))
         parts += doubts.parts(i, float(constants[i]), logged)
         parts += sampled if name == "b_visc_nm_s_rad" else ()

@@ -54,23 +54,7 @@ def sniff(text: str) -> tuple[CsvDialect, str | None] | None:
     """
     lines = text.replace("\r\n", "\n").split("\n")[:_LOOK_AT_LINES]
     lines, row_end = _without_ends(lines)
-    best: tuple[int, int, int, int] | None = None
-    for place, separator in enumerate(_SEPARATORS):
-        looks = [_numbers(line, separator) for line in lines]
-        counts = [count for count, _ in looks]
-        led = [bool(_NUMBER.match(line.partition(separator)[0].strip())) for line in lines]
-        widths = [count for count in counts if count > 1]
-        if widths:
-            width = max(set(widths), key=lambda w: (widths.count(w), w))
-            worth = sum(surplus for count, surplus in looks if count == width)
-            rows = [n for n, count in enumerate(counts) if count == width]
-            # a line of a preamble is a name and a number, where rows begin with a number
-            usual = 2 * sum(led[n] for n in rows) > len(rows)
-            first = next(n for n in rows if led[n] or not usual)
-            found = (worth, -place, first, width)
-            best = max(best, found) if best else found
-    if best is None:
-        best = _one_column(lines)
+    best = _separated(lines) or _one_column(lines)
     if best is None:
         return None
     _, place, first, width = best
@@ -94,6 +78,28 @@ def sniff(text: str) -> tuple[CsvDialect, str | None] | None:
         ),
         lines[header],
     )
+
+
+def _separated(lines: list[str]) -> tuple[int, int, int, int] | None:
+    """Worth, place of the separator (negative), first row and width of the best table; None for no
+    rows of numbers.
+    """
+    best: tuple[int, int, int, int] | None = None
+    for place, separator in enumerate(_SEPARATORS):
+        looks = [_numbers(line, separator) for line in lines]
+        counts = [count for count, _ in looks]
+        led = [bool(_NUMBER.match(line.partition(separator)[0].strip())) for line in lines]
+        widths = [count for count in counts if count > 1]
+        if widths:
+            width = max(set(widths), key=lambda w: (widths.count(w), w))
+            worth = sum(surplus for count, surplus in looks if count == width)
+            rows = [n for n, count in enumerate(counts) if count == width]
+            # a line of a preamble is a name and a number, where rows begin with a number
+            usual = 2 * sum(led[n] for n in rows) > len(rows)
+            first = next(n for n in rows if led[n] or not usual)
+            found = (worth, -place, first, width)
+            best = max(best, found) if best else found
+    return best
 
 
 def _without_ends(lines: list[str]) -> tuple[list[str], str]:
