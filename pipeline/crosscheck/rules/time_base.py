@@ -65,7 +65,7 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     files = ", ".join(off[:NAMED]) + more
     return judge_ratio(
         NAME,
-        Ratio(worst.ratio, worst.u, BLOCKS - 2.0),
+        Ratio(worst.ratio, worst.u, BLOCKS - 3.0),
         allowance,
         f"speed integrated over the recorded time, over the angle, in {worst.path}",
         "count",
@@ -92,12 +92,14 @@ def pace(capture: Capture, turns: float) -> Pace | None:
 
     Notes
     -----
-    Increments over blocks obey ∫ω dt = r Δθ − τ Δω, with τ the lag of the speed, by least squares.
-    Both clocks' own uncertainty is in u.
+    A tracking observer of second order, ω'' + 2ζn ω' + n² ω = n² r θ', integrates to ∫ω dt = r Δθ −
+    (2ζ/n) Δω − (1/n²) Δω'; a low-pass of first order to the same without its last term. Increments
+    over blocks give r by least squares. Both clocks' own uncertainty is in u.
 
     References
     ----------
     JCGM 100:2008 (GUM), H.3 (uncertainty of a straight line).
+    Harnefors and Nee, IEEE Trans. Ind. Electron. 47, 2000, 77, doi:10.1109/41.824128 (observer).
 
     """
     if not capture.has(*COLUMNS):
@@ -116,15 +118,17 @@ def pace(capture: Capture, turns: float) -> Pace | None:
 
 
 def _increments(rows: Array, pause_s: float | None = None) -> Array:
-    """Increments [K, 3] of the integrated speed [rad], the angle [rad] and the speed [rad/s], over
-    blocks of rows [n, 3]: time, angle, speed. What happened in pauses of the recorder is in none.
+    """Increments [K, 4] of the integrated speed [rad], the angle [rad], the speed [rad/s] and the
+    acceleration [rad/s²], over blocks of rows [n, 3]: time, angle, speed. What happened in pauses
+    of the recorder is in none.
     """
     t_s, theta, omega = rows.T
     turned = 0.5 * (omega[1:] + omega[:-1]) * np.diff(t_s)
-    steps = np.column_stack([turned, np.diff(theta), np.diff(omega)])
+    rates = np.gradient(omega, t_s)
+    steps = np.column_stack([turned, np.diff(theta), np.diff(omega), np.diff(rates)])
     if pause_s is not None:
         steps[np.diff(t_s) > pause_s] = 0.0
-    along = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    along = np.vstack([np.zeros(4), np.cumsum(steps, axis=0)])
     edges = np.linspace(0, t_s.size - 1, BLOCKS + 1).round().astype(np.int64)
     return np.diff(along[edges], axis=0)
 

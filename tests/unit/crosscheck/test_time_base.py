@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
+from scipy.signal import lsim, lti
 
 from pipeline.crosscheck.registry import check_all
 from pipeline.crosscheck.rules.time_base import RULE, pace
@@ -81,6 +82,20 @@ def test_a_clock_within_its_stated_uncertainty_passes():
     """2.4 % off on a bench that states 2 %: no failure, and J has that in its u."""
     assert judged(spin(1.0 + 1e-4)).status == "pass"
     assert judged(spin(FAST, u_rel_clock=0.02)).status == "not_evaluated"
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.024])
+def test_an_observer_of_second_order_under_reversals_is_no_wrong_clock(factor):
+    """2.3 Hz, an observer of 40 rad/s: with its first lag alone the ratio is 13 % off."""
+    t_s, swing = np.arange(6000) * 1e-3, 2.0 * np.pi * 2.3
+    theta = 40.0 / swing * np.sin(swing * t_s) + 2.0 * np.sin(0.31 * swing * t_s**1.05)
+    observer = lti([1600.0, 0.0], [1.0, 80.0, 1600.0])
+    _, omega, _ = lsim(observer, theta, t_s)
+    table = {"t_s": factor * t_s, "theta_mech_rad": theta, "omega_mech_rad_s": omega}
+    made = replace(spin(1.0), tables=(pl.DataFrame(table),))
+    found = pace(made, TURNS)
+    assert found.ratio == pytest.approx(factor, abs=3.0 * found.u)
+    assert found.u < 1e-3
 
 
 def test_without_a_second_clock_nothing_is_judged():
