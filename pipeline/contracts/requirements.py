@@ -67,7 +67,7 @@ TERMINAL_VOLTAGES = Requirement(
 DQ = ("vd_v", "vq_v", "id_a", "iq_a")
 
 _FIXED: dict[str, tuple[Requirement, ...]] = {
-    "resistance": _all("temp_winding_degc"),
+    "resistance": (),
     "current_step": (),
     "lcr": _all("theta_elec_deg", "lab_h"),
     "open_circuit": (TERMINAL_VOLTAGES,),

@@ -136,7 +136,6 @@ def test_all_failures_at_once(rng: np.random.Generator) -> None:
     ("test", "dropped"),
     [
         ("resistance", "ia_a"),
-        ("resistance", "temp_winding_degc"),
         ("current_step", "vab_v"),
         ("current_step", "t_s"),
         ("lcr", "lab_h"),
@@ -169,6 +168,7 @@ def test_missing_column(test: str, dropped: str, rng: np.random.Generator) -> No
 @pytest.mark.parametrize(
     ("test", "dropped"),
     [
+        ("resistance", "temp_winding_degc"),
         ("open_circuit", "theta_mech_rad"),
         ("open_circuit", "omega_mech_rad_s"),
         ("open_circuit", "vca_v"),
