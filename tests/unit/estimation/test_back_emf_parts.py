@@ -307,6 +307,18 @@ def test_cycles_of_unequal_stretches_weigh_by_travel() -> None:
     assert math.isnan(electrical_per_mechanical(Spin(t, (), None, None, None), parts)[0])
 
 
+@pytest.mark.parametrize("sense", [1, -1])
+def test_cycles_of_a_slow_uneven_turn(sense: int) -> None:
+    """A fifth of a turn of 17 pole pairs whose speed swings by 15 % within a cycle."""
+    t = np.arange(6000) * 1e-4
+    theta = sense * (2.2 * t + 0.33 / 40.0 * np.sin(40.0 * t))
+    phase = 17.0 * theta
+    v = 1j * np.gradient(phase, t) * 5e-3 * np.exp(1j * phase)
+    spin = spin_of(t, v + 1e-4 * np.random.default_rng(3).standard_normal(t.size), theta=theta)
+    ratio, _ = electrical_per_mechanical(spin, steady_stretches(spin, 0.02))
+    assert ratio == pytest.approx(17.0, abs=0.01)
+
+
 def course(speeds, rate=1e4, psi=4e-3, noise=1e-3):
     """Spin of an electrical speed [n]."""
     t = np.arange(speeds.size) / rate
