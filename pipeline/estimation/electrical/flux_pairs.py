@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.estimation.electrical.operating_points import Point
+from pipeline.estimation.electrical.operating_points import Point, hold_s
 from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import linear_fit
 
@@ -173,8 +173,9 @@ def _root_sum(*parts: float) -> float:
 def instant_voltage(point: Point, pole_pairs: int) -> complex:
     """The dq voltage at the sampling instant, of a mean over the period about or after it.
 
-    Over one period T the mean of a vector turning at w is sinc(w T / 2) exp(j w T / 2) of what it
-    is at the start of the period, and sinc alone of what it is in the middle.
+    Over the time T for which a vector is held (`hold_s`) the mean of a vector turning at w is
+    sinc(w T / 2) exp(j w T / 2) of what it is at the start, and sinc alone of what it is in the
+    middle.
 
     Parameters
     ----------
@@ -197,7 +198,8 @@ def instant_voltage(point: Point, pole_pairs: int) -> complex:
     timing = point.capture.meta.voltage_timing
     if timing == "instant":
         return voltage
-    half = 0.5 * pole_pairs * point.omega_mech_rad_s * point.period_s
+    omega = pole_pairs * point.omega_mech_rad_s
+    half = 0.5 * omega * hold_s(point.capture.meta, point.period_s, omega)
     turned = np.exp(1j * half) if timing == "held" else 1.0
     return complex(voltage / (np.sinc(half / np.pi) * turned))
 

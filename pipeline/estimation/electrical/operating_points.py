@@ -15,7 +15,7 @@ from pipeline.estimation.uncertainty.instruments import current_source, torque_s
 from pipeline.estimation.uncertainty.instruments import voltage_source as source_of_voltage
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import find_plateaus, white_noise_sigma
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 
 MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
@@ -350,6 +350,33 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
         capture=capture,
         alpha_mech_rad_s2=alpha,
     )
+
+
+def hold_s(meta: CaptureMeta, period_s: float, omega_elec_rad_s: float) -> float:
+    """Time for which an inverter held a voltage vector still, of a log whose voltages are means.
+
+    Parameters
+    ----------
+    meta
+        Of the log: its PWM frequency, where stated.
+    period_s
+        Sampling period [s].
+    omega_elec_rad_s
+        Highest electrical speed [rad/s].
+
+    Returns
+    -------
+    float
+        The PWM period [s] of a log that is slower, which holds means in the rotor's frame; the
+        sampling period of one as fast; zero where the rotor turns further in a row than under one
+        vector of any inverter, in a log that states no PWM frequency.
+
+    """
+    inverter = policy().inverter
+    if meta.pwm_hz:
+        pwm_s = 1.0 / meta.pwm_hz
+        return pwm_s if pwm_s < inverter.slower_share * period_s else period_s
+    return period_s if abs(omega_elec_rad_s) * period_s < inverter.held_turn_rad else 0.0
 
 
 def _acceleration(t_s: Array, motion: Array, power: int) -> float:

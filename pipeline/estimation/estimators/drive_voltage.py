@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.electrical.operating_points import hold_s, pole_pairs_of
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -236,7 +236,8 @@ def _instant(
     v_d, v_q = data.get("vd_v"), data["vq_v"]
     if timing == "instant" or pole_pairs is None:
         return v_d, v_q
-    half = 0.5 * pole_pairs * speed * period_s
+    fastest = pole_pairs * float(np.max(np.abs(speed)))
+    half = 0.5 * pole_pairs * speed * hold_s(capture.meta, period_s, fastest)
     damping = np.sinc(half / np.pi)
     if timing == "centred" or v_d is None:
         return (None if v_d is None else v_d / damping), v_q / damping
@@ -248,7 +249,9 @@ def _hold_doubt(capture: Capture, speed: Array, pole_pairs: int | None, period_s
     """(1/cos(w T / 2) - 1)/sqrt(3) at the rms speed: polygon or circle, rectangular (GUM 4.3.7)."""
     if capture.meta.voltage_timing != "centred":
         return 0.0
-    half = 0.5 * (pole_pairs or 1) * float(np.sqrt(np.mean(speed**2))) * period_s
+    omega = (pole_pairs or 1) * np.abs(speed)
+    held = hold_s(capture.meta, period_s, float(np.max(omega)))
+    half = 0.5 * float(np.sqrt(np.mean(omega**2))) * held
     return float((1.0 / np.cos(min(half, 1.0)) - 1.0) / np.sqrt(3.0))
 
 

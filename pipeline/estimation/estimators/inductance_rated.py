@@ -8,7 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.estimation.electrical.flux_pairs import Flux, flux_pairs, frame_of, instant_voltage
-from pipeline.estimation.electrical.operating_points import Point, operating_points, pole_pairs_of
+from pipeline.estimation.electrical.operating_points import (
+    Point,
+    hold_s,
+    operating_points,
+    pole_pairs_of,
+)
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -160,7 +165,7 @@ def _without_ripple(
             corrected.append(point)
             continue
         omega = pole_pairs * point.omega_mech_rad_s
-        half = 0.5 * omega * point.period_s
+        half = 0.5 * omega * hold_s(point.capture.meta, point.period_s, omega)
         bend = instant_voltage(point, pole_pairs) / (1j * omega)
         short = complex(bend.real / direct.value_h, bend.imag / quadrature.value_h)
         drop = -resistance.number * short * half**2 / 3.0 * np.exp(1j * half)
@@ -248,10 +253,11 @@ def _hold_doubt(points: Sequence[Point], pole_pairs: int) -> float:
 
     Seen from the middle of a side the two differ by 1/cos(w T / 2) - 1; rectangular, GUM 4.3.7.
     """
+    centred = [p for p in points if p.capture.meta.voltage_timing == "centred"]
+    speeds = [pole_pairs * abs(p.omega_mech_rad_s) for p in centred]
     late = [
-        0.5 * pole_pairs * abs(p.omega_mech_rad_s) * p.period_s
-        for p in points
-        if p.capture.meta.voltage_timing == "centred"
+        0.5 * w * hold_s(p.capture.meta, p.period_s, w)
+        for p, w in zip(centred, speeds, strict=True)
     ]
     if not late:
         return 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from pipeline.records.policy import chosen, derived
@@ -153,6 +154,14 @@ class Inverter:
         2.0, "samples", "latest that a drive's voltage is against its angle",
         source="a period of computing and half a one of holding (Bae and Sul, IEEE Trans. Ind. "
         "Appl. 39(3), 2003); the row of its log may be another half",
+    )  # fmt: skip
+    slower_share: float = chosen(
+        0.75, "sample periods", "PWM period below which a log is slower than the PWM",
+        why="a log of every second period is at a half, one of every period at 1",
+    )  # fmt: skip
+    held_turn_rad: float = derived(
+        math.pi / 3.0, "rad", "electrical turn beyond which no voltage vector is held for a sample",
+        source="six vectors a turn, the fewest of any inverter (six-step)",
     )  # fmt: skip
 
 

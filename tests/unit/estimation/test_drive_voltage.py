@@ -10,6 +10,7 @@ import pytest
 from pipeline.estimation.estimators.drive_voltage import ESTIMATOR
 from pipeline.estimation.policy import DEFAULT
 from pipeline.estimation.thermal.magnet_coefficient import SOURCE
+from pipeline.numerics.integrals import trapezoid
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
@@ -62,6 +63,35 @@ def test_a_mean_over_a_period_is_taken_back_to_its_instant(timing: str) -> None:
     found = estimates(ESTIMATOR, log, known=pairs)
     assert found["ke_phase_peak_v_s_rad"].number == pytest.approx(ke, rel=1e-3)
     assert found["r_phase_ohm"].number == pytest.approx(r, rel=3e-3)
+
+
+@pytest.mark.parametrize("timing", ["held", "centred"])
+def test_means_of_many_pwm_periods_are_in_the_rotors_frame(timing: str) -> None:
+    """Rows of 12 PWM periods in which the rotor turns by 0.5 rad: nothing to take back.
+
+    On a shaft whose current goes with its acceleration. Taken for one held vector a row, Ke came
+    out 1.1 % high and R 37 % low, as lateness.
+    """
+    pole_pairs, ke, r, period = 12, 0.3, 0.8, 1e-3
+    t, swing = np.arange(0.0, 8.0, period), 2.0 * np.pi / 1.6
+    speed = 42.0 * np.sin(swing * t) * (1.0 + 0.3 * np.sin(0.7 * t))
+    iq = 0.01 * np.gradient(speed, period) + 0.4 * np.sign(speed)
+    noise = 1e-4 * np.random.default_rng(3).standard_normal((2, t.size))
+    log = capture(
+        "drive",
+        voltage_timing=timing,
+        pole_pairs=pole_pairs,
+        pwm_hz=12_000.0,
+        t_s=t,
+        theta_mech_rad=trapezoid(t, speed),
+        vd_v=noise[0],
+        vq_v=ke * speed + r * iq + noise[1],
+        iq_a=iq,
+    )
+    pairs = Constants((known_value("pole_pairs", pole_pairs),))
+    found = estimates(ESTIMATOR, log, known=pairs)
+    assert found["ke_phase_peak_v_s_rad"].number == pytest.approx(ke, rel=1e-3)
+    assert found["r_phase_ohm"].number == pytest.approx(r, rel=5e-3)
 
 
 def test_back_emf_constant_from_a_drive() -> None:

@@ -304,7 +304,7 @@ def test_two_pairs_of_ld_weigh_by_their_variance() -> None:
 
 def test_what_a_held_vector_may_be_of_its_mean() -> None:
     """(1/cos(wT/2) - 1)/sqrt(3) of centred means, the mean over points; others none."""
-    centred = replace(MAP, meta=replace(MAP.meta, voltage_timing="centred"))
+    centred = replace(MAP, meta=replace(MAP.meta, voltage_timing="centred", pwm_hz=1000.0))
     points = [point(1.0, w=w, source=centred, period=1e-3) for w in (100.0, -400.0)]
     halves = [0.5 * P * w * 1e-3 for w in (100.0, 400.0)]
     expected = sum(1.0 / math.cos(h) - 1.0 for h in halves) / 2.0 / math.sqrt(3.0)
@@ -312,6 +312,8 @@ def test_what_a_held_vector_may_be_of_its_mean() -> None:
     assert _hold_doubt([point(1.0)], P) == 0.0
     fast = [point(1.0, w=1e4, source=centred, period=1e-3)]
     assert _hold_doubt(fast, P) == pytest.approx((1.0 / math.cos(1.0) - 1.0) / math.sqrt(3.0))
+    unstated = replace(centred, meta=replace(centred.meta, pwm_hz=None))
+    assert _hold_doubt([replace(fast[0], capture=unstated)], P) == 0.0, "slower than any inverter"
 
 
 def test_what_the_fastest_point_turns_while_currents_are_late() -> None:
