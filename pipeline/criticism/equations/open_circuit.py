@@ -67,7 +67,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if encoder:
         shaft_angle(columns, period, machine)
     else:
-        keep &= _by_voltage(columns, machine, window)
+        keep &= _by_voltage(columns, machine, window, period)
     sensors = prepared(columns, period, machine.policy)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     columns, starts = thinned(columns, keep, window, policy.windows)
@@ -86,12 +86,14 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     return made if encoder else replace(made, fixed={**made.fixed, _VOLTAGE_FRAME: 1.0})
 
 
-def _by_voltage(columns: dict[str, Array], machine: Machine, window: int) -> NDArray[np.bool_]:
+def _by_voltage(
+    columns: dict[str, Array], machine: Machine, window: int, period: float
+) -> NDArray[np.bool_]:
     """Adds the angle [n, rad] at which the voltage stands; the samples where it is known.
 
     The magnet's angle at the start differs between spins, and a speed does not show it. The voltage
-    does, but for the sense of rotation, which its own turning shows; its harmonics are averaged
-    out over a window.
+    does, but for the sense of rotation, which its own turning shows. What its phase has at whole
+    orders of its own angle is harmonics and errors of the meter; all else is motion of the shaft.
     """
     voltage = vector_of_lines({name: columns[name] for name in LINES_V if name in columns})
     noise = max(
@@ -102,12 +104,23 @@ def _by_voltage(columns: dict[str, Array], machine: Machine, window: int) -> NDA
     phase = np.unwrap(np.angle(voltage))
     width = 2 * (window // 2) + 1
     sense = np.sign(smoothed(np.gradient(phase), width))
-    angle = smoothed(phase - 0.5 * math.pi * sense, width)
-    columns["theta_mech_rad"] = angle / machine.pole_pairs
     known = (np.abs(voltage) > machine.policy.cutting.audible_u * noise) & (
         np.diff(sense, prepend=sense[0]) == 0.0
     )
-    return np.convolve(known.astype(float), np.ones(width), mode="same") > width - 0.5
+    inside: NDArray[np.bool_] = (
+        np.convolve(known.astype(float), np.ones(width), mode="same") > width - 0.5
+    )
+    upright = phase - 0.5 * math.pi * sense
+    angle = smoothed(upright, width)
+    short = 2 * (round(machine.policy.cutting.speed_s / period) // 2) + 1
+    if short < width and inside.any():
+        orders = np.arange(1, machine.policy.cutting.voltage_orders + 1)
+        waves = np.exp(1j * orders * angle[:, None])
+        basis, rest = np.column_stack([waves.real, waves.imag]), upright - angle
+        found = np.linalg.lstsq(basis[inside], rest[inside], rcond=None)[0]
+        angle += smoothed(rest - basis @ found, short)
+    columns["theta_mech_rad"] = angle / machine.pole_pairs
+    return inside
 
 
 def _steady(weak: Projection, theta: Array, policy: Cutting) -> NDArray[np.bool_]:

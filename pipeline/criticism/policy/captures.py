@@ -55,6 +55,10 @@ class Cutting:
         why="shorter, and the encoder's rounding is in drags and currents; longer, and a step of "
         "the speed is blurred",
     )  # fmt: skip
+    voltage_orders: int = chosen(
+        12, "1", "electrical orders that the angle of a voltage leaves to the voltage",
+        why="those of back-EMF and of errors of the meter; motion has all others",
+    )  # fmt: skip
     reversal_u: float = chosen(
         6.0, "standard deviations of noise", "angle that a shaft must turn back by for a reversal",
         why="noise alone comes to five in a log of 1e6 samples",
