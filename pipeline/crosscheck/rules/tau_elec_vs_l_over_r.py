@@ -12,13 +12,19 @@ from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
-from pipeline.physics.conventions import copper_resistance_ohm, terminal_inductance_h
+from pipeline.physics.conventions import (
+    COPPER_COEFFICIENT_25_1_K,
+    UNLOGGED_U_K,
+    copper_resistance_ohm,
+    terminal_inductance_h,
+)
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
-from pipeline.records.uncertainty import propagate, type_a
+from pipeline.records.uncertainty import propagate, type_a, type_b
 
 NAME = "tau_elec_vs_l_over_r"
+WINDING = "temp_winding_degc"
 
 
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
@@ -26,9 +32,10 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
     Notes
     -----
-    The mean of the ratios is judged; the option `allowance` [1] is added to its uncertainty. No
-    gain enters the time constant, so this sees what L and R cannot say of themselves: an open
-    delta, a lossy core, resistance between the motor and where the voltage was measured.
+    The mean of the ratios is judged; the option `allowance` [1] is added to its uncertainty. A
+    winding whose temperature the step did not log is at ambient ± `UNLOGGED_U_K`. No gain enters
+    the time constant, so this sees what L and R cannot say of themselves: an open delta, a lossy
+    core, resistance between the motor and where the voltage was measured.
 
     """
     ld, lq = constants.best("ld_h"), constants.best("lq_h")
@@ -37,12 +44,14 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
         return not_evaluated(NAME, "needs ld_h, lq_h and r_phase_ohm")
     ratios: list[float] = []
     errors: list[float] = []
+    unlogged = 0
     for capture in _smallest_steps(campaign):
         expected = _expected_s(capture, ld.number, lq.number, r_phase.number)
         found = step_time_constant_s(*_trace(capture))
         if found is not None:
             ratios.append(found[0] / expected)
             errors.append(found[1] / expected)
+            unlogged += not capture.has(WINDING)
     if not ratios:
         return not_evaluated(NAME, "needs current_step captures that settle within the recording")
     mean = float(np.mean(ratios))
@@ -50,11 +59,13 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     spread, others = float(np.std(ratios)), max(len(ratios) - 1, 1)
     scatter = max(spread, fit) / math.sqrt(others)
     dof = others if spread > fit else math.inf
+    kelvin = type_b(f"assumed:{WINDING}", UNLOGGED_U_K * unlogged / len(ratios))
     budget = propagate(
         [
             (0.5 * mean / ld.number, ld.budget),
             (0.5 * mean / lq.number, lq.budget),
             (-mean / r_phase.number, r_phase.budget),
+            (-mean * COPPER_COEFFICIENT_25_1_K, kelvin),
             (1.0, type_a(f"scatter:{NAME}", scatter, dof)),
         ]
     )
@@ -148,8 +159,8 @@ def _expected_s(capture: Capture, ld_h: float, lq_h: float, r_phase_ohm: float) 
     theta_rad = math.radians(meta.theta_elec_deg or 0.0)
     l_h = float(terminal_inductance_h(ld_h, lq_h, theta_rad, meta.pair or "ab"))
     temp_degc = meta.ambient_degc if meta.ambient_degc is not None else 25.0
-    if capture.has("temp_winding_degc"):
-        temp_degc = float(np.nanmean(capture.arrays("temp_winding_degc")["temp_winding_degc"]))
+    if capture.has(WINDING):
+        temp_degc = float(np.nanmean(capture.arrays(WINDING)[WINDING]))
     return l_h / (2.0 * float(copper_resistance_ohm(r_phase_ohm, temp_degc, 25.0)))
 
 

@@ -300,7 +300,7 @@ def test_torque_equation_needs_both_terms() -> None:
     assert judge("torque_equation", wrong_sign, whole).status == "fail"
 
 
-def current_step(tau_s: float) -> Campaign:
+def current_step(tau_s: float, temp_degc: float | None = 25.0) -> Campaign:
     """A step up and down on pair ab with d on it, from the closed form, with noise."""
     rng = np.random.default_rng(5)
     t_s = 1e-5 * np.arange(1200)
@@ -314,6 +314,8 @@ def current_step(tau_s: float) -> Campaign:
         "vab_v": np.where(on, 4.0 * R, 0.0) + rng.normal(0, 0.003, t_s.size),
         "ia_a": i + rng.normal(0, 0.004, t_s.size),
     }
+    if temp_degc is not None:
+        columns["temp_winding_degc"] = np.full(t_s.size, temp_degc)
     return campaign_of("current_step", columns, pair="ab", theta_elec_deg=-30.0)
 
 
@@ -325,6 +327,16 @@ def test_the_current_s_own_time_constant() -> None:
     leads = judge("tau_elec_vs_l_over_r", constants(), current_step(LD / (1.08 * R)))
     assert leads.status == "fail"
     assert leads.value == pytest.approx(1.0 / 1.08, abs=0.005)
+
+
+def test_a_warm_winding_without_a_thermometer_is_no_lead() -> None:
+    """At 45 degC a sound winding settles 7 % sooner, which refused its datasheet."""
+    warm = LD / (R * (1.0 + 20.0 / 259.5))
+    assert judge("tau_elec_vs_l_over_r", constants(), current_step(warm, 45.0)).status == "pass"
+    unlogged = judge("tau_elec_vs_l_over_r", constants(), current_step(warm, None))
+    assert unlogged.status == "pass"
+    delta = judge("tau_elec_vs_l_over_r", constants(), current_step(LD / (1.5 * R), None))
+    assert delta.status == "fail"
 
 
 @pytest.mark.parametrize("source_share", [0.05, 0.12, 0.25, 1.0])
