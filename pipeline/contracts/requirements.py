@@ -129,11 +129,12 @@ def requirements(test: str, pair: str | None = None) -> tuple[Requirement, ...]:
     words = f"v{pair}_v and {' or '.join(f'i{p}_a' for p in pair)}" if pair in PAIRS else ""
     anywhere = words or "the voltage and the line current of one terminal pair"
     if test == "resistance":
-        shown = tuple((f"r{one}_ohm", "temp_winding_degc") for one in pairs)
-        ohms = " or ".join(name for name, _ in shown)
-        table = f"{anywhere}, or {ohms} of an ohmmeter with temp_winding_degc"
+        shown = tuple((f"r{one}_ohm",) for one in pairs)
+        table = f"{anywhere}, or {' or '.join(name for (name,) in shown)} of an ohmmeter"
         timed = Requirement((("t_s",), *shown), "t_s")
-        return timed, Requirement((*terminals, *shown), table), *fixed
+        warmth = "temp_winding_degc"
+        known = Requirement((("t_s",), (warmth,)), f"{warmth} beside an ohmmeter's")
+        return timed, Requirement((*terminals, *shown), table), known
     if test == "current_step":
         fixed = (Requirement(terminals, anywhere), *fixed)
     if test == "heat_run":
