@@ -472,19 +472,20 @@ def test_voltages_of_a_drive_at_the_sampling_instant(timing: str) -> None:
 
 
 def test_what_a_held_voltage_may_be_of_the_back_emf() -> None:
+    made = log(timing="centred")
+    made = replace(made, meta=replace(made.meta, pwm_hz=1000.0))
     speed = np.array([300.0, -400.0, 0.0])
     half = 0.5 * 4 * math.sqrt(250_000.0 / 3.0) * 1e-3
     expected = (1.0 / math.cos(half) - 1.0) / math.sqrt(3.0)
-    assert drive_voltage._hold_doubt(log(timing="centred"), speed, 4, 1e-3) == pytest.approx(
-        expected
-    )
+    assert drive_voltage._hold_doubt(made, speed, 4, 1e-3) == pytest.approx(expected)
     assert drive_voltage._hold_doubt(log(), speed, 4, 1e-3) == 0.0
     # without pole pairs one, the least that a motor has
     least = (1.0 / math.cos(half / 4.0) - 1.0) / math.sqrt(3.0)
-    alone = drive_voltage._hold_doubt(log(timing="centred"), speed, None, 1e-3)
+    alone = drive_voltage._hold_doubt(made, speed, None, 1e-3)
     assert alone == pytest.approx(least)
     most = (1.0 / math.cos(1.0) - 1.0) / math.sqrt(3.0)
-    assert drive_voltage._hold_doubt(log(timing="centred"), speed, 4, 1.0) == pytest.approx(most)
+    slow = replace(made, meta=replace(made.meta, pwm_hz=1.0))
+    assert drive_voltage._hold_doubt(slow, speed, 4, 1.0) == pytest.approx(most)
 
 
 def fed(*, ks=0.5, kv=0.02, ka=2e-3, delay=0.0, rows=12000, rate=1000.0, noise=1e-4):
