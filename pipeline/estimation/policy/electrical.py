@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from pipeline.records.policy import chosen, derived
@@ -160,7 +159,7 @@ class Inverter:
         why="a log of every second period is at a half, one of every period at 1",
     )  # fmt: skip
     held_turn_rad: float = derived(
-        math.pi / 3.0, "rad", "electrical turn beyond which no voltage vector is held for a sample",
+        1.0472, "rad", "electrical turn beyond which no voltage vector is held for a sample",
         source="six vectors a turn, the fewest of any inverter (six-step)",
     )  # fmt: skip
 
