@@ -95,12 +95,12 @@ def with_starts(
     before = Standing.of(
         base, np.arange(len(base.columns)), base.normal_equations().best(*thorough)
     )
-    penalty = searched(offered)
     for end in _best_ends(base, offered):
-        name, score = end.trial.candidate.effect.name, _score(base, end, before, significant)
-        known = best.get(name)
+        effect, score = end.trial.candidate.effect, _score(base, end, before, significant)
+        known = best.get(effect.name)
         if known is None or score.fall > known.fall:
-            best[name] = replace(score, penalty=score.penalty + penalty)
+            penalty = score.penalty + searched(offered, effect)
+            best[effect.name] = replace(score, penalty=penalty)
     return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
 
 

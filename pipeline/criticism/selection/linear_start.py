@@ -97,8 +97,9 @@ def with_better(
         The largest fall first.
 
     """
-    name = started.candidate.effect.name
-    started = replace(started, penalty=started.penalty + searched(offered))
+    effect = started.candidate.effect
+    name = effect.name
+    started = replace(started, penalty=started.penalty + searched(offered, effect))
     others = [score for score in scores if score.candidate.effect.name != name]
     known = [score for score in scores if score.candidate.effect.name == name]
     best = max([started, *known], key=lambda score: score.fall)

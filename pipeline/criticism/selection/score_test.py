@@ -249,11 +249,12 @@ def score_all(
     """
     by, policy = _Scoring.of(system, significant), system.policy.selection
     penalty = math.log(float(system.size))
-    search_penalty = searched(offered)
+    searched_of = {c.effect.name: searched(offered, c.effect) for c in offered}
     best: dict[str, tuple[Score, NDArray[np.int64]]] = {}
     for candidate, places in placed(system, offered):
         score = by.score(candidate, places, policy.quick)
-        cost = paid_for(candidate.effect, system.fit.machine, score) * penalty + search_penalty
+        cost = paid_for(candidate.effect, system.fit.machine, score) * penalty
+        cost += searched_of[candidate.effect.name]
         if score is not None and score.fall > policy.quick_penalties * cost:
             score = by.score(candidate, places, policy.thorough)
         known = best.get(candidate.effect.name)
@@ -308,18 +309,21 @@ def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
     )
 
 
-def searched(offered: Sequence[Candidate]) -> float:
-    """What the search over candidates costs a score.
+def searched(offered: Sequence[Candidate], effect: Effect) -> float:
+    """What the search over candidates costs the score of one.
 
     Parameters
     ----------
     offered
         All candidates; one effect at several trial shapes counts once.
+    effect
+        The effect of the candidate.
 
     Returns
     -------
     float
-        2 log p [deviance] of p effects, at least two.
+        2 log (p c) [deviance] of p effects, at least two, and c choices that the effect has: the
+        best of seven recorders whose clock may be off has had seven chances.
 
     References
     ----------
@@ -327,7 +331,14 @@ def searched(offered: Sequence[Candidate]) -> float:
     the number of models of a size, here of one further effect), doi:10.1093/biomet/asn034.
 
     """
-    return 2.0 * math.log(max(len({c.effect.name for c in offered}), 2))
+    choices = {f"{effect.name}.{p.name}" for p in effect.parameters if p.choice}
+    chances = {
+        tuple(sorted((name, c.values[name]) for name in choices & c.values.keys()))
+        for c in offered
+        if c.effect.name == effect.name
+    }
+    effects = max(len({c.effect.name for c in offered}), 2)
+    return 2.0 * math.log(effects * max(len(chances), 1))
 
 
 @dataclass(frozen=True, slots=True)
