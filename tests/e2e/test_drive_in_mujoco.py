@@ -24,7 +24,7 @@ from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.requested_model import fit_of
-from pipeline.criticism.validation.held_out import SPEED, Run, free_run
+from pipeline.criticism.validation.free_run import SPEED, Run, free_run
 from pipeline.execution.tasks.start import start_constants
 from pipeline.records.capture import Capture
 from pipeline.records.comparison import ModelSpec
