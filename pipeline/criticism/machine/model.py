@@ -98,7 +98,6 @@ BASE: tuple[Constant, ...] = (
     Constant("frame_lag_s", "s", "lag of the speed that a drive turns its voltage by", hook="hold"),
     Constant("ripple_torque", "1", "T_s di/dt of the current in the torque", hook="hold"),
     Constant("ripple_held", "1", "(ω_e T_s)², ripple in a held shaft's torque", hook="hold"),
-    Constant("sampled_s", "s", "current's sample before the middle of its pulse", hook="hold"),
     Constant("bench_angle_rad", "rad", "electrical zero of the bench's encoder", hook="bench"),
     Constant("lead_share", "1", "resistance of inverter and leads over the phase's"),
     Constant("zero_alpha_a", "A", "α offset of the shunts", 0.0, "state", "current_a", "zero_a"),

@@ -304,10 +304,6 @@ class Priors:
     ripple_held: float = derived(
         0.08, "(ω_e T_s)²", "ripple in a held shaft's torque", source="as `priors.ripple_edge`"
     )
-    sampled_s: float = chosen(
-        0.5e-6, "s", "time from a current's sample to the middle of its pulse",
-        why="half of a dead time, and of what filters delay; dead times are 0.5 to 2 µs",
-    )  # fmt: skip
     lead_share: float = chosen(
         5e-3, "1", "resistance of inverter and leads over the phase's",
         why="a few milliohm of switches and leads beside a winding of one ohm",

@@ -270,7 +270,7 @@ def _restore(rows: Array, unknown: Sequence[Array]) -> None:
 
 _FINE = 1e-3
 """Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
-_BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held", "sampled_s")
+_BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 
 _OF_SENSORS = ("bench_angle_rad", *STATE)

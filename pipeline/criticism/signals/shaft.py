@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from pipeline.criticism.machine.model import Model, Pieces, air_gap_torque, ripp
 from pipeline.criticism.signals.true_state import ahead_in
 from pipeline.criticism.signals.voltage import central
 
-TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held", "sampled_s")
+TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
 """Nuisances of the current's ripple that are in the torque (`model.BASE`)."""
 
 
@@ -63,16 +62,14 @@ def torque_between(segment: Segment, x: Operating, pieces: Pieces, values: Value
     """Torque [n, N·m] of what current and flux do between samples.
 
     The current moves on for a part of a period; and while a held voltage turns, both are off their
-    means. A pulse that is late has its middle behind the sample. A free shaft responds to
-    sample-period means; a locked shaft's transducer has a nuisance parameter of its own.
+    means. A free shaft responds to sample-period means; a locked shaft's transducer has a
+    nuisance parameter of its own.
     """
     if not any(values[name] for name in TORQUE_RIPPLES):
         return np.zeros(x.theta_rad.size)
     flux, current = ripple(x, values["ripple_held" if x.shaft.held else "ripple_mean"], values)
-    early, sampled = _before_pulse(x, pieces, values)
-    moved = _moved_on(segment, x, values) - current - sampled
-    torque = _torque_of_current(x, pieces, moved)
-    less: Array = 1.5 * x.machine.pole_pairs * (np.conj(flux + early) * x.i_a).imag
+    torque = _torque_of_current(x, pieces, _moved_on(segment, x, values) - current)
+    less: Array = 1.5 * x.machine.pole_pairs * (np.conj(flux) * x.i_a).imag
     return torque - less
 
 
@@ -100,38 +97,6 @@ def _moved_on(segment: Segment, x: Operating, values: Values) -> Complex:
     """
     period = segment.ts_s * segment.size / x.theta_rad.size
     return values["ripple_torque"] * segment.ts_s * central(x.i_a, period)
-
-
-def _before_pulse(x: Operating, pieces: Pieces, values: Values) -> tuple[Complex, Complex]:
-    """Flux [n m, Wb] and current [n m, A] of a sample over their means, which are those at the
-    middle of the pulse.
-
-    Parameters
-    ----------
-    x
-        True state [n m].
-    pieces
-        Flux of the model there.
-    values
-        Parameters by full name; `sampled_s` is the time τ from the sample to that middle.
-
-    Returns
-    -------
-    tuple of array [n m], complex
-        τ (R i + j ω_e ψ) [Wb], and that over L [A].
-
-    Notes
-    -----
-    A drive samples between two pulses, where the winding is shorted. A dead time delays pulses by
-    half of it.
-
-    """
-    omega = x.machine.pole_pairs * x.omega_rad_s
-    volts = values["r_ohm"] * x.i_a + 1j * omega * pieces.psi_wb
-    flux: Complex = values["sampled_s"] * volts
-    # what no capture determines is zero
-    l_d, l_q = values["ld_h"] or math.inf, values["lq_h"] or math.inf
-    return flux, flux.real / l_d + 1j * flux.imag / l_q
 
 
 def _torque_of_current(x: Operating, pieces: Pieces, current: Complex) -> Array:

@@ -28,7 +28,6 @@ BASE = {
     "frame_lag_s": 0.0,
     "ripple_torque": 0.0,
     "ripple_held": 0.0,
-    "sampled_s": 0.0,
     "bench_angle_rad": 0.0,
     "lead_share": 0.0,
     **dict.fromkeys((*STATE, *(one.name for one in BASE if one.hook in ("gain", "log"))), 0.0),
