@@ -13,7 +13,14 @@ from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
 from pipeline.criticism.regression.linearise import effect_columns
-from pipeline.criticism.selection.score_test import Candidate, Score, candidates, score_all, widened
+from pipeline.criticism.selection.score_test import (
+    Candidate,
+    Score,
+    candidates,
+    score_all,
+    searched,
+    widened,
+)
 from pipeline.criticism.selection.stepwise import _floored_anew
 from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, machine, with_drag
 
@@ -149,3 +156,15 @@ def test_floors_are_made_anew_where_undoing_a_lag_brings_noise(lag_s, anew):
     after = _floored_anew(lagging)
     assert (after.sigma is not before.sigma) is anew
     assert bool(after.sigma[0][-1] > 2.0 * before.sigma[0][-1]) is anew
+
+
+def test_the_best_of_several_choices_has_had_as_many_chances():
+    offered = candidates(effects(), Model(machine(), ()))
+    plain, clock = (effects()[name] for name in ("windage", "clock_scale"))
+    recorders = {c.values["clock_scale.of"] for c in offered if c.effect is clock}
+    assert len(recorders) > 1
+    assert searched(offered, plain) == pytest.approx(
+        2.0 * np.log(len({c.effect.name for c in offered}))
+    )
+    more = searched(offered, clock) - searched(offered, plain)
+    assert more == pytest.approx(2.0 * np.log(len(recorders)))
