@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.special import fdtrc
@@ -209,19 +210,10 @@ def _estimates(
     still: Budget,
     known: Constants,
 ) -> tuple[Estimate, ...]:
-    used = {p.capture.path: p.capture for p in points}.values()
-    gains = instrument_uncertainties(used, ("current", "torque")) | magnet_uncertainties(used)
-
-    def values(shift: Mapping[str, float]) -> Array:
-        shifted = [p.shifted(shift) for p in points]
-        again = _regress(shifted, alpha + shift.get(SOURCE, 0.0), chosen)
-        bent = _slope(shifted, alpha + shift.get(SOURCE, 0.0), chosen, again)
-        return np.array([bent.kt_nm_a, _reluctance(again), *_drag(points, again)[0]])
-
+    used = list({p.capture.path: p.capture for p in points}.values())
     slope_k = _slope(points, alpha, chosen, model)
-    type_b = contributions(values, gains)
-    slope = float((values({SOURCE: 1e-4}) - values({}))[0]) / 1e-4
-    type_b[0] += propagate([(slope, alpha_parts)])
+    type_b = _type_b(points, chosen, alpha, instrument_uncertainties(used, ("current", "torque")))
+    type_b[0] += propagate([(_per_alpha(points, chosen, alpha), alpha_parts)])
     type_b[0] += [Contribution("assumed:torque_form", slope_k.form_nm_a, "B"), *still]
     if not _d_logged(points):
         share = policy().torque_map.unlogged_d_share
@@ -244,7 +236,7 @@ def _estimates(
         why = f"d current did not vary enough to show reluctance torque; {EXPERIMENT}"
         found.append(METHOD.missing(GIVES[1], why))
     drag, covariance, dof, why = _drag(points, model)
-    type_b[3] += sampling_drag([*used], slope_k.kt_nm_a, known)
+    type_b[3] += sampling_drag(used, slope_k.kt_nm_a, known)
     if why:
         return (*found, *(METHOD.missing(name, why) for name in DRAG))
     for index, name in enumerate(DRAG):
@@ -252,6 +244,30 @@ def _estimates(
         parts = [*type_b[2 + index], *_untested_form(points, model, index)]
         found.append(estimate(name, float(drag[index]), u_drag, dof, parts))
     return tuple(found)
+
+
+def _values(
+    points: Sequence[Point], chosen: Sequence[str], alpha: float, shift: Mapping[str, float]
+) -> Array:
+    """K, K_rel and both drags [4] with gains and the magnet's coefficient shifted by so much."""
+    shifted, alpha = [p.shifted(shift) for p in points], alpha + shift.get(SOURCE, 0.0)
+    again = _regress(shifted, alpha, chosen)
+    bent = _slope(shifted, alpha, chosen, again)
+    return np.array([bent.kt_nm_a, _reluctance(again), *_drag(points, again)[0]])
+
+
+def _type_b(
+    points: Sequence[Point], chosen: Sequence[str], alpha: float, gains: Mapping[str, float]
+) -> list[list[Contribution]]:
+    """What instruments and the magnet's temperature do to K, K_rel and both drags."""
+    magnet = magnet_uncertainties({p.capture.path: p.capture for p in points}.values())
+    return contributions(partial(_values, points, chosen, alpha), {**gains, **magnet})
+
+
+def _per_alpha(points: Sequence[Point], chosen: Sequence[str], alpha: float) -> float:
+    """Change of K by the magnet's coefficient [N·m K/A]."""
+    step = _values(points, chosen, alpha, {SOURCE: 1e-4}) - _values(points, chosen, alpha, {})
+    return float(step[0]) / 1e-4
 
 
 def _drag(points: Sequence[Point], model: Regression) -> tuple[Array, Array, int, str]:
