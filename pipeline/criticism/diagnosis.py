@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from scipy.special import gammaincc
 
@@ -208,8 +209,8 @@ def _records(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> tuple[Step
     """The steps for people, each with the signature of what came with it."""
     records = [step_record(step, one) for step, one in zip(steps, held, strict=True)]
     signatures = [
-        signature((steps[n - 1], steps[n]), (records[n - 1], records[n]))
-        for n in range(1, len(records))
+        signature(after.system, sorted({*after.added} - {*before.added}), record.maps)
+        for (before, after), record in zip(pairwise(steps), records[1:], strict=True)
     ]
     return tuple(
         replace(one, signature=shown)

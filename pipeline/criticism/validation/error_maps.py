@@ -319,9 +319,11 @@ def _turns(segment: Segment) -> bool:
 
 
 def _mechanical_cells(model: Model) -> int:
-    """Four cells a wave of the highest order that a slow turn is looked at in."""
+    """Four cells a wave of the highest order that a slow turn is looked at in, and one more: every
+    wave then meets the cells at other phases, and all together show its shape.
+    """
     highest = math.ceil(max(slow_orders(model.machine), default=1))
-    return min(max(4 * highest, 72), model.policy.validation.most_angle_cells)
+    return min(max(4 * highest, 72), model.policy.validation.most_angle_cells) + 1
 
 
 def _by_angle(

@@ -8,7 +8,7 @@ which the change of the error is largest beside what is left of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,17 +16,18 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array
-from pipeline.criticism.selection.stepwise import LadderStep
-from pipeline.criticism.validation.error_maps import Errors, window_errors
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
+from pipeline.criticism.validation.error_maps import Errors, angle_maps, window_errors
 from pipeline.physics.glossary import unit_of
 from pipeline.physics.units import TURN_RAD
-from pipeline.records.diagnosis import Signature, StepRecord
+from pipeline.records.diagnosis import Signature
 from pipeline.records.error_map import ErrorMap
 
 _CELLS, _FEWEST = 48, 6
 """Cells of a curve, and the fewest that make one. By judgement, for people to look at."""
-_MANY_WAVES, _FINE = 6, 72
-"""Waves a turn from which on they are laid over each other, and cells of one wave."""
+_MANY_WAVES, _FINE, _FEWEST_PHASES = 6, 72, 12
+"""Waves a turn from which on they are laid over each other, cells of one wave, and the fewest in
+which its shape is seen."""
 _VARIABLES = (
     "omega_mech_rad_s",
     "iq_a",
@@ -66,30 +67,42 @@ class _Curve:
 
 
 def signature(
-    steps: tuple[LadderStep, LadderStep], records: tuple[StepRecord, StepRecord]
+    whole: LinearSystem, added: Sequence[str], maps: Sequence[ErrorMap]
 ) -> Signature | None:
-    """The curve in which two neighbouring steps differ most clearly; None where none has cells.
+    """The curve in which effects show most clearly; None where none has cells.
 
     Parameters
     ----------
-    steps : pair of LadderStep
-        Without and with what came.
-    records : pair of StepRecord
-        The same steps as records, whose maps over the angle of a turn are candidates too.
+    whole : LinearSystem
+        The fit with the effects.
+    added : sequence of str
+        Names of the effects.
+    maps : sequence of ErrorMap
+        Its errors over the angle of a turn.
 
     Returns
     -------
     Signature
         An error of acceleration is reported as torque, by the inertia that was fitted.
 
+    Notes
+    -----
+    Without the effects, every other parameter stays as it is. Fitted anew, the others would bend
+    towards what is missing, and its shape would be lost.
+
+    References
+    ----------
+    Component-plus-residual plots: F. S. Wood, Technometrics 15 (1973) 677-695.
+
     """
-    curves = [*_window_curves(steps), *_turn_curves(records)]
+    bare = linear_system(whole.fit.without(*added))
+    curves = [*_window_curves(bare, whole), *_turn_curves(angle_maps(bare.fit), maps)]
     if not curves:
         return None
     best = max(curves, key=lambda one: one.contrast)
     scale, signal = 1.0, best.signal
     if signal == _ACCELERATION:
-        scale, signal = steps[1].fit.values["j_kgm2"], _TORQUE
+        scale, signal = whole.fit.values["j_kgm2"], _TORQUE
     return Signature(
         signal,
         unit_of(signal),
@@ -102,19 +115,16 @@ def signature(
     )
 
 
-def _window_curves(steps: tuple[LadderStep, LadderStep]) -> Iterator[_Curve]:
+def _window_curves(bare: LinearSystem, whole: LinearSystem) -> Iterator[_Curve]:
     """Window errors of every signal of every capture over every variable that was recorded."""
-    by_step = [
-        {one.signal: one for one in window_errors(step.system, step.system.residual)}
-        for step in steps
-    ]
-    for signal, before in by_step[0].items():
-        after = by_step[1].get(signal)
+    with_it = {one.signal: one for one in window_errors(whole, whole.residual)}
+    for before in window_errors(bare, bare.residual):
+        after = with_it.get(before.signal)
         if after is None or after.error.size != before.error.size:
             continue
         for number in np.unique(before.segment).tolist():
             in_segment = before.segment == number
-            yield from _of_capture(steps[0].system.segments[number], before, after, in_segment)
+            yield from _of_capture(bare.segments[number], before, after, in_segment)
 
 
 def _of_capture(
@@ -182,12 +192,12 @@ def _cells(variable: str, value: Array) -> tuple[NDArray[np.int64], Array]:
     return np.where(fine, cell, -1).astype(np.int64), (edges[1:] + edges[:-1]) / 2.0
 
 
-def _turn_curves(records: tuple[StepRecord, StepRecord]) -> Iterator[_Curve]:
+def _turn_curves(without: Sequence[ErrorMap], with_it: Sequence[ErrorMap]) -> Iterator[_Curve]:
     """The maps over the angle of a turn, sample by sample, of all captures together."""
-    after = {_key(one): one for one in records[1].maps if one.y is None}
-    for one in records[0].maps:
+    after = {_key(one): one for one in with_it if one.y is None}
+    for one in without:
         other = after.get(_key(one))
-        if one.y is not None or other is None or one.x != other.x:
+        if other is None or one.x != other.x:
             continue
         seen = np.isfinite(one.mean) & np.isfinite(other.mean)
         if seen.sum() < _FEWEST:
@@ -221,7 +231,7 @@ def _folded(curve: _Curve, cells: int) -> _Curve | None:
     phase = np.mod(order * curve.at, TURN_RAD)
     _, cell = np.unique(np.round(phase / TURN_RAD * _FINE) % _FINE, return_inverse=True)
     count: Array = np.bincount(cell, curve.count).astype(np.float64)
-    if np.count_nonzero(count) < _FEWEST:
+    if np.count_nonzero(count) < _FEWEST_PHASES:
         return None
 
     def mean(values: Array) -> Array:

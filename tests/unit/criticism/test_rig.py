@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.criticism.comparison import compare
@@ -40,8 +41,11 @@ def test_what_is_hidden_is_named_exactly(name):
         told = {effect: (s.signal, s.variable) for effect, s in shown.items() if s is not None}
         assert told == {
             "angle_eccentricity": ("vd_v", "theta_mech_rad"),
-            "stribeck": ("torque_shaft_nm", "omega_mech_rad_s"),
+            "stribeck": ("torque_nm", "omega_mech_rad_s"),
         }
+        bump = shown["stribeck"]
+        fast = np.abs(bump.at) > 4.0 * truth(name)["sizes"]["ws"]
+        assert np.abs(bump.before).max() > 20.0 * np.abs(np.array(bump.before)[fast]).max()
 
 
 @pytest.mark.slow
