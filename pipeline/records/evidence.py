@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -25,6 +25,8 @@ class Series:
         [n, unit of the plot's `y_name`].
     fitted
         [n], or empty where there is no fit.
+    before
+        [n], what an earlier fit made; empty where there was none.
 
     """
 
@@ -32,6 +34,7 @@ class Series:
     x: NDArray[np.float64]
     measured: NDArray[np.float64]
     fitted: NDArray[np.float64]
+    before: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,12 @@ from pipeline.physics.notation import quantity
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.charts.axis import Axis, axis_for, padded, symmetric_axis
 from pipeline.report.charts.band import filled, outlined
-from pipeline.report.charts.residual import ResidualScale, residual_of, residual_scale
+from pipeline.report.charts.residual import (
+    ResidualScale,
+    residual_before,
+    residual_of,
+    residual_scale,
+)
 from pipeline.report.charts.ticks import x_ticks, y_ticks
 
 Array = NDArray[np.float64]
@@ -99,7 +104,7 @@ def chart(evidence: Evidence) -> str:
 
 def _ranges(evidence: Evidence) -> tuple[tuple[float, float], tuple[float, float]] | None:
     xs = _finite(one.x for one in evidence.series)
-    ys = _finite(y for one in evidence.series for y in (one.measured, one.fitted))
+    ys = _finite(y for one in evidence.series for y in (one.measured, one.fitted, one.before))
     if xs.size == 0 or ys.size == 0:
         return None
     x_range = float(xs.min()), float(xs.max())
@@ -130,7 +135,8 @@ def _reach(evidence: Evidence, scale: ResidualScale) -> float:
     """Half the height of the residual's axis: all of it, but for one sample in a hundred at most
     that lies far out; those are drawn at the edge.
     """
-    sizes = np.abs(_finite(residual_of(one) for one in evidence.series))
+    both = (of(one) for one in evidence.series for of in (residual_of, residual_before))
+    sizes = np.abs(_finite(both))
     largest, usual = float(sizes.max()), FAR_OUT * float(np.median(sizes))
     outside = int(np.count_nonzero(sizes > usual))
     if usual > 0.0 and outside <= 0.01 * sizes.size and largest > 2.0 * usual:
@@ -146,6 +152,9 @@ def _main_marks(evidence: Evidence, panel: Panel) -> Iterator[str]:
         yield _drawn(css, evidence, panel, one, one.measured, index)
     draw = _bar_caps if evidence.kind == "bars" else _fit_line
     for index, one in enumerate(evidence.series):
+        if one.before.size:
+            marks = _fit_line(panel, one.x, one.before, index, len(evidence.series))
+            yield _path("before", marks, one.label)
         if one.fitted.size:
             order = np.argsort(one.x, kind="stable") if evidence.kind == "scatter" else slice(None)
             marks = draw(panel, one.x[order], one.fitted[order], index, len(evidence.series))
@@ -162,12 +171,13 @@ def _residual_marks(evidence: Evidence, panel: Panel, scale: ResidualScale) -> I
             f'width="{right - left:.1f}" height="{bottom - top:.1f}"/>'
         )
     reach, beyond = panel.y.high, 0
-    for index, one in enumerate(evidence.series):
-        residual = residual_of(one)
-        if residual.size:
-            beyond += int(np.count_nonzero(np.abs(residual) > reach))
-            inside = np.clip(residual, -reach, reach)
-            yield _drawn("residual", evidence, panel, one, inside, index)
+    for css, of in (("residual before", residual_before), ("residual", residual_of)):
+        for index, one in enumerate(evidence.series):
+            residual = of(one)
+            if residual.size:
+                beyond += int(np.count_nonzero(np.abs(residual) > reach))
+                inside = np.clip(residual, -reach, reach)
+                yield _drawn(css, evidence, panel, one, inside, index)
     if scale.noise is not None:
         lines = "".join(f"M{left:.1f} {y:.1f}H{right:.1f}" for y in (top, bottom))
         yield f'<path class="noise" d="{lines}"/>'

@@ -43,10 +43,26 @@ def residual_of(series: Series) -> Array:
         Measured and fitted samples.
 
     """
-    if series.fitted.size == 0:
+    return _less(series.measured, series.fitted)
+
+
+def residual_before(series: Series) -> Array:
+    """What an earlier fit left over [n]; empty where there was none.
+
+    Parameters
+    ----------
+    series
+        Measured and fitted samples.
+
+    """
+    return _less(series.measured, series.before)
+
+
+def _less(measured: Array, fitted: Array) -> Array:
+    if fitted.size == 0:
         return np.empty(0)
     with np.errstate(invalid="ignore"):
-        return np.asarray(series.measured - series.fitted, dtype=np.float64)
+        return np.asarray(measured - fitted, dtype=np.float64)
 
 
 def residual_scale(series: Iterable[Series]) -> ResidualScale | None:

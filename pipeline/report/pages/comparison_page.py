@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from pipeline.records.comparison import Comparison, Trace
 from pipeline.records.comparison_history import Earlier
 from pipeline.records.error_map import ErrorMap
@@ -82,8 +84,10 @@ def _axes(error_map: ErrorMap) -> tuple[str, ...]:
 
 
 def _worst_traces(result: Comparison) -> list[Trace]:
-    """Of each signal and kind the trace of the capture that is farthest over its floor."""
-    ratios = {(e.signal, e.kind, e.capture): ratio_of(e) for e in result.errors}
+    """Of each signal and kind the trace of the capture that is farthest over its floor: without
+    what was added, where anything was.
+    """
+    ratios = {(e.signal, e.kind, e.capture): ratio_of(e) for e in (*result.errors, *result.before)}
     worst: dict[tuple[str, str], Trace] = {}
     for one in result.traces:
         key = (one.signal, one.kind)
@@ -98,7 +102,8 @@ def _ratio(trace: Trace, ratios: Mapping[Any, float]) -> float:
 
 
 def _trace(trace: Trace) -> Figure:
-    series = (Series("", trace.t_s, trace.measured, trace.model),)
+    before = np.empty(0) if trace.before is None else trace.before
+    series = (Series("", trace.t_s, trace.measured, trace.model, before),)
     drawn = Evidence(
         "", quantity_words(trace.signal), "t_s", trace.signal, "line", series, trace.capture
     )

@@ -282,3 +282,17 @@ def test_one_sample_far_out_does_not_flatten_the_residual() -> None:
     assert np.percentile(ys, 95) - np.percentile(ys, 5) > 15.0
     noise[::25] = 5.0
     assert "beyond" not in chart(one), "one in twenty-five is no outlier"
+
+
+def test_what_an_earlier_fit_made_is_drawn_with_what_it_left() -> None:
+    """The residual's axis holds both, so that the fall is seen."""
+    x = np.linspace(0.0, 1.0, 201)
+    measured = np.sin(6.0 * x)
+    now = Series("", x, measured, measured - 0.001 * np.sin(300.0 * x), measured - 0.1)
+    svg = drawing(replace(one(x, measured), series=(now,)))
+    lines = {p.get("class"): p for p in svg.iter("path") if "before" in p.get("class", "").split()}
+    assert set(lines) == {"before", "residual before curve"}
+    below = points(svg, "residual")
+    assert np.ptp(below[:, 1]) > 20.0, "a tenth of an ampere is far from zero"
+    alone = drawing(one(x, measured, measured - 0.001 * np.sin(300.0 * x)))
+    assert not points(alone, "before").size

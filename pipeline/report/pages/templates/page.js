@@ -12,7 +12,7 @@ for (const svg of document.querySelectorAll("svg.chart")) {
     const points = (d) => [...d.matchAll(/[ML]([-\d.]+) ([-\d.]+)/g)].map((m) => [+m[1], +m[2]]);
     curves = [...svg.querySelectorAll("path[data-label]:not(.residual):not(.bars):not(.caps)")].map(
       (path) => ({
-        name: [path.dataset.label, path.classList.contains("fitted") ? "fitted" : "measured"]
+        name: [path.dataset.label, ["fitted", "before"].find((css) => path.classList.contains(css)) || "measured"]
           .filter(Boolean)
           .join(" "),
         points: points(path.getAttribute("d")),
