@@ -45,7 +45,7 @@ ARITHMETIC = {
     "regression/parallel.py": {"_THREADS"},  # how work is run
     "validation/free_run.py": {"_SEED"},
     # cells of a picture, when its waves are laid over each other; a turn
-    "validation/signature.py": {"_CELLS", "_FEWEST", "_MANY_WAVES", "_FINE"},
+    "validation/signature.py": {"_CELLS", "_FEWEST", "_MANY_WAVES", "_FINE", "_FEWEST_PHASES"},
     "validation/trajectories.py": {"_PAD", "_START_S", "_PROBE"},  # samples kept; differences
     "data/clocks.py": {"_REACH"},  # a cubic goes through four samples
     "data/segment.py": {"PAIR_RAD"},  # a turn
