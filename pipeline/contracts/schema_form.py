@@ -1,91 +1,42 @@
-"""The words of JSON Schema: objects, lists, numbers, and the schema of a record."""
+"""The JSON Schema of a record, from the kinds of its fields."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import is_dataclass
-from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from pipeline.records.plain_form import hints_of
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.records.field_kinds import EXTENSION, Keyword
 
 Schema = dict[str, Any]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-TEXT: Schema = {"type": "string"}
-NAME: Schema = {"type": "string", "minLength": 1}
-NUMBER: Schema = {"type": "number"}
-WHOLE: Schema = {"type": "integer"}
-SPREAD: Schema = {"type": "number", "minimum": 0}
-SHARE: Schema = {"type": "number", "minimum": 0, "maximum": 1}
-COUNT: Schema = {"type": "integer", "minimum": 0}
-SHA256: Schema = {"type": "string", "pattern": "^[0-9a-f]{64}$"}
+ARRAYS: Mapping[Any, Schema] = {
+    NDArray[np.int64]: {"type": "array", "items": {"type": ["integer", "array"]}},
+    NDArray[np.float64]: {"type": "array", "items": {"type": ["number", "null", "array"]}},
+}
+SCALARS: Mapping[Any, str] = {float: "number", int: "integer", str: "string", bool: "boolean"}
 
 
-def or_null(schema: Schema) -> Schema:
-    """A schema, or null.
-
-    Parameters
-    ----------
-    schema
-        The schema.
-
-    """
-    return {"anyOf": [schema, {"type": "null"}]}
-
-
-def one_of(literal: Any) -> Schema:
-    """One of the values of a literal type.
-
-    Parameters
-    ----------
-    literal
-        A `Literal`.
-
-    """
-    return {"enum": list(get_args(literal))}
-
-
-def list_of(items: Schema, **more: Any) -> Schema:
-    """A list of one kind of item.
-
-    Parameters
-    ----------
-    items
-        Schema of an item.
-    **more
-        Further keys, such as `minItems`.
-
-    """
-    return {"type": "array", "items": items, **more}
-
-
-def map_of(values: Schema) -> Schema:
-    """An object of one kind of value under any name.
-
-    Parameters
-    ----------
-    values
-        Schema of a value.
-
-    """
-    return {"type": "object", "additionalProperties": values}
-
-
-def object_of(needed: Mapping[str, Schema], more: Mapping[str, Schema] | None = None) -> Schema:
+def object_of(needed: Mapping[str, Any], more: Mapping[str, Any] | None = None) -> Schema:
     """An object; other keys than those named are allowed.
 
     Parameters
     ----------
     needed
-        Schemas of keys that it must hold.
+        Kinds of keys that it must hold, or their schemas.
     more
-        Schemas of keys that it may hold.
+        Those of keys that it may hold.
 
     """
+    kinds = {**needed, **(more or {})}
     return {
         "type": "object",
-        "properties": {**needed, **(more or {})},
+        "properties": {name: of_kind(kind) for name, kind in kinds.items()},
         "required": sorted(needed),
     }
 
@@ -108,25 +59,93 @@ def document(identity: str, words: str, body: Schema) -> Schema:
     return {"$schema": DIALECT, "$id": f"urn:{identity}", "title": words, **body}
 
 
+def list_of(items: Schema) -> Schema:
+    """A list of one kind of item.
+
+    Parameters
+    ----------
+    items
+        Schema of an item.
+
+    """
+    return {"type": "array", "items": items}
+
+
+def map_of(values: Schema) -> Schema:
+    """An object of one kind of value under any name.
+
+    Parameters
+    ----------
+    values
+        Schema of a value.
+
+    """
+    return {"type": "object", "additionalProperties": values}
+
+
+def of_record(record: type, *, without: Sequence[str] = (), **changed: Any) -> Schema:
+    """The schema of a record: every field is a needed key, save an `Extension`.
+
+    Parameters
+    ----------
+    record
+        A dataclass or a named tuple.
+    without
+        Fields that are not written.
+    **changed
+        Kinds or schemas of keys that its JSON form has beside its fields, or unlike them.
+
+    """
+    hints = get_type_hints(record, include_extras=True)
+    kinds = {name: kind for name, kind in hints.items() if name not in without} | changed
+    more = {name: kind for name, kind in kinds.items() if EXTENSION in _marks(kind)}
+    return object_of({name: kind for name, kind in kinds.items() if name not in more}, more)
+
+
 def of_kind(kind: Any) -> Schema:
     """The schema of a field of a record.
 
     Parameters
     ----------
     kind
-        Its type: a record, a tuple, a mapping, a literal, a scalar, or one of these or None.
+        Its type: a record, a tuple, a mapping, a literal, an array, a scalar, or several of these;
+        a schema is its own.
 
     """
+    if isinstance(kind, dict):
+        return kind
     origin, inner = get_origin(kind), get_args(kind)
-    if is_dataclass(kind) and isinstance(kind, type):
-        return object_of({name: of_kind(hint) for name, hint in hints_of(kind).items()})
-    if origin in (Union, UnionType):
-        (one,) = (part for part in inner if part is not type(None))
-        return or_null(of_kind(one))
-    if origin is tuple:
-        return list_of(of_kind(inner[0]))
-    if origin is Mapping:
-        return map_of(of_kind(inner[1]))
-    if origin is Literal:
-        return one_of(kind)
-    return {float: NUMBER, int: WHOLE, str: TEXT, bool: {"type": "boolean"}}[kind]
+    if origin is Annotated:
+        keywords = [mark for mark in _marks(kind) if isinstance(mark, Keyword)]
+        return of_kind(inner[0]) | {word.name: word.value for word in keywords}
+    if origin in FORMS:
+        return FORMS[origin](inner)
+    if is_dataclass(kind) or hasattr(kind, "_fields"):
+        return of_record(kind)
+    return ARRAYS.get(kind) or {"type": SCALARS[kind]}
+
+
+def _marks(kind: Any) -> tuple[Any, ...]:
+    return kind.__metadata__ if get_origin(kind) is Annotated else ()
+
+
+def _any_of(kinds: tuple[Any, ...]) -> Schema:
+    """One of several kinds; a whole number is a number."""
+    kinds = tuple(kind for kind in kinds if kind is not int or float not in kinds)
+    schemas = [{"type": "null"} if kind is NoneType else of_kind(kind) for kind in kinds]
+    return schemas[0] if len(schemas) == 1 else {"anyOf": schemas}
+
+
+def _tuple(kinds: tuple[Any, ...]) -> Schema:
+    """A list of one kind of item, of any length or of one."""
+    length = {} if kinds[-1] is Ellipsis else {"minItems": len(kinds), "maxItems": len(kinds)}
+    return list_of(of_kind(kinds[0])) | length
+
+
+FORMS: Mapping[Any, Callable[[tuple[Any, ...]], Schema]] = {
+    Union: _any_of,
+    UnionType: _any_of,
+    tuple: _tuple,
+    Mapping: lambda kinds: map_of(of_kind(kinds[1])),
+    Literal: lambda kinds: {"enum": list(kinds)},
+}

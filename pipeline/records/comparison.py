@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from pipeline.records.error_map import Array, ErrorMap
+from pipeline.records.field_kinds import Count, Extension, Name, Share, Spread
 from pipeline.records.plain_form import PlainRecord, plain_of
 from pipeline.records.policy import Overrides
 
-SIGNALS = (
-    "vd_v",
-    "vq_v",
-    "torque_shaft_nm",
-    "omega_mech_rad_s",
-    "iq_a",
-    "psi_d_wb",
-    "psi_q_wb",
-)
+Signal = Literal[
+    "vd_v", "vq_v", "torque_shaft_nm", "omega_mech_rad_s", "iq_a", "psi_d_wb", "psi_q_wb"
+]
+SIGNALS: tuple[str, ...] = get_args(Signal)
+Split = Literal["fit", "held_out"]
+ParameterStatus = Literal["measured", "stated", "not_identifiable"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +63,8 @@ class ModelParameter(PlainRecord):
     """
 
     value: float | None
-    u: float | None
-    unit: str
+    u: Spread | None
+    unit: Name
     at_bound: bool = False
     stated: bool = False
 
@@ -76,7 +74,7 @@ class ModelParameter(PlainRecord):
         return self.value is not None
 
     @property
-    def status(self) -> Literal["measured", "stated", "not_identifiable"]:
+    def status(self) -> ParameterStatus:
         """As in a datasheet."""
         if not self.known:
             return "not_identifiable"
@@ -99,11 +97,11 @@ class KnownCombination(PlainRecord):
     its standard uncertainty [unit]. `of` are the parameters in it.
     """
 
-    expression: str
+    expression: Name
     value: float
-    u: float
-    unit: str
-    of: tuple[str, ...]
+    u: Spread
+    unit: Name
+    of: tuple[Name, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,15 +155,15 @@ class SignalError(PlainRecord):
 
     """
 
-    signal: str
-    capture: str
-    split: Literal["fit", "held_out"]
-    rmse: float
-    noise_floor: float
-    n: int
-    n_eff: float
-    unit: str = ""
-    kind: Literal["equation", "free_run"] = "equation"
+    signal: Name
+    capture: Name
+    split: Split
+    rmse: Spread
+    noise_floor: Spread
+    n: Count
+    n_eff: Spread
+    unit: Extension[str] = ""
+    kind: Extension[Literal["equation", "free_run"]] = "equation"
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,10 +173,10 @@ class Dependence(PlainRecord):
     `p_value` is None where there are too few stretches of record.
     """
 
-    signal: str
-    variable: str
-    explained: float
-    p_value: float | None
+    signal: Name
+    variable: Name
+    explained: Share
+    p_value: Share | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +190,7 @@ class Trace:
     capture: str
     signal: str
     kind: Literal["equation", "free_run"]
-    split: Literal["fit", "held_out"]
+    split: Split
     t_s: Array
     measured: Array
     model: Array

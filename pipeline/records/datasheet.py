@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from pipeline.records.capture import Integrity
 from pipeline.records.estimate import Estimate
+from pipeline.records.field_kinds import Extension, Name, Sha256
 from pipeline.records.model_verdict import MODEL_REASON, ModelVerdict
 from pipeline.records.plain_form import PlainRecord, plain_of
 
@@ -56,12 +58,12 @@ class Check(PlainRecord):
 
     """
 
-    name: str
+    name: Name
     status: CheckStatus
     meaning: str
     value: float | None = None
     limit: float | None = None
-    unit: str = "1"
+    unit: Name = "1"
     suspect: str | None = None
 
 
@@ -88,20 +90,20 @@ class CaptureReference(PlainRecord):
 
     """
 
-    path: str
-    sha256: str
-    test: str
-    integrity: str
-    station: str | None = None
-    started_at: str | None = None
-    read_sha256: str | None = None
+    path: Name
+    sha256: Sha256
+    test: Name
+    integrity: Integrity
+    station: Extension[str | None] = None
+    started_at: Extension[str | None] = None
+    read_sha256: Extension[Sha256 | None] = None
 
 
 @dataclass(frozen=True, slots=True)
 class Superseded(PlainRecord):
     """The revoked version of the same work whose place a datasheet takes: by whom and why."""
 
-    version: str
+    version: Sha256
     by: str
     why: str
 

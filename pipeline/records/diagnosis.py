@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 from pipeline.records.comparison import KnownCombination
 from pipeline.records.error_map import ErrorMap, Histogram
+from pipeline.records.field_kinds import Extension, Name, Share, Spread
 from pipeline.records.plain_form import PlainRecord, plain_fields
 
 Verdict = Literal["adequate", "missing", "unknown", "insufficient"]
@@ -19,8 +20,8 @@ class ReportedParameter(NamedTuple):
     """
 
     value: float | None
-    u: float | None
-    unit: str
+    u: Spread | None
+    unit: Name
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,18 +75,18 @@ class RankedEffect(PlainRecord):
 
     """
 
-    effect: str
+    effect: Name
     score: float
     held_out_drop: float
-    p_value: float
-    confused_with: tuple[str, ...]
+    p_value: Share
+    confused_with: tuple[Name, ...]
     explanation: str
     experiment: str
-    parameters: Mapping[str, ReportedParameter]
-    separation: tuple[Separation, ...] = ()
-    size: float | None = None
-    shortfall: str = ""
-    headline: str = ""
+    parameters: Extension[Mapping[str, ReportedParameter]]
+    separation: Extension[tuple[Separation, ...]] = ()
+    size: Extension[float | None] = None
+    shortfall: Extension[str] = ""
+    headline: Extension[str] = ""
 
     @property
     def slight(self) -> bool:
@@ -97,8 +98,8 @@ class RankedEffect(PlainRecord):
 class StepError(PlainRecord):
     """Held-out error of one signal's window means beside their noise floor [unit]."""
 
-    rmse: float
-    noise_floor: float
+    rmse: Spread
+    noise_floor: Spread
     unit: str
 
 
@@ -162,14 +163,14 @@ class StepRecord(PlainRecord):
 
     """
 
-    effects: tuple[str, ...]
-    held_out: float
-    signals: Mapping[str, float]
-    errors: Mapping[str, StepError] = field(default_factory=dict)
-    parameters: Mapping[str, ReportedParameter] = field(default_factory=dict)
-    maps: tuple[ErrorMap, ...] = field(default=())
-    histograms: tuple[Histogram, ...] = field(default=())
-    signature: Signature | None = None
+    effects: tuple[Name, ...]
+    held_out: Spread
+    signals: Mapping[str, Spread]
+    errors: Extension[Mapping[str, StepError]] = field(default_factory=dict)
+    parameters: Extension[Mapping[str, ReportedParameter]] = field(default_factory=dict)
+    maps: Extension[tuple[ErrorMap, ...]] = field(default=())
+    histograms: Extension[tuple[Histogram, ...]] = field(default=())
+    signature: Extension[Signature | None] = None
 
     def map_of(self, signal: str, *variables: str) -> ErrorMap | None:
         """The error map of a signal over one or two variables.
@@ -221,9 +222,9 @@ class CurvePoint(PlainRecord):
 class SketchTerm(NamedTuple):
     """A term of an unknown structure, and its coefficient [unit]."""
 
-    term: str
+    term: Name
     coefficient: float
-    unit: str
+    unit: Name
 
 
 class AlternativeVariables(NamedTuple):
@@ -260,16 +261,16 @@ class UnknownStructure(PlainRecord):
 
     """
 
-    signal: str
-    variables: tuple[str, ...]
+    signal: Name
+    variables: tuple[Name, ...]
     shape: str
     sketch: tuple[SketchTerm, ...]
-    expression: str = ""
-    curve: tuple[CurvePoint, ...] = ()
-    times: str = ""
-    alternatives: tuple[AlternativeVariables, ...] = ()
-    effect: str = ""
-    source: str = ""
+    expression: Extension[str] = ""
+    curve: Extension[tuple[CurvePoint, ...]] = ()
+    times: Extension[str] = ""
+    alternatives: Extension[tuple[AlternativeVariables, ...]] = ()
+    effect: Extension[str] = ""
+    source: Extension[str] = ""
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`; `source` has a file of its own."""
@@ -339,19 +340,19 @@ class Diagnosis(PlainRecord):
 
     """
 
-    motor_id: str
+    motor_id: Name
     model: str
     verdict: Verdict
-    missing: tuple[str, ...]
+    missing: tuple[Name, ...]
     ranking: tuple[RankedEffect, ...]
     ladder: tuple[StepRecord, ...]
     unknown: UnknownStructure | None
-    remainder: tuple[Remainder, ...]
-    notes: tuple[str, ...]
-    unexcited: tuple[Unexcited, ...] = ()
-    asked: tuple[str, ...] = ()
-    combinations: tuple[KnownCombination, ...] = ()
-    policy: str = ""
+    remainder: Extension[tuple[Remainder, ...]]
+    notes: Extension[tuple[str, ...]]
+    unexcited: Extension[tuple[Unexcited, ...]] = ()
+    asked: Extension[tuple[Name, ...]] = ()
+    combinations: Extension[tuple[KnownCombination, ...]] = ()
+    policy: Extension[str] = ""
 
     @property
     def whole_model(self) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.records.field_kinds import Keyword, Name, Share, ShareOrNull
 from pipeline.records.plain_form import PlainRecord
 
 Array = NDArray[np.float64]
@@ -27,8 +28,8 @@ class Bins(PlainRecord):
 
     """
 
-    variable: str
-    edges: tuple[float, ...]
+    variable: Name
+    edges: Annotated[tuple[float, ...], Keyword("minItems", 2)]
 
     @property
     def count(self) -> int:
@@ -59,15 +60,15 @@ class ErrorMap(PlainRecord):
 
     """
 
-    signal: str
+    signal: Name
     unit: str
     x: Bins
     y: Bins | None
     count: NDArray[np.int64]
     mean: Array
     p_value: Array
-    explained: float
-    p_map: float
+    explained: Share
+    p_map: ShareOrNull
 
     @property
     def reach(self) -> float:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
+from pipeline.records.field_kinds import Count, Extension, Keyword, Name, Spread
 from pipeline.records.uncertainty import Budget, effective_dof, propagate, standard_uncertainty
 
 Status = Literal["measured", "derived", "assumed", "stated", "not_identifiable"]
@@ -29,9 +30,9 @@ class Order:
 
     """
 
-    order: int
-    amplitude: float
-    u: float
+    order: Count
+    amplitude: Spread
+    u: Spread
     phase_rad: float
 
 
@@ -76,20 +77,20 @@ class Estimate:
 
     """
 
-    name: str
+    name: Name
     value: float | int | None
-    unit: str
+    unit: Name
     status: Status
     method: str
-    budget: Budget = ()
+    budget: Extension[Budget] = ()
     at: Conditions = field(default_factory=dict)
-    captures: tuple[str, ...] = ()
+    captures: tuple[Name, ...] = ()
     note: str = ""
-    bounds: tuple[float, float] | None = None
-    at_bound: bool = False
-    orders: tuple[Order, ...] = ()
+    bounds: Extension[tuple[float, float] | None] = None
+    at_bound: Extension[bool] = False
+    orders: Extension[tuple[Order, ...]] = ()
     impossible: bool = False
-    settled: bool = False
+    settled: Extension[Annotated[bool, Keyword("const", True)]] = False
 
     def __post_init__(self) -> None:
         if (self.value is None) != (self.status == "not_identifiable"):
@@ -119,22 +120,22 @@ class Estimate:
         return float(self.value)
 
     @property
-    def u(self) -> float:
+    def u(self) -> Spread:
         """Combined standard uncertainty (k=1) [unit]."""
         return standard_uncertainty(self.budget)
 
     @property
-    def u_a(self) -> float:
+    def u_a(self) -> Spread:
         """Standard uncertainty from scatter, type A [unit]."""
         return standard_uncertainty(self.budget, "A")
 
     @property
-    def u_b(self) -> float:
+    def u_b(self) -> Spread:
         """Standard uncertainty from instruments and assumptions, type B [unit]."""
         return standard_uncertainty(self.budget, "B")
 
     @property
-    def dof(self) -> float:
+    def dof(self) -> Spread:
         """Effective degrees of freedom of `u`."""
         return effective_dof(self.budget)
 

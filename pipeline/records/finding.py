@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from pipeline.records.errors import CaptureError
+from pipeline.records.field_kinds import Count, Keyword, Name
 from pipeline.records.naming import counted, printable
 from pipeline.records.plain_form import PlainRecord
 
@@ -34,10 +35,10 @@ class Finding(PlainRecord):
 
     file: str
     severity: Severity
-    code: str
-    message: str
+    code: Annotated[str, Keyword("pattern", "^[a-z0-9_]+$")]
+    message: Name
     remedy: str
-    rows: tuple[int, int] | None = None
+    rows: tuple[Count, Count] | None = None
 
     @classmethod
     def refusal(cls, file: str, error: CaptureError) -> Finding:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from pipeline.records.diagnosis import ReportedParameter, Unexcited
+from pipeline.records.field_kinds import Count, Extension, Name, Spread
 from pipeline.records.plain_form import PlainRecord, plain_fields, record_of
 
 ModelState = Literal["adequate", "missing", "unknown", "insufficient", "not_tested"]
@@ -35,11 +36,11 @@ class Excess(PlainRecord):
 
     """
 
-    capture: str
-    signal: str
-    order: float
-    floors: float
-    size: float
+    capture: Name
+    signal: Name
+    order: Spread
+    floors: Spread
+    size: Spread
     unit: str
 
     @property
@@ -67,9 +68,9 @@ class FoundEffect(PlainRecord):
     """
 
     parameters: Parameters
-    headline: str = ""
-    confused_with: tuple[str, ...] = ()
-    experiment: str = ""
+    headline: Extension[str] = ""
+    confused_with: Extension[tuple[Name, ...]] = ()
+    experiment: Extension[str] = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,20 +115,20 @@ class ModelVerdict(PlainRecord):
     """
 
     verdict: ModelState
-    model: str = "standard"
-    effects: tuple[str, ...] = ()
+    model: Extension[Name] = "standard"
+    effects: Extension[tuple[Name, ...]] = ()
     missing: Mapping[str, FoundEffect] = field(default_factory=dict)
-    held_out: float | None = None
-    residual: float | None = None
-    worst: Excess | None = None
-    over: int = 0
-    note: str = ""
-    held_out_with: float | None = None
-    unknown: str = ""
-    unexcited: tuple[Unexcited, ...] = ()
-    fitted: Mapping[str, Parameters] = field(default_factory=dict)
-    scales: Mapping[str, float] = field(default_factory=dict)
-    touches: Mapping[str, str] = field(default_factory=dict)
+    held_out: Spread | None = None
+    residual: Spread | None = None
+    worst: Extension[Excess | None] = None
+    over: Extension[Count] = 0
+    note: Extension[str] = ""
+    held_out_with: Extension[Spread | None] = None
+    unknown: Extension[str] = ""
+    unexcited: Extension[tuple[Unexcited, ...]] = ()
+    fitted: Extension[Mapping[str, Parameters]] = field(default_factory=dict)
+    scales: Extension[Mapping[str, Spread]] = field(default_factory=dict)
+    touches: Extension[Mapping[str, str]] = field(default_factory=dict)
 
     @property
     def sizes(self) -> dict[str, Parameters]:

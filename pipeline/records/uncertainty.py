@@ -14,6 +14,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from pipeline.records.field_kinds import Extension, Name, SpreadOrNull
+
 Kind = Literal["A", "B"]
 
 
@@ -38,10 +40,10 @@ class Contribution:
 
     """
 
-    source: str
+    source: Name
     u: float
     kind: Kind
-    dof: float = math.inf
+    dof: Extension[SpreadOrNull] = math.inf
 
 
 Budget = tuple[Contribution, ...]
