@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import gammainc, gammaincinv
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.effect import Array
@@ -223,6 +224,45 @@ def significantly_nonzero(system: LinearSystem, held: HeldOut, least: float) -> 
         ):
             sure.add(column.name)
     return sure
+
+
+def together_nonzero(
+    system: LinearSystem, held: HeldOut, names: Sequence[str], least: float
+) -> bool:
+    """Whether parameters that are each unsure are not all zero.
+
+    Parameters
+    ----------
+    system
+        Around a fit.
+    held
+        What leaving out captures moves.
+    names
+        The parameters.
+    least
+        Standard uncertainties that one alone must be away from zero; several must exclude zero with
+        the same probability.
+
+    Returns
+    -------
+    bool
+        Of their combination that differs most from zero: of friction and damping of bristles, of
+        which one may stand for the other, the sum may be known a hundred times better than either.
+
+    References
+    ----------
+    Hotelling, Ann. Math. Statist. 2(3), 1931, 360, doi:10.1214/aoms/1177732979.
+
+    """
+    fit = known(system, held)
+    own = [column.name for column in system.columns[: system.model_columns.size]]
+    at = np.array([own.index(name) for name in names if name in own], dtype=int)
+    values = np.array([system.fit.values[own[n]] for n in at])
+    gradient = np.zeros(len(own))
+    covariance = fit.identified.covariance[np.ix_(at, at)]
+    gradient[at] = np.linalg.pinv(covariance, hermitian=True) @ values
+    least = math.sqrt(2.0 * gammaincinv(0.5 * max(at.size, 1), gammainc(0.5, 0.5 * least**2)))
+    return fit.excludes_zero(float(gradient[at] @ values), gradient, least)
 
 
 def _inward(system: LinearSystem) -> Array:

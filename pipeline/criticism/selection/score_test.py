@@ -533,7 +533,7 @@ def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Stan
 
 
 def fall_below_floor(system: LinearSystem, before: Array, after: Array) -> float:
-    """Fall of the deviance in signals without an excess that counts.
+    """Fall of the deviance in signals that at some order have no excess that counts.
 
     Parameters
     ----------
@@ -545,15 +545,10 @@ def fall_below_floor(system: LinearSystem, before: Array, after: Array) -> float
         χ²/n with it [G].
 
     """
-    fall, policy = 0.0, system.policy.selection
-    channel = np.array([name for _, name, _ in system.labels])
-    for name in dict.fromkeys(channel.tolist()):
-        in_channel = channel == name
-        counts = system.counts[in_channel]
-        excess = float(counts @ np.log(np.maximum(before[in_channel], 1.0)))
-        if excess <= min(policy.excess, policy.excess_a_sample * float(counts.sum())):
-            fall += deviance_of(counts, before[in_channel]) - deviance_of(counts, after[in_channel])
-    return fall
+    pool, worth = _pools(system, before)
+    below = ~worth[pool]
+    counts = system.counts[below]
+    return deviance_of(counts, before[below]) - deviance_of(counts, after[below])
 
 
 def power_share(system: LinearSystem, before: Array, after: Array) -> float:
@@ -574,14 +569,21 @@ def power_share(system: LinearSystem, before: Array, after: Array) -> float:
         From 0 to 1; 0 where no signal has an excess that counts.
 
     """
-    numbers: dict[tuple[str, int], int] = {}
-    pool = [numbers.setdefault((name, k), len(numbers)) for _, name, k in system.labels]
-    count = np.bincount(pool, system.counts)
-    nats = np.bincount(pool, system.counts * np.log(np.maximum(before, 1.0)))
+    pool, worth = _pools(system, before)
     had, has = (
         np.bincount(pool, system.counts * np.maximum(reduced_chi2 - 1.0, 0.0))
         for reduced_chi2 in (before, after)
     )
-    policy = system.policy.selection
-    worth = nats > np.minimum(policy.excess, policy.excess_a_sample * count)
     return float((1.0 - has[worth] / had[worth]).max(initial=0.0))
+
+
+def _pools(
+    system: LinearSystem, reduced_chi2: Array
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Which signal at which order each group [G] is of, and of which of them the excess counts."""
+    numbers: dict[tuple[str, int], int] = {}
+    pool = np.array([numbers.setdefault((name, k), len(numbers)) for _, name, k in system.labels])
+    count = np.bincount(pool, system.counts)
+    nats = np.bincount(pool, system.counts * np.log(np.maximum(reduced_chi2, 1.0)))
+    policy = system.policy.selection
+    return pool, nats > np.minimum(policy.excess, policy.excess_a_sample * count)

@@ -20,7 +20,10 @@ from pipeline.criticism.regression.goodness import (
     predicted_chi2,
     significant_groups,
 )
-from pipeline.criticism.regression.identifiability import significantly_nonzero
+from pipeline.criticism.regression.identifiability import (
+    significantly_nonzero,
+    together_nonzero,
+)
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.regression.normal_equations import NormalEquations
@@ -313,14 +316,16 @@ def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np
 
 def _sure(system: LinearSystem) -> bool:
     """Whether some amplitude of the newest effect differs significantly from zero: two standard
-    uncertainties away, whichever capture is left out. Of a coupling, its twist or gap must be so as
-    well, by the fit or by full logs, and full logs must not exclude it.
+    uncertainties away, whichever capture is left out; or all of them together do. Of a coupling,
+    its twist or gap must be so as well, by the fit or by full logs, and full logs must not exclude
+    it.
 
     A counterexample: a drag below the lowest speed of any capture can mend how friction changes
     sense at a reversal, while its own size is not known at all.
     """
     effect = system.fit.model.effects[-1]
-    sure = significantly_nonzero(system, leave_out(system), system.policy.selection.least_u)
+    held = leave_out(system)
+    sure = significantly_nonzero(system, held, system.policy.selection.least_u)
     known = effect.parameters_of(system.fit.machine)
     least, size = system.policy.selection.least_u, partial(system.fit.size, effect)
     nonzero = [p for p in known if f"{effect.name}.{p.name}" in sure or 0.0 < least * p.u < size(p)]
@@ -328,7 +333,9 @@ def _sure(system: LinearSystem) -> bool:
     coupled = effect.discriminator is None or not twists or any(p in nonzero for p in twists)
     seen = discriminate(system.fit, effect) if coupled else None
     excluded = seen is not None and seen.name is None
-    return coupled and not excluded and any(p.amplitude for p in nonzero)
+    amplitudes = [f"{effect.name}.{p.name}" for p in known if p.amplitude]
+    there = any(p.amplitude for p in nonzero) or together_nonzero(system, held, amplitudes, least)
+    return coupled and not excluded and there
 
 
 def _same_hook(effect: Effect, added: Sequence[Effect]) -> list[Effect]:

@@ -209,8 +209,12 @@ def test_torque_comes_from_the_co_energy_of_the_linear_machine():
         ),
         (
             "presliding",
-            {"torque_nm": 0.01, "travel_rad": 0.002},
-            lambda x: -0.02 * np.exp(-x.travel_rad / 0.002) * np.sign(x.omega_rad_s),
+            {"torque_nm": 0.01, "damping_nm": 0.5, "travel_rad": 0.002},
+            lambda x: (
+                2.0
+                * np.exp(-x.travel_rad / 0.002)
+                * (0.5 * x.omega_rad_s / 250.0 - 0.01 * np.sign(x.omega_rad_s))
+            ),
         ),
     ],
 )

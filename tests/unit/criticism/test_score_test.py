@@ -17,6 +17,8 @@ from pipeline.criticism.selection.score_test import (
     Candidate,
     Score,
     candidates,
+    fall_below_floor,
+    power_share,
     score_all,
     searched,
     widened,
@@ -139,6 +141,35 @@ def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
     (score,) = score_all(system, [Candidate(effect, (column,))])
     assert score.fall > score.penalty
     assert score.share == pytest.approx(expected, abs=0.2 * expected)
+
+
+@pytest.mark.parametrize("quiet_chi2", [0.5, 1.2])
+def test_evidence_at_an_order_counts_above_its_floor_or_below_it(quiet_chi2):
+    """A channel is loud at order 1 and all but quiet at order 0, where an effect halves it: what it
+    takes there is below the floor, whatever the other order has.
+    """
+    model = Model(machine(), ())
+    columns = tuple(model_columns(model))
+    before, after = np.array([quiet_chi2, 1000.0]), np.array([0.5 * quiet_chi2, 1000.0])
+    system = LinearSystem(
+        columns=columns,
+        residual=np.repeat(np.sqrt(before), 100),
+        matrix=np.zeros((200, len(columns))),
+        group=np.repeat([0, 1], 100),
+        window=np.tile(np.arange(100), 2),
+        unit=np.ones(200),
+        noise_ratio=np.ones(200),
+        row_weight=np.ones(200),
+        labels=((0, "torque_shaft_nm", 0), (0, "torque_shaft_nm", 1)),
+        prior_precision=np.zeros(len(columns)),
+        prior_gradient=np.zeros(len(columns)),
+        fit=Fit((log(),), model, dict(BASE), (), BASE),
+        model_column_count=len(columns),
+        made_at={},
+    )
+    assert power_share(system, before, after) == 0.0
+    assert fall_below_floor(system, before, after) > 20.0
+    assert fall_below_floor(system, before, np.array([quiet_chi2, 500.0])) == 0.0
 
 
 NO_STAMP = {"torque_lag.late": 0.0, "torque_lag.stamped": 0.0}

@@ -36,11 +36,14 @@ def shaft(theta: np.ndarray):
     )
 
 
-def test_dahls_friction_in_loops_within_loops():
-    """dz/dθ = (1 − z sgn ω)/θ_s, by small Euler steps, over strokes of 0.2 to 5 times θ_s."""
+@pytest.mark.parametrize("damping_nm", [0.0, 0.05])
+def test_friction_of_bristles_in_loops_within_loops(damping_nm):
+    """σ0 z + σ1 dz/dt of dz/dθ = 1 − z sgn ω/θ_s, by small Euler steps, over strokes of 0.2 to 5
+    times θ_s: Dahl's without a damping, LuGre's with one that is as large at full speed.
+    """
     t = np.arange(12000) * TS
     theta = 0.02 * np.sin(20 * t) + 0.004 * np.sin(131 * t) + 0.001 * np.sin(640 * t)
-    q = {"torque_nm": 0.01, "travel_rad": 0.004}
+    q = {"torque_nm": 0.01, "damping_nm": damping_nm, "travel_rad": 0.004}
     x = shaft(theta)
     assert x.shaft.runs_rad.size > 25
     z, found = 1.0, []
@@ -49,7 +52,9 @@ def test_dahls_friction_in_loops_within_loops():
             z += (step - abs(step) * z) / 10 / q["travel_rad"]
         found.append(z)
     told = LIBRARY["presliding"].torque(x, q) + q["torque_nm"] * np.sign(x.omega_rad_s)
-    assert told[1:] == pytest.approx(q["torque_nm"] * np.array(found), abs=2e-4)
+    bristle, omega = np.array(found), x.omega_rad_s[1:]
+    bending = (omega - np.abs(omega) * bristle) / x.machine.scales["speed_rad_s"]
+    assert told[1:] == pytest.approx(0.01 * bristle + damping_nm * bending, abs=2e-4)
 
 
 def test_noise_of_an_encoder_makes_no_reversal():

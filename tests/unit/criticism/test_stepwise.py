@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,28 @@ def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none
     assert steps[0].system.reduced_chi2(steps[0].system.residual).max() < 1.0
     assert steps[-1].added == ("windage",)
     assert search(cautious(none, 3.0), LIBRARY)[-1].added == ()
+
+
+def bristled(torque_nm, damping_nm, travel_rad, seed):
+    """The log with friction of bristles in place of dry friction, after its one reversal."""
+    segment = log(noise=1.0, seed=seed)
+    omega = -60.0 + 400.0 * np.arange(segment.size) * segment.ts_s
+    turned = omega**2 / 800.0
+    lack = np.where(omega > 0.0, 2.0 * np.exp(-turned / travel_rad), 0.0)
+    columns = {**segment.recorded, "travel_rad": np.where(omega > 0.0, turned, np.inf)}
+    columns["torque_shaft_nm"] = columns["torque_shaft_nm"] + lack * (
+        torque_nm - damping_nm * omega / 250.0
+    )
+    return replace(segment, recorded=columns)
+
+
+def test_bristles_with_a_damping_are_named_with_their_sizes():
+    true = {"torque_nm": 0.02, "damping_nm": 1.0, "travel_rad": 0.04}
+    library = {**LIBRARY, "presliding": effects()["presliding"]}
+    last = search(fitted([bristled(**true, seed=seed) for seed in (5, 6)]), library)[-1]
+    assert last.added == ("presliding",)
+    for name, value in true.items():
+        assert last.fit.values[f"presliding.{name}"] == pytest.approx(value, rel=0.03)
 
 
 def test_choices_are_made_again_on_every_step_and_at_the_end_of_what_is_asked_for(monkeypatch):

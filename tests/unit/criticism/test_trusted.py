@@ -14,6 +14,7 @@ from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
+from pipeline.criticism.regression.identifiability import significantly_nonzero, together_nonzero
 from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
 from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.search import Ladder, ladder_from
@@ -202,6 +203,34 @@ def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, s
     held = HeldOut(plain.residual, 1.0, {0: step, 1: -step})
     monkeypatch.setattr("pipeline.criticism.selection.stepwise.leave_out", lambda _: held)
     assert _sure(system) is sure
+
+
+@pytest.mark.parametrize(("damping_nm", "sure"), [(0.1, True), (-0.1, False)])
+def test_amplitudes_that_stand_for_one_another_are_surely_there_together(damping_nm, sure):
+    """Friction and damping of bristles, of which captures know the sum to 0.02 and the difference
+    to 1: neither is known, and both are not zero, unless they are no more than the difference.
+    """
+    plain = missing_by(torque_shaft_nm=1.0).system
+    values = {"torque_nm": 0.1, "damping_nm": damping_nm, "travel_rad": 1e-3}
+    full = {f"presliding.{key}": value for key, value in values.items()}
+    model = Model(machine(), (effects()["presliding"],))
+    fit = Fit((log(),) * 3, model, {**BASE, **full}, (), {})
+    rows = np.zeros((plain.size, 3))
+    rows[0], rows[1], rows[2] = (50.0, 50.0, 0.0), (1.0, -1.0, 0.0), (0.0, 0.0, 1e5)
+    system = replace(
+        plain,
+        columns=tuple(Column(key, 1e-3) for key in full),
+        matrix=rows,
+        prior_precision=np.zeros(3),
+        prior_gradient=np.zeros(3),
+        residual=np.zeros(plain.size),
+        fit=fit,
+        model_column_count=3,
+    )
+    held = HeldOut(plain.residual, 1.0, {0: np.zeros(3), 1: np.zeros(3)})
+    amplitudes = ["presliding.torque_nm", "presliding.damping_nm"]
+    assert not significantly_nonzero(system, held, 2.0) & set(amplitudes)
+    assert together_nonzero(system, held, amplitudes, 2.0) is sure
 
 
 @pytest.mark.parametrize(
