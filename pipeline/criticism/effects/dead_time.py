@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
 from pipeline.criticism.machine.inverter import lost_shares, phases_of, turning, vector_of
 
 
@@ -25,10 +25,33 @@ def _drop(x: Operating, q: Values) -> Complex:
     return rotor + q["on_v"] / x.machine.scales["current_a"] * x.i_a if q["on_v"] else rotor
 
 
+def _sampled(x: Operating, q: Values) -> Complex:
+    """Current [n, A] by which samples exceed their mean.
+
+    A dead time t_d = T V/V_dc makes pulses late by half of it, while a drive samples midway between
+    those that it commands. The winding is shorted there, so that current falls by v/L, v = R i +
+    j ω_e ψ, from the sample to that middle.
+    """
+    supply, l_d, l_q = x.supply, x.base["ld_h"], x.base["lq_h"]
+    if not (x.inverter and q["sampled"] and supply.vdc_v and l_d and l_q):
+        return np.zeros(x.omega_rad_s.shape, dtype=complex)
+    early_s = 0.5 * q["sampled"] * q["loss_v"] * supply.pwm_s / supply.vdc_v
+    volts = x.base["r_ohm"] * x.i_a + 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
+    fallen: Complex = early_s * volts
+    return fallen.real / l_d + 1j * fallen.imag / l_q
+
+
+def _torque(x: Operating, q: Values) -> Array:
+    """Torque [n, N·m] that the recorded current seems to make beyond its mean's."""
+    torque: Array = 1.5 * x.machine.pole_pairs * (np.conj(x.flux_wb) * _sampled(x, q)).imag
+    return torque
+
+
 EFFECT = Effect(
     name="dead_time",
     words="each phase loses V tanh(i/width), in the limit V sign(i), i a lag before the sample, or "
-    "(ripple 1) what the edges of a switching period make of it; and on_v i/i_max in its switches",
+    "(ripple 1) what the edges of a switching period make of it; and on_v i/i_max in its switches; "
+    "current is sampled half a dead time before the middle of its pulses",
     signature="voltage offset at small current, orders 6ε, the same at every speed",
     tests=("torque_map", "drive", "heat_run"),
     experiment="steps of current from a hundredth of rated current up, at low speed",
@@ -52,9 +75,22 @@ EFFECT = Effect(
             choice=True,
             words="1: as pwm_hz, vdc_v and L switch it, 0: by the mean current alone",
         ),
+        Parameter(
+            "sampled",
+            "1",
+            1.0,
+            0.0,
+            low=0.0,
+            high=4.0,
+            scan=(0.0,),
+            usual=(1.0, 0.5),
+            words="of half a dead time, by which a current is sampled before the middle of a pulse",
+        ),
         Parameter("lag_s", "s", 0.25, 0.0, "period_s", low=-1.0, high=1.0, scan=(0.0,)),
     ),
     signals=("vd_v", "vq_v"),
     alternatives={"copper_temperature": "several currents: dead time does not grow with current"},
     drop=_drop,
+    parallel=_sampled,
+    torque=_torque,
 )

@@ -437,6 +437,9 @@ class _Sampler:
                 change.drop_v - before.drop_v,
                 change.drag_nm - before.drag_nm,
             )
+        parts = (change.psi_wb, change.slope_wb, change.drop_v, change.drag_nm)
+        if not any(part.any() for part in parts):
+            return None
         alone = effect.hook == "torque" and effect.parallel is None
         if alone and self.observes.torque_in:
             # a drag is in the torque alone: no voltage needs to be predicted for it
@@ -466,7 +469,8 @@ class _Sampler:
         nothing = np.zeros(shape)
         flux, slope = effect_flux(effect, x, q)
         still: Complex = nothing.astype(np.complex128)
-        drop = still if effect.drop is None else effect.drop(self.mean, q)
+        lost = effect.drop if "drop" in self.hooks else None
+        drop = still if lost is None else lost(self.mean, q)
         drag = nothing if effect.torque is None else effect.torque(x, q)
         if effect.parallel is not None:
             flux = flux - flux_of(effect.parallel(x, q), self.values)

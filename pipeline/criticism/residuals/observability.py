@@ -39,9 +39,9 @@ def observes(segment: Segment, effect: Hooks) -> bool:
     seen = equation_of(segment).observes
     if effect.parallel is not None and {"flux", "drop"} <= seen.hooks:
         return True
-    if effect.hook == "torque" and seen.torque_in and seen.torque_in not in segment.channels:
-        return False
-    return effect.hook in seen.hooks
+    if effect.torque is not None and "torque" in hooks_in(segment):
+        return True
+    return effect.hook != "torque" and effect.hook in seen.hooks
 
 
 def hooks_in(segment: Segment) -> frozenset[str]:
