@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-
 from pipeline.execution.outputs.page_links import links_of, relink
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.naming import file_stem
@@ -50,11 +48,10 @@ def _judge(task: Task) -> Judged:
 
     with task.watch.stage("page"):
         links = links_of(output, "diagnosis/{}.html", result.motor_id)
-        page = render_ladder(result, task.folder, links)
+        page = render_ladder(result, links, task.folder, str(output))
         write_whole(output / "diagnosis" / f"{stem}.html", page.encode())
         relink(output, result.motor_id)
     undecided = result.verdict == "insufficient"
-    next_ = ladder_view(result, task.folder).compare
-    if next_:
-        next_ = f"{next_.removeprefix('motor-datasheets ')} output={shlex.quote(str(output))}"
+    view = ladder_view(result, task.folder, str(output))
+    next_ = (view.try_start or view.compare).removeprefix("motor-datasheets ")
     return Judged(ladder_text(result), undecided, document, next_)

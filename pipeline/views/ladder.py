@@ -11,7 +11,7 @@ from pipeline.physics.notation import MINUS, number_text, quantity, significant
 from pipeline.records.diagnosis import Diagnosis, RankedEffect, Signature, StepRecord
 from pipeline.records.model_verdict import effects_key, number
 from pipeline.views.constants import sentence
-from pipeline.views.names import quantity_words
+from pipeline.views.names import in_words, quantity_words
 
 TONES = {"adequate": "pass", "missing": "marginal", "unknown": "fail"}
 SPEED, CURRENT = "omega_mech_rad_s", "iq_a"
@@ -66,7 +66,8 @@ class LadderView:
     """A diagnosis: `headline` in a few sentences; the commands to go on with; the steps.
 
     `signals` are those shown on every step, the one farthest over its floor on the first one
-    first, those of which no floor is known last.
+    first, those of which no floor is known last. `try_start` compares with the effect that was
+    written as a start where something unknown is left.
     """
 
     tone: str
@@ -77,9 +78,10 @@ class LadderView:
     slight: tuple[str, ...]
     signals: tuple[str, ...]
     steps: tuple[StepView, ...]
+    try_start: str = ""
 
 
-def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
+def ladder_view(result: Diagnosis, folder: str = "FOLDER", output: str = "OUTPUT") -> LadderView:
     """The view of one diagnosis of the captures in a `folder`.
 
     Parameters
@@ -88,23 +90,32 @@ def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
         The diagnosis.
     folder
         The input folder, as the user named it.
+    output
+        The output folder, as the user named it.
 
     """
     signals = shown_signals(result)
     ranked = {one.effect: one for one in result.ranking}
     words = f"input={shlex.quote(folder)} motor={shlex.quote(result.motor_id)}"
-    model = "" if result.model == "standard" else f" model={result.model}"
-    model += effects_key((*result.asked, *result.missing))
+    base = "" if result.model == "standard" else f" model={result.model}"
+    known = (*result.asked, *result.missing)
+    model, where = base + effects_key(known), f" output={shlex.quote(output)}"
+    start = ""
+    if result.unknown is not None and result.unknown.sketch:
+        path = shlex.quote(f"effects_path={output}/diagnosis/effects")
+        more = base + effects_key((*known, result.unknown.effect))
+        start = f"motor-datasheets compare {words}{more} {path}{where}"
     quiet = result.verdict in ("adequate", "missing")
     return LadderView(
         TONES.get(result.verdict, "not_evaluated"),
         headline(result),
-        f"motor-datasheets compare {words}{model}" if result.missing else "",
-        f"motor-datasheets run input={shlex.quote(folder)}{model}" if result.missing else "",
+        f"motor-datasheets compare {words}{model}{where}" if result.missing else "",
+        f"motor-datasheets run input={shlex.quote(folder)}{model}{where}" if result.missing else "",
         tuple(_doubt(ranked[name]) for name in result.missing if ranked[name].confused_with),
         tuple(f"{r.effect} is {r.shortfall}" for r in result.ranking if r.slight and quiet),
         signals,
         tuple(_step(result, n, signals) for n in range(len(result.ladder))),
+        start,
     )
 
 
@@ -124,8 +135,7 @@ def headline(result: Diagnosis) -> str:
         return "The captures do not decide it; what to record is named below."
     if result.verdict == "unknown":
         one = result.unknown
-        shown = "" if one is None else f": {quantity_words(one.signal)} depends on "
-        shown += "" if one is None else " and ".join(map(quantity_words, one.variables))
+        shown = "" if one is None else f": {in_words(one.shape).replace(': ', ', ', 1)}"
         return f"{found} Something is missing that no known effect explains{shown}.".strip()
     if result.verdict == "adequate":
         floors = f", to {number(result.ladder[-1].held_out)} noise floors" if result.ladder else ""

@@ -23,7 +23,8 @@ OLD = ModelVerdict("not_tested", note="the datasheet is older than the residual 
 class ModelWords:
     """Verdict and error in `short`, and each by itself; one sentence without a full stop; what
     the two numbers of noise floors are `over`, where they differ; the
-    command that shows more and the one that adds what was found (empty where there is none);
+    command that shows more and the one that adds what was found (empty where there is none), in
+    which FOLDER and OUTPUT stand for folders: the same captures give the same page anywhere;
     `rows` of name and text; a number to `sort` by.
     """
 
@@ -40,7 +41,7 @@ class ModelWords:
     passed: bool
 
 
-def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER") -> ModelWords:
+def model_words(model: ModelVerdict | None, motor_id: str) -> ModelWords:
     """What the residual test of a motor came to; None is a datasheet of before there was one.
 
     Parameters
@@ -49,8 +50,6 @@ def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER
         The verdict of the residual test; None for a datasheet without one.
     motor_id
         The motor.
-    folder
-        The input folder, as the user named it.
 
     """
     model = model or OLD
@@ -63,8 +62,10 @@ def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER
         tone=TONES[model.verdict],
         sentence=sentence(model.headline()),
         over=_over(model),
-        command=model.command(motor_id, folder) if model.tested and not model.passed else "",
-        add=model.adding(folder),
+        command=f"{model.command(motor_id)} output=OUTPUT"
+        if model.tested and not model.passed
+        else "",
+        add=f"{adding} output=OUTPUT" if (adding := model.adding()) else "",
         rows=tuple(_rows(model)),
         sort=repr(model.held_out or 0.0),
         passed=model.passed,

@@ -247,9 +247,7 @@ def conditions(at: Conditions) -> str:
 
 
 def _words(key: str) -> str:
-    words = quantity_words(key).replace("_", "")
-    first, _, rest = words.partition(" ")
-    return rest if first == "temperature" and rest else words
+    return quantity_words(key).replace("_", "").removesuffix(" temperature")
 
 
 def _value(value: float | int | str, unit: str) -> str:

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
-from pipeline.physics.glossary import suffix_of, unit_of
+import re
+
+from pipeline.physics.glossary import COLUMNS, suffix_of, unit_of
 from pipeline.physics.notation import unit_text
 
-_SPOKEN = {
+_QUANTITIES = {
     "t": "time",
     "theta": "angle",
     "omega": "speed",
     "alpha": "acceleration",
     "temp": "temperature",
+    "torque": "torque",
+    "i": "current",
+    "v": "voltage",
+    "psi": "flux linkage",
 }
+_QUALIFIERS = {"mech": "shaft", "elec": "electrical", "pair": "line"}
 _AXES = {"ia", "ib", "ic", "id", "iq", "va", "vb", "vc", "vd", "vq", "vab", "vbc", "vca", "vdc"}
+_NAME = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")
 
 
 def quantity_words(name: str) -> str:
-    """A glossary name without its unit, in words: `temp_winding_degc` is temperature winding.
+    """A glossary name without its unit, in words: `temp_winding_degc` is winding temperature.
 
     Parameters
     ----------
@@ -29,7 +37,22 @@ def quantity_words(name: str) -> str:
     first, *rest = stem.split("_")
     if first in _AXES and not rest:
         return f"{first[0]}_{first[1:]}"
-    return " ".join([_SPOKEN.get(first, first), *rest])
+    quantity = _QUANTITIES.get(first, first)
+    if first in _QUANTITIES and len(rest) == 1:
+        return f"{_QUALIFIERS.get(rest[0], rest[0])} {quantity}"
+    return " ".join([quantity, *rest])
+
+
+def in_words(text: str) -> str:
+    """A text with the names of columns in words: `drag as a curve of shaft speed`.
+
+    Parameters
+    ----------
+    text
+        Prose that has glossary names in it.
+
+    """
+    return _NAME.sub(lambda hit: quantity_words(hit[0]) if hit[0] in COLUMNS else hit[0], text)
 
 
 def unit_words(name: str) -> str:
@@ -45,7 +68,7 @@ def unit_words(name: str) -> str:
 
 
 def with_unit(name: str) -> str:
-    """A glossary name in words with its unit: `speed mech [rad/s]`.
+    """A glossary name in words with its unit: `shaft speed [rad/s]`.
 
     Parameters
     ----------

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 
 import numpy as np
 
 from pipeline.physics.notation import scale_for
+from pipeline.records.diagnosis import CurvePoint
 from pipeline.report.charts.axis import axis_for, padded
 from pipeline.report.charts.ticks import x_ticks
 
 WIDTH, LEFT, RIGHT, TOP, HEIGHT, BOTTOM = 560.0, 62.0, 14.0, 20.0, 200.0, 38.0
 
 
-def curve_chart(variable: str, unit: str, points: Sequence[Mapping[str, float]]) -> str:
-    """SVG of points with `at` [variable], `value`, `low` and `high` [unit], in order of `at`.
+def curve_chart(variable: str, title: str, unit: str, points: Sequence[CurvePoint]) -> str:
+    """SVG of a curve with its band.
 
     Parameters
     ----------
     variable
         Name of the variable across.
+    title
+        What the values are.
     unit
         Unit of the values.
     points
@@ -28,7 +31,7 @@ def curve_chart(variable: str, unit: str, points: Sequence[Mapping[str, float]])
 
     """
     at, value, low, high = (
-        np.array([point[key] for point in points]) for key in ("at", "value", "low", "high")
+        np.array([getattr(one, name) for one in points]) for name in ("at", "value", "low", "high")
     )
     x = axis_for(variable, float(at.min()), float(at.max()), LEFT, WIDTH - RIGHT, 6)
     reach = padded(min(float(low.min()), 0.0), max(float(high.max()), 0.0))
@@ -54,5 +57,6 @@ def curve_chart(variable: str, unit: str, points: Sequence[Mapping[str, float]])
         f'<path class="band" d="{band}"/><path class="fitted" d="{line}"/>'
         f'<text class="title x" x="{(LEFT + WIDTH - RIGHT) / 2:.1f}" '
         f'y="{TOP + HEIGHT + 32:.1f}">{escape(x.title)}</text>'
-        f'<text class="title" x="2" y="{TOP - 7:.1f}">[{escape(scale.unit or "1")}]</text></svg>'
+        f'<text class="title" x="2" y="{TOP - 7:.1f}">{escape(title)} '
+        f"[{escape(scale.unit or '1')}]</text></svg>"
     )

@@ -9,7 +9,13 @@ import numpy as np
 
 from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import MINUS, quantity, significant
-from pipeline.records.diagnosis import Diagnosis, RankedEffect, Signature, StepRecord
+from pipeline.records.diagnosis import (
+    Diagnosis,
+    RankedEffect,
+    Signature,
+    StepRecord,
+    UnknownStructure,
+)
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.charts.chart import chart
 from pipeline.report.charts.curve_chart import curve_chart
@@ -27,7 +33,7 @@ from pipeline.views.ladder import (
     over_floor,
     reaches,
 )
-from pipeline.views.names import quantity_words
+from pipeline.views.names import in_words, quantity_words
 from pipeline.views.notes import shown_and_folded
 
 MOST_RANKED = 12
@@ -51,20 +57,27 @@ class Shown:
     caption: str
 
 
-def render_ladder(result: Diagnosis, folder: str = "FOLDER", links: Sequence[Link] = ()) -> str:
+def render_ladder(
+    result: Diagnosis,
+    links: Sequence[Link] = (),
+    folder: str = "FOLDER",
+    output: str = "OUTPUT",
+) -> str:
     """The self-contained HTML page of one diagnosis; equal input gives equal text.
 
     Parameters
     ----------
     result
         The diagnosis.
-    folder
-        The input folder, as the user named it.
     links
         Links to other pages.
+    folder
+        The input folder, as the user named it.
+    output
+        The output folder, as the user named it.
 
     """
-    view = ladder_view(result, folder)
+    view = ladder_view(result, folder, output)
     reach = reaches(result.ladder)
     notes, folded = shown_and_folded(result)
     ranked = [_ranked(one) for one in result.ranking]
@@ -81,7 +94,7 @@ def render_ladder(result: Diagnosis, folder: str = "FOLDER", links: Sequence[Lin
         signals=[quantity_words(name) for name in view.signals],
         found=[one for one in ranked if one["effect"] in result.missing],
         others=[one for one in ranked if one["effect"] not in result.missing][:MOST_RANKED],
-        sketch=_sketch(result),
+        sketch=_sketch(result.unknown),
         remainder=[
             (
                 one.capture,
@@ -152,28 +165,32 @@ def _ranked(ranked: RankedEffect) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Sketch:
-    """An unknown structure: its terms, and, where there is one, its curve, formula and
-    alternatives.
+    """An unknown structure in words: where it shows, on what it depends, its terms, and, where
+    there is one, its curve.
     """
 
+    signal: str
+    variables: str
+    shape: str
     terms: tuple[tuple[str, str], ...]
     curve: str
-    expression: str
     alternatives: tuple[str, ...]
 
 
-def _sketch(result: Diagnosis) -> Sketch | None:
-    if result.unknown is None:
+def _sketch(unknown: UnknownStructure | None) -> Sketch | None:
+    if unknown is None:
         return None
-    remainder = result.unknown.document()
-    points, sketch = remainder.get("curve", []), remainder["sketch"]
-    unit = sketch[0]["unit"] if sketch else "1"
+    unit = unknown.sketch[0].unit if unknown.sketch else "1"
+    title = unknown.shape.partition(" as ")[0]
+    drawn = len(unknown.curve) > 1
     return Sketch(
-        tuple((t["term"], quantity(t["coefficient"], t["unit"], 4)) for t in sketch),
-        curve_chart(remainder["variables"][0], unit, points) if len(points) > 1 else "",
-        remainder.get("expression", ""),
+        quantity_words(unknown.signal),
+        " and ".join(map(quantity_words, unknown.variables)),
+        in_words(unknown.shape),
+        tuple((one.term, quantity(one.coefficient, one.unit, 4)) for one in unknown.sketch),
+        curve_chart(unknown.variables[0], title, unit, unknown.curve) if drawn else "",
         tuple(
-            f"{', '.join(one['variables'])} ({100 * one['share']:.0f} %)"
-            for one in remainder.get("alternatives", [])
+            f"{', '.join(map(quantity_words, one.variables))} ({100 * one.share:.0f} %)"
+            for one in unknown.alternatives
         ),
     )

@@ -28,7 +28,7 @@ def ladder_text(result: Diagnosis) -> str:
         text_lines += [f"    {test}" for test in doubt.tests]
     text_lines += [f"  {text}" for text in view.slight]
     if (unknown := result.unknown) is not None:
-        text_lines.append(f"  left over in {unknown.signal}: {unknown.shape}")
+        text_lines.append(f"  left over in {unknown.signal}")
         if unknown.sketch:
             text_lines.append(f"  {unknown.expression}")
             text_lines.append(f"  an effect to start from: diagnosis/effects/{unknown.effect}.py")

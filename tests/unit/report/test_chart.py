@@ -16,7 +16,7 @@ from pipeline.report.charts.axis import axis_for, symmetric_axis
 from pipeline.report.charts.chart import chart
 from pipeline.report.charts.residual import residual_scale
 from pipeline.report.charts.strip import Dot, strip_plot
-from pipeline.views.names import quantity_words
+from pipeline.views.names import in_words, quantity_words
 
 Array = NDArray[np.float64]
 NONE = np.empty(0)
@@ -191,9 +191,9 @@ def test_labels_at_the_ends_do_not_overlap() -> None:
     ("name", "low", "high", "labels", "title"),
     [
         ("t_s", 0.0, 0.008, ("0", "2", "4", "6", "8"), "time [ms]"),
-        ("torque_shaft_nm", -0.02, 0.02, ("−20", "−10", "0", "10", "20"), "torque shaft [mN·m]"),
-        ("theta_elec_deg", 0.0, 345.0, ("0", "90", "180", "270"), "angle elec [°]"),
-        ("temp_winding_degc", 25.0, 90.0, ("40", "60", "80"), "temperature winding [°C]"),
+        ("torque_shaft_nm", -0.02, 0.02, ("−20", "−10", "0", "10", "20"), "shaft torque [mN·m]"),
+        ("theta_elec_deg", 0.0, 345.0, ("0", "90", "180", "270"), "electrical angle [°]"),
+        ("temp_winding_degc", 25.0, 90.0, ("40", "60", "80"), "winding temperature [°C]"),
         ("iq_a", 7.0, 7.0, ("6.8", "7.0", "7.2"), "i_q [A]"),
         ("cogging_order", 1.0, 120.0, ("25", "50", "75", "100"), "cogging order"),
     ],
@@ -214,8 +214,11 @@ def test_symmetric_axis_has_zero_in_its_middle() -> None:
 
 
 def test_words_of_a_quantity() -> None:
-    assert quantity_words("temp_magnet_degc") == "temperature magnet"
+    assert quantity_words("temp_magnet_degc") == "magnet temperature"
     assert quantity_words("order") == "order"
+    assert quantity_words("theta_in_one_of_60_waves_rad") == "angle in one of 60 waves"
+    text = "drag as a curve of omega_mech_rad_s times iq_a/(9.1 A), not of iq_abs_a"
+    assert in_words(text) == "drag as a curve of shaft speed times i_q/(9.1 A), not of iq_abs_a"
 
 
 def test_a_strip_draws_each_motor_at_its_value_with_its_uncertainty() -> None:

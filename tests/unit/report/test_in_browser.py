@@ -86,7 +86,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "fleet": lambda: render_fleet(
         [motor(LONG, 252.0), motor("b", 364.0), make_datasheet("c", 1.02)], FINDINGS
     ),
-    "ladder": lambda: render_ladder(long_ladder(), "a/folder of captures/with a long name"),
+    "ladder": lambda: render_ladder(long_ladder(), (), "a/folder of captures/with a long name"),
     "comparison": lambda: render_comparison(
         make_comparison(LONG), (Earlier("standard", ("dead_time", "cogging"), 3.0, 76.0),)
     ),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pipeline.records.comparison import Comparison, Dependence, Move, SignalError
-from pipeline.records.diagnosis import Remainder, StepRecord, Unexcited
+from pipeline.records.diagnosis import CurvePoint, Remainder, StepRecord, Unexcited
 from pipeline.report.charts.curve_chart import curve_chart
 from pipeline.report.charts.heatmap import angle_bars, colour, heatmap
 from pipeline.report.charts.step_chart import step_chart
@@ -49,7 +49,7 @@ def test_every_number_of_the_ladder_is_on_the_page() -> None:
 
 
 def test_the_page_leads_with_words_the_command_and_what_shows_it() -> None:
-    html = flat(render_ladder(make_diagnosis(), "captures"))
+    html = flat(render_ladder(make_diagnosis(), (), "captures"))
     places = [
         html.index(words)
         for words in (
@@ -104,7 +104,7 @@ def test_effects_that_no_test_excites_are_told_by_the_test_to_record() -> None:
 
 def test_the_unknown_and_what_is_left_are_told() -> None:
     html = render_ladder(make_diagnosis(unknown=True))
-    assert "odd in iq_a" in html
+    assert "odd in i_q" in html
     assert "at iq_a = 4" in html
     assert "120.0 mV" in html
     assert "drive_0.mcap" in html
@@ -197,8 +197,8 @@ def test_errors_without_a_floor_are_on_the_page_and_all_together_in_the_chart() 
 @pytest.mark.parametrize(
     ("signal", "words", "size"),
     [
-        ("omega_mech_rad_s", "speed mech", "276 rad/s<"),
-        ("alpha_mech_rad_s2", "acceleration mech", "276 rad/s²"),
+        ("omega_mech_rad_s", "shaft speed", "276 rad/s<"),
+        ("alpha_mech_rad_s2", "shaft acceleration", "276 rad/s²"),
     ],
 )
 def test_what_is_left_has_its_unit(signal: str, words: str, size: str) -> None:
@@ -284,10 +284,9 @@ def test_a_comparison_tells_its_notes_and_whether_anything_was_held_out(
 
 def test_a_curve_has_its_band_around_it() -> None:
     points = [
-        {"at": a, "value": 0.01 * a, "low": 0.01 * a - 0.005, "high": 0.01 * a + 0.005}
-        for a in (-4.0, 0.0, 2.0, 4.0)
+        CurvePoint(a, 0.01 * a, 0.01 * a - 0.005, 0.01 * a + 0.005) for a in (-4.0, 0.0, 2.0, 4.0)
     ]
-    root = ElementTree.fromstring(curve_chart("iq_a", "V", points))
+    root = ElementTree.fromstring(curve_chart("iq_a", "drop", "V", points))
     paths = {p.attrib["class"]: p.attrib["d"] for p in root.iter("path")}
     line = [float(y) for y in re.findall(r" ([\d.]+)", paths["fitted"])]
     band = [float(y) for y in re.findall(r" ([\d.]+)", paths["band"])]
@@ -296,7 +295,7 @@ def test_a_curve_has_its_band_around_it() -> None:
     assert min(d - u for u, d in zip(up, down, strict=True)) > 5.0
     texts = [t.text for t in root.iter("text")]
     assert "i_q [A]" in texts
-    assert "[mV]" in texts
+    assert "drop [mV]" in texts
 
 
 def test_a_test_that_lacks_a_signal_is_told_with_it() -> None:

@@ -84,7 +84,7 @@ def test_the_page_shows_sizes_moves_maps_and_the_worst_capture_of_each_signal() 
     ):
         assert words in html
     traces = html.split('id="traces"')[1].split("</section>")[0]
-    assert traces.count("<figure>") == 1 and "a.mcap" in traces
+    assert traces.count("<figure>") == 1 and "b.mcap" in traces, "worst before what was added"
     assert 'id="earlier"' not in html
     assert html == flat(render_comparison(make_comparison(), links=links))
 

@@ -42,7 +42,7 @@ def test_equal_reasons_are_told_once_with_their_motors_and_sizes() -> None:
     view = fleet_view(sheets)
     assert [(reason.text, reason.members) for reason in view.reasons] == [
         ("not approved", ("a", "b", "c")),
-        ("the standard model misses torque shaft, 84 a turn", ("a", "b")),
+        ("the standard model misses shaft torque, 84 a turn", ("a", "b")),
     ]
     assert [floors_of(reason, view.rows) for reason in view.reasons] == [
         "",
@@ -53,9 +53,9 @@ def test_equal_reasons_are_told_once_with_their_motors_and_sizes() -> None:
     assert rows["b"].why == ""
     assert rows["c"].why == "cogging_amplitude_nm is not measured"
     html = render_fleet(sheets, ())
-    assert html.count("the standard model misses torque shaft") == 1
+    assert html.count("the standard model misses shaft torque") == 1
     assert (
-        "<b>2 motors</b>: the standard model misses torque shaft, 84 a turn, by 252 to 364" in html
+        "<b>2 motors</b>: the standard model misses shaft torque, 84 a turn, by 252 to 364" in html
     )
 
 

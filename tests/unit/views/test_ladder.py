@@ -26,6 +26,18 @@ def two() -> Diagnosis:
     return replace(make_diagnosis(), missing=names, ranking=ranking, ladder=tuple(steps))
 
 
+def test_what_is_unknown_is_tried_as_an_effect_with_all_that_is_known() -> None:
+    unknown = make_diagnosis(unknown=True)
+    assert unknown.unknown is not None and unknown.unknown.sketch
+    view = ladder_view(replace(unknown, asked=("cogging",)), "in", "out")
+    effects = f"[cogging,dead_time,{unknown.unknown.effect}]"
+    assert view.try_start == (
+        f"motor-datasheets compare input=in motor=joint-P1 'model.effects={effects}' "
+        "effects_path=out/diagnosis/effects output=out"
+    )
+    assert ladder_view(make_diagnosis()).try_start == ""
+
+
 def test_the_headline_says_what_is_missing_with_sizes_and_what_adding_it_does() -> None:
     assert headline(two()) == (
         "Encoder disc off-centre by 9.0 ± 0.1 mrad, and extra friction below 7.0 rad/s. "
@@ -40,7 +52,7 @@ def test_other_verdicts_in_words() -> None:
     known = "Voltage lost in the inverter, 179.90 ± 0.24 mV a phase. With it, the error falls from "
     assert headline(base) == (
         f"{known}20 to 0.41 noise floors. Something is missing that no known effect explains: "
-        "v_q depends on i_q."
+        "odd in i_q."
     )
     adequate = replace(make_diagnosis(), verdict="adequate", missing=())
     assert "to 0.41 noise floors; nothing is missing" in headline(adequate)
@@ -52,9 +64,9 @@ def test_the_commands_name_folder_motor_and_all_effects() -> None:
     view = ladder_view(asked, "my captures")
     effects = "'model.effects=[cogging,-coulomb_friction,angle_eccentricity,stribeck]'"
     assert view.compare == (
-        f"motor-datasheets compare input='my captures' motor=joint-P1 {effects}"
+        f"motor-datasheets compare input='my captures' motor=joint-P1 {effects} output=OUTPUT"
     )
-    assert view.add == f"motor-datasheets run input='my captures' {effects}"
+    assert view.add == f"motor-datasheets run input='my captures' {effects} output=OUTPUT"
     none = ladder_view(replace(make_diagnosis(), verdict="adequate", missing=()))
     assert (none.compare, none.add) == ("", "")
     assert " model=ideal " in ladder_view(replace(two(), model="ideal")).add
@@ -79,7 +91,7 @@ def test_steps_tell_what_came_its_numbers_and_the_fall() -> None:
     cells = [cell for cell in last.errors if cell is not None]
     assert [(c.signal, c.rmse, c.floor, c.ratio, c.change) for c in cells] == [
         ("v_q", "2.60 mV", "2.00 mV", "1.30", "−98 %"),
-        ("v pair", "500 µV", "500 µV", "1.00", "+0 %"),
+        ("line voltage", "500 µV", "500 µV", "1.00", "+0 %"),
     ]
     gone = replace(make_diagnosis(), ladder=(make_step(("dead_time",), 1.0), make_step((), 1.0)))
     assert ladder_view(gone).steps[1].title == "− dead_time"

@@ -93,6 +93,40 @@ for (const button of document.querySelectorAll("button.copy"))
       getSelection().addRange(range);
     }
   });
+// The same captures give the same page anywhere, so its commands do not know where they lie. The
+// reader says it once; the page knows where itself lies.
+{
+  const codes = [...document.querySelectorAll(".command code")];
+  const texts = codes.map((code) => code.textContent);
+  const quoted = (path) => (/^[\w@%+=:,./-]+$/.test(path) ? path : `'${path.replaceAll("'", "'\\''")}'`);
+  const output =
+    location.protocol === "file:" ? decodeURIComponent(location.pathname.replace(/\/[^/]*\/[^/]*$/, "")) : "OUTPUT";
+  const fill = (folder) =>
+    codes.forEach((code, place) => {
+      code.textContent = texts[place]
+        .replace("input=FOLDER", `input=${quoted(folder || "FOLDER")}`)
+        .replace(/(output|effects_path)=OUTPUT/g, (_, key) => `${key}=${quoted(output)}`);
+    });
+  const first = codes.find((_, place) => texts[place].includes("input=FOLDER"));
+  const key = `captures of ${output}`;
+  let folder = "";
+  try {
+    folder = localStorage.getItem(key) || "";
+  } catch {} // a browser may keep nothing for a page from a file
+  if (first) {
+    const label = Object.assign(document.createElement("label"), { className: "folder", textContent: "Folder of the captures " });
+    const field = Object.assign(document.createElement("input"), { value: folder, placeholder: "FOLDER" });
+    field.addEventListener("input", () => {
+      fill(field.value.trim());
+      try {
+        localStorage.setItem(key, field.value.trim());
+      } catch {}
+    });
+    label.append(field);
+    first.closest(".command").before(label);
+  }
+  fill(folder);
+}
 // A link to something folded opens it.
 const unfold = () => {
   const place =
