@@ -64,3 +64,9 @@ class SensorNoise:
     in_step: float = chosen(
         0.9, "1", "coherence that it then needs", why="noise of 0.07 steps comes to it"
     )
+    most_readings: int = chosen(
+        128,
+        "1",
+        "readings of an encoder at the most whose mean a drive logs as one",
+        why="drives control at 8 to 100 kHz and log at 100 Hz and more",
+    )

@@ -142,18 +142,22 @@ def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:
 
 
 def _by_encoder(segment: Segment, machine: Machine) -> Segment:
-    """The segment with the step of its angle: that of the drive's encoder, if it is in such steps,
-    else its own.
+    """The segment with the step of its angle: that of the drive's encoder or a multiple of it, if it
+    is in such steps, else its own.
 
     A shaft that turns by nearly whole steps a sample does not show the step itself, and its
-    rounding is then periodic in the angle, as an electrical order is.
+    rounding is then periodic in the angle, as an electrical order is. A drive that logs means of
+    several readings has its angle in fractions of the step.
     """
     theta, step = segment.recorded.get("theta_mech_rad"), machine.encoder_rad
     theta = segment.recorded.get(UNSMOOTHED, theta)
     if theta is None:
         return segment
     policy = machine.policy.sensor_noise
-    if not is_rounded(theta, step, policy):
+    if is_rounded(theta, step, policy):
+        multiples = range(1, policy.most_readings + 1)
+        step = max(n * step for n in multiples if is_rounded(theta, n * step, policy))
+    else:
         known = segment.sensors.angle_step_rad
         step = rounding_step(theta, policy) if known is None else known
     return replace(segment, sensors=replace(segment.sensors, angle_step_rad=step))
