@@ -60,6 +60,7 @@ ARITHMETIC = {
         "_FINEST",
         "_REACH",
         "_FLOATING",
+        "_DIGITS",
     },
     "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight
     "design/experiments.py": {"_SEED"},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.sensors import SensorNoise
@@ -22,9 +23,9 @@ _REACH = 1.5
 in the next; number of the parts; spacing of trial steps, at first and at the end, in turns of the
 phase over a part; how many spacings they reach around the step before. A lobe of the coherence is
 a turn wide: a wider spacing misses it, a finer one costs time."""
+_DIGITS = 1e-3
+"""Share of a step that the digits of a file may leave where there is none."""
 _FLOATING = 1e-9
-_HIGH_OVER_MEDIAN = 3.82
-"""99 % over 50 % quantile of the size of a normal variable."""
 """Share of a signal's size that is rounding of floating-point numbers."""
 
 
@@ -160,8 +161,8 @@ def unrounded(signal: Array, step: float) -> Array:
     return np.interp(np.arange(signal.size), known[order], level[order])
 
 
-def rounding_error(signal: Array, step: float, shift: float, smooth: int) -> Array:
-    """What rounding does to a signal like this one.
+def smoothed(signal: Array, step: float, policy: SensorNoise) -> Array:
+    """What a rounded signal was, as far as its samples tell.
 
     Parameters
     ----------
@@ -169,10 +170,44 @@ def rounding_error(signal: Array, step: float, shift: float, smooth: int) -> Arr
         As recorded [n, any unit].
     step
         Of the rounding [same unit].
+    policy
+        Lengths of the local parabola that smooths it.
+
+    Returns
+    -------
+    array [n]
+        Smoothed by the longest parabola that leaves no more than a rounding does, step / √12. A
+        shorter one would keep part of the beat between the steps and the sampling, and a longer one
+        bends that the signal has.
+
+    Notes
+    -----
+    A. Savitzky and M. J. E. Golay, Anal. Chem. 36 (1964) 1627, DOI 10.1021/ac60214a047.
+
+    """
+    most = policy.smooth_share * step / math.sqrt(12.0)
+    best = signal
+    for length in policy.smooth:
+        if length > signal.size:
+            break
+        even: Array = savgol_filter(signal, length, 2)
+        if best is not signal and float((signal - even).std()) > most:
+            break
+        best = even
+    return best
+
+
+def rounding_error(even: Array, step: float, shift: float) -> Array:
+    """What rounding does to a signal.
+
+    Parameters
+    ----------
+    even
+        The signal before it is rounded [n, any unit].
+    step
+        Of the rounding [same unit].
     shift
-        By which the smoothed signal is moved before it is rounded anew [steps].
-    smooth
-        Samples of the mean that smooths it, odd.
+        By which it is moved before it is rounded [steps].
 
     Returns
     -------
@@ -181,10 +216,8 @@ def rounding_error(signal: Array, step: float, shift: float, smooth: int) -> Arr
         whose beat with the sampling may fall on any order.
 
     """
-    kernel = np.full(smooth, 1.0 / smooth)
-    padded = np.pad(signal / step, smooth // 2, mode="reflect", reflect_type="odd")
-    even = np.convolve(padded, kernel, mode="valid") + shift
-    return (np.round(even) - even) * step
+    moved = even / step + shift
+    return (np.round(moved) - moved) * step
 
 
 def rounding_step(signal: Array, policy: SensorNoise) -> float:
@@ -205,7 +238,7 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     Notes
     -----
     Third differences d of a rounded signal are whole steps q, so that their phase e^{j2πd/q} stays
-    together at the right q, even where a number format has rounded it once more. Parts of the
+    at 1 at the right q, even where a number format has rounded it once more. Parts of the
     record, longer and longer, give q sharply enough to separate 4000 steps a turn from 4096.
 
     """
@@ -213,10 +246,9 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     third = np.diff(signal, 3)
     if third.size < policy.block:
         return 0.0
-    # of a shaft that turns by nearly whole steps a sample most are zero
-    middle, high = np.quantile(np.abs(third), [0.5, 0.99])
-    usual = max(float(middle), float(high) / _HIGH_OVER_MEDIAN)
-    third = third[np.abs(third) < policy.burst * usual + 1e-300]
+    # of a shaft that turns by nearly whole steps a sample most are zero, but for a file's digits
+    third = third[np.abs(third) > _DIGITS * np.quantile(np.abs(third), 0.95)]
+    third = third[np.abs(third) < policy.burst * np.median(np.abs(third)) + 1e-300]
     spread = float(np.sqrt((third**2).mean())) if third.size >= policy.block else 0.0
     if spread <= _FLOATING * float(np.abs(signal).max()):
         return 0.0
@@ -224,7 +256,7 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     steps = np.geomspace(0.25 * spread, 2.0 * spread, _STEPS)
     # in single precision, which is several times faster and good to 1e-4 of a turn
     phase = np.outer(2.0 * np.pi / steps, sample).astype(np.float32)
-    together = np.hypot(np.cos(phase).mean(axis=1), np.sin(phase).mean(axis=1))
+    together = np.cos(phase).mean(axis=1)
     inner = together[1:-1]
     peaks = 1 + np.flatnonzero((inner >= together[:-2]) & (inner >= together[2:]))
     least = max(policy.high * together[peaks].max(initial=0.0), policy.together)

@@ -22,9 +22,13 @@ class SensorNoise:
     steady: tuple[float, ...] = chosen(
         (0.6, 0.2533), "1", "the same of an angle", why="its rounding comes and goes"
     )
-    smooth: int = chosen(
-        21, "samples", "mean of a rounded signal that is rounded anew",
-        why="of a few it still is a stair, of many its bends are lost",
+    smooth: tuple[int, ...] = chosen(
+        (21, 51, 101, 201, 401), "samples", "parabolas that smooth a signal to be rounded anew",
+        why="of a few samples it still is a stair, of many its bends are lost",
+    )  # fmt: skip
+    smooth_share: float = chosen(
+        1.05, "1", "what they may leave, over the rounding's standard deviation",
+        why="a twentieth is the scatter of a standard deviation of 200 samples",
     )  # fmt: skip
     burst: float = chosen(
         12.0, "1", "third difference over the median one that is a jump and not the rounding",

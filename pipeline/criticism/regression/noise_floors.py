@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import UNSMOOTHED, Segment, projected, row_index
-from pipeline.criticism.data.sensor_noise import rounding_error, unrounded
+from pipeline.criticism.data.sensor_noise import rounding_error, smoothed, unrounded
 from pipeline.criticism.data.traces import parabolas
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
 from pipeline.criticism.policy.regression import NoiseFloors
+from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.criticism.residuals.channels import (
     channel_of,
     channel_scale,
@@ -96,7 +97,7 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     the residual counts too: it may have been noise or motion.
 
     """
-    policy, even = model.policy.noise_floors, model.policy.sensor_noise.smooth
+    policy = model.policy.noise_floors
     group, _, valid, groups = row_index(segment)
     plain = projected(segment, residual(segment, model, values))
     total, count = np.zeros(len(groups)), np.zeros(len(groups))
@@ -106,7 +107,7 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     if sensors.steps:
         replicates = max(replicates, policy.shifts)
     shifts = _shifts(segment, replicates, seed)
-    smooth = {name: unrounded(segment.recorded[name], q) for name, q in sensors.steps.items()}
+    even = _before_rounding(segment, model.policy.sensor_noise)
     for replicate in range(replicates):
         generator = np.random.default_rng([seed, replicate])
         noisy = {
@@ -114,11 +115,11 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
             for name, column in segment.recorded.items()
         }
         for name, step in sensors.steps.items():
-            noisy[name] += rounding_error(smooth[name], step, shifts[name][replicate], even)
+            noisy[name] += rounding_error(even[name], step, shifts[name][replicate])
         if sensors.angle_step_rad:
             theta = segment.recorded["theta_mech_rad"]
             step, shift = sensors.angle_step_rad, generator.uniform(-0.5, 0.5)
-            error = rounding_error(theta, step, shift, even if sensors.parabola == 1 else 1)
+            error = rounding_error(even["theta_mech_rad"], step, shift)
             noisy["theta_mech_rad"] = theta + parabolas(error, sensors.parabola)
         change = projected(segment, residual(segment, model, values, noisy)) - plain
         np.add.at(total, group[valid], change[valid] ** 2)
@@ -130,6 +131,22 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
         power = np.bincount(group[valid], change[valid] ** 2, len(groups))
         variance += power / np.maximum(np.bincount(group[valid], minlength=len(groups)), 1)
     return np.sqrt(variance) + 1e-300
+
+
+def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
+    """Coarse signals and a rounded angle as they may have been before they were rounded; an angle
+    that was smoothed stays as it is.
+    """
+    sensors = segment.sensors
+    even = {
+        name: smoothed(unrounded(segment.recorded[name], step), step, policy)
+        for name, step in sensors.steps.items()
+    }
+    if sensors.angle_step_rad:
+        theta = segment.recorded["theta_mech_rad"]
+        rough = sensors.parabola == 1
+        even["theta_mech_rad"] = smoothed(theta, sensors.angle_step_rad, policy) if rough else theta
+    return even
 
 
 def _smoothed(segment: Segment, name: str, normal: Array) -> Array:

@@ -142,7 +142,7 @@ def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:
 
 
 def _by_encoder(segment: Segment, machine: Machine) -> Segment:
-    """The segment with the step of its angle: that of the drive's encoder or a multiple of it, if it
+    """The segment with the step of its angle: a multiple of that of the drive's encoder, if it
     is in such steps, else its own.
 
     A shaft that turns by nearly whole steps a sample does not show the step itself, and its

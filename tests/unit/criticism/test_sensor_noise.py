@@ -12,14 +12,17 @@ from pipeline.criticism.data.sensor_noise import (
     coarse_step,
     is_rounded,
     resolution,
+    rounding_error,
     rounding_step,
     sensor_noise,
+    smoothed,
 )
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.regression.noise_floors import noise_floor
+from pipeline.criticism.residuals.segments import _by_encoder
 from pipeline.criticism.selection.stepwise import _shrunk
 from tests.unit.criticism.machines import BASE, coasting, log, machine
 
@@ -67,6 +70,42 @@ def test_an_encoder_s_counts_a_turn_are_told_whether_powers_of_two_or_not(counts
     told = rounding_step(theta, SENSORS)
     assert 2.0 * np.pi / told == pytest.approx(counts, rel=1e-9)
     assert is_rounded(theta, told, SENSORS)
+
+
+def test_a_shaft_that_turns_by_nearly_whole_steps_a_sample_shows_its_step():
+    """Most third differences are then what the file's digits round."""
+    step, t = 2.0 * np.pi / 10_000, np.arange(8000) * 5e-5
+    moved = 1.0 + 11.97 * step / 5e-5 * t + 0.01 * np.sin(2.0 * np.pi * 7.0 * t)
+    theta = np.round(np.round(moved / step) * step, 8)
+    assert np.median(np.abs(np.diff(theta, 3))) < 1e-3 * step
+    assert rounding_step(theta, SENSORS) == pytest.approx(step, rel=1e-9)
+
+
+def test_the_step_of_a_drive_that_logs_means_of_readings_is_a_part_of_the_encoder_s():
+    """A mean of 16 readings is in sixteenths of a step; a bench logs each of them."""
+    step, segment = 2.0 * np.pi / 8192, log()
+    theta = np.round(segment.recorded["theta_mech_rad"] / step) * step
+    bench = replace(segment, recorded={**segment.recorded, "theta_mech_rad": theta})
+    drive = replace(machine(), encoder_rad=step / 16.0)
+    assert _by_encoder(bench, drive).sensors.angle_step_rad == pytest.approx(step, rel=1e-6)
+    sixteenth = np.round(segment.recorded["theta_mech_rad"] / step * 16.0) * step / 16.0
+    fine = replace(segment, recorded={**segment.recorded, "theta_mech_rad": sixteenth})
+    assert _by_encoder(fine, drive).sensors.angle_step_rad == pytest.approx(step / 16.0, rel=1e-6)
+
+
+def test_a_beat_of_steps_and_sampling_is_as_loud_when_the_angle_is_rounded_anew():
+    """1.43 steps a sample: the seventh wave of the saw-tooth is seen at 1 % of the rate."""
+    step, t, random = 2.0 * np.pi / 8192, np.arange(8000) * 5e-5, np.random.default_rng(4)
+    moved = 1.43 * step / 5e-5 * t + 0.01 * np.sin(2.0 * np.pi * 7.0 * t)
+    theta = np.round(moved / step) * step
+    even = smoothed(theta, step, SENSORS)
+
+    def beat(error):
+        lines = np.abs(np.fft.rfft(error * np.hanning(error.size))) ** 2
+        return lines[50:400].sum()
+
+    anew = [beat(rounding_error(even, step, random.uniform(-0.5, 0.5))) for _ in range(20)]
+    assert np.mean(anew) == pytest.approx(beat(theta - moved), rel=0.3)
 
 
 def test_a_noisy_angle_has_no_step():
