@@ -248,6 +248,8 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
         return 0.0
     # of a shaft that turns by nearly whole steps a sample most are zero, but for a file's digits
     third = third[np.abs(third) > _DIGITS * np.quantile(np.abs(third), 0.95)]
+    if third.size < policy.block:
+        return 0.0
     third = third[np.abs(third) < policy.burst * np.median(np.abs(third)) + 1e-300]
     spread = float(np.sqrt((third**2).mean())) if third.size >= policy.block else 0.0
     if spread <= _FLOATING * float(np.abs(signal).max()):
