@@ -155,7 +155,8 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
         return segment
     policy = machine.policy.sensor_noise
     if is_rounded(theta, step, policy):
-        multiples = range(1, policy.most_readings + 1)
+        evenly = float(np.ptp(np.diff(theta))) < step
+        multiples = range(1, 2 if evenly else policy.most_readings + 1)
         step = max(n * step for n in multiples if is_rounded(theta, n * step, policy))
     else:
         known = segment.sensors.angle_step_rad
