@@ -13,7 +13,16 @@ import numpy as np
 from numba import njit
 
 from pipeline.simulator.field import SQRT3, Array, current, magnet, torque_of
-from pipeline.simulator.motion import bristle_after, coupling, dragged, extra, heat, passive
+from pipeline.simulator.motion import (
+    Mechanics,
+    Pair,
+    bristle_after,
+    coupling,
+    dragged,
+    extra,
+    heat,
+    passive,
+)
 from pipeline.simulator.plant import Plant
 
 HISTORY = 256
@@ -38,8 +47,6 @@ COLUMNS = (
     "work_copper",
     "work_switches",
 )
-Pair = tuple[float, float]
-Mechanics = tuple[float, float, float, float]
 Field = tuple[float, float, float, float, float, float, float, float, float]
 
 
@@ -187,8 +194,8 @@ def windings(flux: Pair, mechanics: Mechanics, volt: Pair, warm: Pair, p: Plant)
     d_alpha = volt[0] - (2.0 * u_a - u_b - u_c) / 3.0
     d_beta = volt[1] - (u_b - u_c) / SQRT3
     if p.extras > 0:
-        u_d = extra(1, omega, theta, i_d, i_q, warm[0], warm[1], p)
-        u_q = extra(2, omega, theta, i_d, i_q, warm[0], warm[1], p)
+        u_d = extra(1, (theta, omega), (i_d, i_q), warm, p)
+        u_q = extra(2, (theta, omega), (i_d, i_q), warm, p)
         d_alpha -= c * u_d - s * u_q
         d_beta -= s * u_d + c * u_q
     torque = torque_of(psi_d, psi_q, i_d, i_q, w_eps, p)
@@ -218,7 +225,7 @@ def net_torque(mechanics: Mechanics, bristle: float, field: Field, warm: Pair, p
     theta, omega = mechanics[0], mechanics[1]
     net = field[2] + passive(theta, omega, bristle, field[2], field[8], p)
     if p.extras > 0:
-        net += extra(0, omega, theta, field[6], field[7], warm[0], warm[1], p)
+        net += extra(0, (theta, omega), (field[6], field[7]), warm, p)
     return float(net)
 
 

@@ -7,9 +7,10 @@ from numba import njit
 
 from pipeline.simulator.converter import resistance_rise
 from pipeline.simulator.field import Array, current, magnet, stiffness
+from pipeline.simulator.motion import Pair
 from pipeline.simulator.plant import Plant
 
-Pair = tuple[float, float]
+Circuit = tuple[float, float, float]
 
 
 @njit(cache=True)
@@ -40,25 +41,20 @@ def pair_current(flux: Pair, way: Pair, eps: float, t_m: float, p: Plant) -> flo
 
 
 @njit(cache=True)
-def pair_rate(
-    flux: Pair, way: Pair, volt: float, ohm: float, eps: float, t_m: float, p: Plant
-) -> Pair:
+def pair_rate(flux: Pair, circuit: Circuit, volt: float, spot: Pair, p: Plant) -> Pair:
     """Flux rate that lets current change along the pair alone.
 
     Parameters
     ----------
     flux
         Flux linkages in d and q [Wb].
-    way
-        Space vector of one ampere through the pair, in d and q [1].
+    circuit
+        Space vector of one ampere through the pair, in d and q [1]; resistance of pair and supply
+        [ohm].
     volt
         Open voltage of the supply [V].
-    ohm
-        Resistance of pair and supply [ohm].
-    eps
-        Electrical angle [rad].
-    t_m
-        Temperature of the magnets [degC].
+    spot
+        Electrical angle [rad] and temperature of the magnets [degC].
     p
         The plant.
 
@@ -72,25 +68,19 @@ def pair_rate(
     dψ/dt = L way di/dt with L the incremental inductances, and v − R i = 1.5 way · dψ/dt.
 
     """
-    g_dd, g_qq, g_dq = stiffness(flux[0], flux[1], eps, t_m, p)
+    way, ohm = (circuit[0], circuit[1]), circuit[2]
+    g_dd, g_qq, g_dq = stiffness(flux[0], flux[1], spot[0], spot[1], p)
     det = g_dd * g_qq - g_dq * g_dq
     l_d = (g_qq * way[0] - g_dq * way[1]) / det
     l_q = (g_dd * way[1] - g_dq * way[0]) / det
-    i = pair_current(flux, way, eps, t_m, p)
+    i = pair_current(flux, way, spot[0], spot[1], p)
     rate = (volt - ohm * i) / (1.5 * (way[0] * l_d + way[1] * l_q))
     return l_d * rate, l_q * rate
 
 
 @njit(cache=True)
 def advanced(
-    flux: Pair,
-    way: Pair,
-    ramp: tuple[float, float],
-    time: tuple[float, int],
-    ohm: float,
-    eps: float,
-    t_m: float,
-    p: Plant,
+    flux: Pair, circuit: Circuit, ramp: Pair, time: tuple[float, int], spot: Pair, p: Plant
 ) -> Pair:
     """Flux after `time` = (step, how many), by RK4 under the voltage `ramp` = (start, slope).
 
@@ -98,18 +88,14 @@ def advanced(
     ----------
     flux
         Flux linkages [Wb].
-    way
-        Direction of the terminal pair in the rotor frame.
+    circuit
+        As `pair_rate` takes it.
     ramp
         Voltage at the start [V] and its slope [V/s].
     time
         Length [s] and number of the steps.
-    ohm
-        Resistance of the pair [ohm].
-    eps
-        Electrical angle [rad].
-    t_m
-        Temperature of the magnets [degC].
+    spot
+        Electrical angle [rad] and temperature of the magnets [degC].
     p
         The motor in numbers.
 
@@ -119,12 +105,12 @@ def advanced(
     for m in range(time[1]):
         v1 = ramp[0] + slope * m * h
         v2, v4 = v1 + 0.5 * slope * h, v1 + slope * h
-        a1, b1 = pair_rate((d, q), way, v1, ohm, eps, t_m, p)
+        a1, b1 = pair_rate((d, q), circuit, v1, spot, p)
         at = (d + 0.5 * h * a1, q + 0.5 * h * b1)
-        a2, b2 = pair_rate(at, way, v2, ohm, eps, t_m, p)
+        a2, b2 = pair_rate(at, circuit, v2, spot, p)
         at = (d + 0.5 * h * a2, q + 0.5 * h * b2)
-        a3, b3 = pair_rate(at, way, v2, ohm, eps, t_m, p)
-        a4, b4 = pair_rate((d + h * a3, q + h * b3), way, v4, ohm, eps, t_m, p)
+        a3, b3 = pair_rate(at, circuit, v2, spot, p)
+        a4, b4 = pair_rate((d + h * a3, q + h * b3), circuit, v4, spot, p)
         d += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
         q += h * (b1 + 2.0 * b2 + 2.0 * b3 + b4) / 6.0
     return d, q
@@ -133,14 +119,10 @@ def advanced(
 @njit(cache=True)
 def pair_step(
     source: Array,
-    early: Array,
-    step_s: float,
-    substeps: int,
-    pair: tuple[float, float, float],
-    source_ohm: float,
+    time: tuple[float, int],
+    pair: tuple[float, float, float, float],
     eps: float,
-    t_w: float,
-    t_m: float,
+    warm: Pair,
     p: Plant,
 ) -> Array:
     """Voltage and current of one terminal pair, the rotor locked and the third terminal open.
@@ -148,21 +130,17 @@ def pair_step(
     Parameters
     ----------
     source
-        Open voltage of the supply at each sample [n + 1, V], linear between them except that a jump
-        of more than half its largest value is an edge.
-    early
-        By how much of a sample an edge comes before the later point [n + 1, samples].
-    step_s
-        Sampling period [s].
-    substeps
-        Integration steps a sample.
+        Open voltage of the supply [V] at each sample, linear between them except that a jump of
+        more than half its largest value is an edge; and by how much of a sample such an edge comes
+        before the later point [n + 1, 2].
+    time
+        Sampling period [s], and integration steps a sample.
     pair
-        Current direction in alpha and beta [1], and the pair's resistance at 25 degC [ohm].
-    source_ohm
-        Resistance of the supply [ohm].
+        Current direction in alpha and beta [1], the pair's resistance at 25 degC and that of the
+        supply [ohm].
     eps
         Electrical angle of the rotor [rad].
-    t_w, t_m
+    warm
         Temperatures of winding and magnets [degC].
     p
         The plant.
@@ -177,26 +155,28 @@ def pair_step(
     The state is the flux vector; the open terminal's voltage is what keeps its current zero.
 
     """
-    out = np.empty((source.size - 1, 2))
+    volts, early = source[:, 0], source[:, 1]
+    out = np.empty((volts.size - 1, 2))
     c, s = np.cos(eps), np.sin(eps)
     way = (c * pair[0] + s * pair[1], c * pair[1] - s * pair[0])
-    whole = pair[2] * resistance_rise(0.0, t_w, p) + source_ohm
-    d, q, _, _ = magnet(eps, t_m, p)
+    whole = pair[2] * resistance_rise(0.0, warm[0], p) + pair[3]
+    circuit, spot = (way[0], way[1], whole), (eps, warm[1])
+    d, q, _, _ = magnet(eps, warm[1], p)
     flux = (d, q)
-    edge = 0.5 * np.max(np.abs(source))
+    edge = 0.5 * np.max(np.abs(volts))
+    step_s, substeps = time
     h = step_s / substeps
-    for n in range(source.size - 1):
-        i = pair_current(flux, way, eps, t_m, p)
-        out[n, 0], out[n, 1] = source[n] - source_ohm * i, i
-        jump = source[n + 1] - source[n]
+    for n in range(volts.size - 1):
+        i = pair_current(flux, way, eps, warm[1], p)
+        out[n, 0], out[n, 1] = volts[n] - pair[3] * i, i
+        jump = volts[n + 1] - volts[n]
         if abs(jump) > edge:
             after = early[n + 1]
             first = (h * (1.0 - after), substeps)
-            flux = advanced(flux, way, (source[n], 0.0), first, whole, eps, t_m, p)
+            flux = advanced(flux, circuit, (volts[n], 0.0), first, spot, p)
             if after > 0.0:
                 last = (h * after, substeps)
-                flux = advanced(flux, way, (source[n + 1], 0.0), last, whole, eps, t_m, p)
+                flux = advanced(flux, circuit, (volts[n + 1], 0.0), last, spot, p)
         else:
-            ramp = (source[n], jump / step_s)
-            flux = advanced(flux, way, ramp, (h, substeps), whole, eps, t_m, p)
+            flux = advanced(flux, circuit, (volts[n], jump / step_s), (h, substeps), spot, p)
     return out

@@ -11,6 +11,10 @@ from pipeline.simulator.field import Array, cogging
 from pipeline.simulator.plant import Plant
 
 TURN = 2.0 * math.pi
+Pair = tuple[float, float]
+Arrays = tuple[Array, Array]
+Mechanics = tuple[float, float, float, float]
+"""Angle and speed of the rotor, then of the far mass [rad, rad/s]."""
 
 
 @njit(cache=True)
@@ -214,74 +218,51 @@ def lookup(x: float, xs: Array, ys: Array, n: int) -> float:
 
 
 @njit(cache=True)
-def variable(
-    code: int, omega: float, theta: float, i_d: float, i_q: float, t_w: float, t_m: float, p: Plant
-) -> float:
+def variable(code: int, motion: Pair, amps: Pair, warm: Pair, p: Plant) -> float:
     """The value of one of `design.EXTRA_VARIABLES`.
 
     Parameters
     ----------
     code
         Number of the variable.
-    omega
-        Mechanical speed [rad/s].
-    theta
-        Mechanical angle [rad].
-    i_d
-        Current along d [A].
-    i_q
-        Current along q [A].
-    t_w
-        Temperature of the winding [degC].
-    t_m
-        Temperature of the magnets [degC].
+    motion
+        Mechanical angle [rad] and speed [rad/s].
+    amps
+        Current along d and q [A].
+    warm
+        Temperatures of winding and magnets [degC].
     p
         The motor in numbers.
 
     """
     values = (
         1.0,
-        omega,
-        theta % TURN,
-        (p.pole_pairs * theta) % TURN,
-        i_d,
-        i_q,
-        math.hypot(i_d, i_q),
-        t_w,
-        t_m,
+        motion[1],
+        motion[0] % TURN,
+        (p.pole_pairs * motion[0]) % TURN,
+        amps[0],
+        amps[1],
+        math.hypot(amps[0], amps[1]),
+        warm[0],
+        warm[1],
     )
     return float(values[code])
 
 
 @njit(cache=True)
-def extra(
-    signal: int,
-    omega: float,
-    theta: float,
-    i_d: float,
-    i_q: float,
-    t_w: float,
-    t_m: float,
-    p: Plant,
-) -> float:
+def extra(signal: int, motion: Pair, amps: Pair, warm: Pair, p: Plant) -> float:
     """Sum of the extra terms that enter one signal.
 
     Parameters
     ----------
     signal
         Number of the signal.
-    omega
-        Mechanical speed [rad/s].
-    theta
-        Mechanical angle [rad].
-    i_d
-        Current along d [A].
-    i_q
-        Current along q [A].
-    t_w
-        Temperature of the winding [degC].
-    t_m
-        Temperature of the magnets [degC].
+    motion
+        Mechanical angle [rad] and speed [rad/s].
+    amps
+        Current along d and q [A].
+    warm
+        Temperatures of winding and magnets [degC].
     p
         The motor in numbers.
 
@@ -289,8 +270,8 @@ def extra(
     total = 0.0
     for k in range(p.extras):
         if p.extra_signal[k] == signal:
-            x = variable(p.extra_variable[k], omega, theta, i_d, i_q, t_w, t_m, p)
-            times = variable(p.extra_times[k], omega, theta, i_d, i_q, t_w, t_m, p)
+            x = variable(p.extra_variable[k], motion, amps, warm, p)
+            times = variable(p.extra_times[k], motion, amps, warm, p)
             total += times * lookup(x, p.extra_x[k], p.extra_y[k], p.extra_points[k])
     return total
 
@@ -350,26 +331,18 @@ def free_torque(theta: float, omega: float, bristle: float, t_m: float, p: Plant
     ratio = 1.0 + p.alpha_magnet * (t_m - 25.0)
     total = passive(theta, omega, bristle, 0.0, ratio, p)
     if p.extras > 0:
-        total += extra(0, omega, theta, 0.0, 0.0, t_m, t_m, p)
+        total += extra(0, (theta, omega), (0.0, 0.0), (t_m, t_m), p)
     return total
 
 
 @njit(cache=True)
-def free_rates(
-    theta: float, omega: float, far: float, far_omega: float, bristle: float, t_m: float, p: Plant
-) -> tuple[float, float]:
+def free_rates(mechanics: Mechanics, bristle: float, t_m: float, p: Plant) -> Pair:
     """Accelerations of rotor and far mass of an open-circuit motor [rad/s²].
 
     Parameters
     ----------
-    theta
-        Mechanical angle [rad].
-    omega
-        Mechanical speed [rad/s].
-    far
-        Angle of the far mass [rad].
-    far_omega
-        Speed of the far mass [rad/s].
+    mechanics
+        Angle and speed of the rotor, then of the far mass [rad, rad/s].
     bristle
         Deflection of the friction's bristle [rad].
     t_m
@@ -378,6 +351,7 @@ def free_rates(
         The motor in numbers.
 
     """
+    theta, omega, far, far_omega = mechanics
     torque = free_torque(theta, omega, bristle, t_m, p)
     if not p.two_mass:
         return torque / p.j_rotor, 0.0
@@ -386,15 +360,13 @@ def free_rates(
 
 
 @njit(cache=True)
-def coast(
-    theta: float, omega: float, step_s: float, substeps: int, count: int, t_m: float, p: Plant
-) -> Array:
+def coast(start: Pair, step_s: float, substeps: int, count: int, t_m: float, p: Plant) -> Array:
     """A rotor that coasts with open terminals.
 
     Parameters
     ----------
-    theta, omega
-        Shaft angle [rad] and speed [rad/s] at the start; a far mass moves alike, the bristle is
+    start
+        Shaft angle [rad] and speed [rad/s]; a far mass moves alike, the bristle is
         bent.
     step_s
         Time from one row to the next [s].
@@ -416,20 +388,21 @@ def coast(
     """
     out = np.empty((count, 2))
     h = step_s / substeps
-    far, far_omega = theta, omega
+    theta, omega = start
+    far, far_omega = start
     bristle = math.copysign(p.bristle, omega)
     for k in range(count):
         out[k, 0], out[k, 1] = theta, omega
         for _ in range(substeps):
-            a1, b1 = free_rates(theta, omega, far, far_omega, bristle, t_m, p)
+            a1, b1 = free_rates((theta, omega, far, far_omega), bristle, t_m, p)
             w2, f2 = omega + 0.5 * h * a1, far_omega + 0.5 * h * b1
-            a2, b2 = free_rates(
-                theta + 0.5 * h * omega, w2, far + 0.5 * h * far_omega, f2, bristle, t_m, p
-            )
+            half = (theta + 0.5 * h * omega, w2, far + 0.5 * h * far_omega, f2)
+            a2, b2 = free_rates(half, bristle, t_m, p)
             w3, f3 = omega + 0.5 * h * a2, far_omega + 0.5 * h * b2
-            a3, b3 = free_rates(theta + 0.5 * h * w2, w3, far + 0.5 * h * f2, f3, bristle, t_m, p)
+            half = (theta + 0.5 * h * w2, w3, far + 0.5 * h * f2, f3)
+            a3, b3 = free_rates(half, bristle, t_m, p)
             w4, f4 = omega + h * a3, far_omega + h * b3
-            a4, b4 = free_rates(theta + h * w3, w4, far + h * f3, f4, bristle, t_m, p)
+            a4, b4 = free_rates((theta + h * w3, w4, far + h * f3, f4), bristle, t_m, p)
             travel = h * (omega + 2.0 * w2 + 2.0 * w3 + w4) / 6.0
             theta += travel
             far += h * (far_omega + 2.0 * f2 + 2.0 * f3 + f4) / 6.0
@@ -632,36 +605,29 @@ def passives(theta: Array, omega: Array, torque: Array, i_q: Array, t_m: float, 
         bristle = math.copysign(p.bristle, omega[k])
         out[k] = passive(theta[k], omega[k], bristle, torque[k], 1.0, p)
         if p.extras > 0:
-            out[k] += extra(0, omega[k], theta[k], 0.0, i_q[k], t_m, t_m, p)
+            out[k] += extra(0, (theta[k], omega[k]), (0.0, i_q[k]), (t_m, t_m), p)
     return out
 
 
 @njit(cache=True)
-def extra_volts(
-    theta: Array, omega: Array, i_d: Array, i_q: Array, t_w: Array, t_m: Array, p: Plant
-) -> Array:
+def extra_volts(motion: Arrays, amps: Arrays, warm: Arrays, p: Plant) -> Array:
     """Extra voltages along d and q [n, 2] that the terminals see on top.
 
     Parameters
     ----------
-    theta
-        Mechanical angle [n, rad].
-    omega
-        Mechanical speed [n, rad/s].
-    i_d
-        Current along d [n, A].
-    i_q
-        Current along q [n, A].
-    t_w
-        Temperature of the winding [n, degC].
-    t_m
-        Temperature of the magnets [n, degC].
+    motion
+        Mechanical angle [n, rad] and speed [n, rad/s].
+    amps
+        Current along d and q, each [n, A].
+    warm
+        Temperatures of winding and magnets, each [n, degC].
     p
         The motor in numbers.
 
     """
-    out = np.empty((theta.size, 2))
-    for k in range(theta.size):
+    out = np.empty((motion[0].size, 2))
+    for k in range(out.shape[0]):
         for axis in range(2):
-            out[k, axis] = extra(1 + axis, omega[k], theta[k], i_d[k], i_q[k], t_w[k], t_m[k], p)
+            moved, flows = (motion[0][k], motion[1][k]), (amps[0][k], amps[1][k])
+            out[k, axis] = extra(1 + axis, moved, flows, (warm[0][k], warm[1][k]), p)
     return out

@@ -143,15 +143,11 @@ def current_step(session: Session, how: protocols.CurrentStep) -> Recording:
     steps = max(1, math.ceil(1.0 / (rate * tau * 0.02)))
     early = session.rng.uniform(size=n + 1) if how.random_edges else np.zeros(n + 1)
     true = pair_step(
-        source,
-        early,
-        1.0 / rate,
-        steps,
-        (alpha, beta, ohm),
-        how.source_share * ohm,
+        np.column_stack([source, early]),
+        (1.0 / rate, steps),
+        (alpha, beta, ohm, how.source_share * ohm),
         math.radians(how.theta_elec_deg + how.theta_off_deg),
-        degc,
-        degc,
+        (degc, degc),
         plant,
     )
     volts, amps, stated = _measured(session, true, first, t_s)
@@ -305,9 +301,9 @@ def _dq_log(
     i_dq, v_dq = complex(i_phase @ turn), v_phase @ turn
     if session.plant.extras > 0:
         theta, still = np.full(n, eps / session.motor.pole_pairs), np.zeros(n)
-        i_d, i_q = np.full(n, i_dq.real), np.full(n, i_dq.imag)
-        t_w, t_m = np.ascontiguousarray(heat[:, 0]), np.ascontiguousarray(heat[:, 1])
-        more = extra_volts(theta, still, i_d, i_q, t_w, t_m, session.plant)
+        amps = (np.full(n, i_dq.real), np.full(n, i_dq.imag))
+        warm = (np.ascontiguousarray(heat[:, 0]), np.ascontiguousarray(heat[:, 1]))
+        more = extra_volts((theta, still), amps, warm, session.plant)
         v_dq = v_dq + more[:, 0] + 1j * more[:, 1]
     v_dq = session.instruments.voltage_commanded * (1.0 + session.fault("voltage_scale")) * v_dq
     sigma = session.current_sigma_a * math.sqrt(2.0 / 3.0)

@@ -35,7 +35,7 @@ def _terminal_voltages(
         emf = open_emf(p * theta, p * omega, magnet, session.plant)
     if session.plant.extras > 0:
         none = np.zeros(theta.size)
-        more = extra_volts(theta, omega, none, none, magnet, magnet, session.plant)
+        more = extra_volts((theta, omega), (none, none), (magnet, magnet), session.plant)
         vector = (more[:, 0] + 1j * more[:, 1]) * np.exp(1j * p * theta)
         emf += np.real(vector[:, None] * np.exp(-2j * math.pi * np.arange(3) / 3.0)[None, :])
     return emf
@@ -202,7 +202,7 @@ def spin_down(session: Session, how: protocols.SpinDown) -> Recording:
     steps = min(400, max(2, math.ceil(fastest / rate / 0.5)))
     start = session.rng.uniform(0.0, 2.0 * math.pi)
     degc = motor.ambient_degc if how.temp_magnet_degc is None else how.temp_magnet_degc
-    true = coast(start, how.direction * omega_0, 1.0 / rate, steps, count, degc, plant)
+    true = coast((start, how.direction * omega_0), 1.0 / rate, steps, count, degc, plant)
     still = np.flatnonzero(how.direction * true[:, 1] < how.end * omega_0)
     n = int(still[0]) if still.size else count
     theta, omega = true[:n, 0], true[:n, 1]

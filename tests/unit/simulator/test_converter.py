@@ -161,12 +161,12 @@ def test_locked_step_is_the_exponential(theta_deg, henry, source_ohm, early):
     The edge lies `early` of a sample before sample 100, and the supply has a resistance.
     """
     motor = design("gimbal-5208")
-    source = np.zeros(1201)
-    source[100:] = 2.0
-    pair = (1.0, -1.0 / math.sqrt(3.0), 0.84)
-    before = np.full(1201, early)
-    angle = math.radians(theta_deg)
-    out = pair_step(source, before, 2e-6, 2, pair, source_ohm, angle, 25.0, 25.0, plant_of(motor))
+    source = np.zeros((1201, 2))
+    source[100:, 0] = 2.0
+    source[:, 1] = early
+    pair = (1.0, -1.0 / math.sqrt(3.0), 0.84, source_ohm)
+    plant = plant_of(motor)
+    out = pair_step(source, (2e-6, 2), pair, math.radians(theta_deg), (25.0, 25.0), plant)
     t = (np.arange(1100) + early) * 2e-6
     loop = 0.84 + source_ohm
     current = 2.0 / loop * (1 - np.exp(-t * loop / henry))
