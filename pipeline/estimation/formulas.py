@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.physics.glossary import CONSTANTS, TESTS
@@ -76,4 +76,4 @@ def _one(method: str, name: str, formula: Formula, known: Constants) -> Estimate
         for power, estimate in zip(formula.powers, inputs, strict=True)
     ]
     at = {"temp_winding_degc": 25.0, "temp_magnet_degc": 25.0}
-    return derived(name, unit, value, terms, method, at, formula.words)
+    return replace(derived(name, unit, value, terms, method, at), note=formula.words)

@@ -83,7 +83,6 @@ class Method:
         captures: Iterable[Capture | str] = (),
         at: Conditions | None = None,
         notes: str | Iterable[str] = (),
-        bounds: tuple[float, float] | None = None,
     ) -> Estimate:
         """A measured constant.
 
@@ -101,15 +100,13 @@ class Method:
             The conditions it holds for.
         notes
             Empty ones are left out.
-        bounds
-            The range that was searched.
 
         """
         paths = tuple(c if isinstance(c, str) else c.path for c in captures)
         note = notes if isinstance(notes, str) else "; ".join(words for words in notes if words)
         return Estimate(
             constant, value, self.unit(constant), "measured", self.name,
-            budget_of(parts), at or {}, paths, note, bounds,
+            budget_of(parts), at or {}, paths, note,
         )  # fmt: skip
 
     def missing(self, constant: str, note: str) -> Estimate:

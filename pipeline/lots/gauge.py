@@ -149,14 +149,12 @@ def components(table: Table, pool_from: float = POOL_FROM) -> Components:
 
     """
     pooled = table.interaction_p > pool_from
-    return _components(
-        table.motors,
-        table.stations,
-        table.repeats,
-        *_pooled(table) if pooled else (table.ms_interaction, table.ms_error),
-        table.ms_part,
-        table.ms_station,
-        pooled=pooled,
+    msi, mse = _pooled(table) if pooled else (table.ms_interaction, table.ms_error)
+    return Components(
+        repeatability=mse,
+        station=max(0.0, (table.ms_station - msi) / (table.motors * table.repeats)),
+        interaction=0.0 if pooled else max(0.0, (msi - mse) / table.repeats),
+        part=max(0.0, (table.ms_part - msi) / (table.stations * table.repeats)),
     )
 
 
@@ -164,17 +162,6 @@ def _pooled(table: Table) -> tuple[float, float]:
     _, _, i, e = table.dof
     mean = (i * table.ms_interaction + e * table.ms_error) / (i + e)
     return mean, mean
-
-
-def _components(
-    p: int, o: int, n: int, msi: float, mse: float, msp: float, mso: float, *, pooled: bool
-) -> Components:
-    return Components(
-        repeatability=mse,
-        station=max(0.0, (mso - msi) / (p * n)),
-        interaction=0.0 if pooled else max(0.0, (msi - mse) / n),
-        part=max(0.0, (msp - msi) / (o * n)),
-    )
 
 
 def study(values: Array, level: float = LEVEL) -> Gauge:

@@ -231,7 +231,6 @@ def derived(
     terms: list[tuple[float, Estimate]],
     method: str,
     at: Conditions | None = None,
-    note: str = "",
 ) -> Estimate:
     """A constant that is computed from others.
 
@@ -249,8 +248,6 @@ def derived(
         What computes it.
     at
         Conditions that it holds at.
-    note
-        The formula, for people.
 
     Returns
     -------
@@ -260,4 +257,4 @@ def derived(
     """
     captures = sorted({path for _, source in terms for path in source.captures})
     budget = propagate((slope, source.budget) for slope, source in terms)
-    return Estimate(name, value, unit, "derived", method, budget, at or {}, tuple(captures), note)
+    return Estimate(name, value, unit, "derived", method, budget, at or {}, tuple(captures))

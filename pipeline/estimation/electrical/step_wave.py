@@ -133,7 +133,7 @@ def waveform_of(
     groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > 1) + 1) if jumps.size else []
     few = len(groups) <= policy().steps.most_edges
     if few and all(group.size <= 2 for group in groups):
-        wave = _supplied(t_s, v_v, i_a, groups, noise, period, ideal)
+        wave = _supplied(t_s, v_v, i_a, groups, noise, ideal)
         if wave is not None:
             return wave
     return _sampled(t_s, v_v, timing, groups if few else [], period)
@@ -145,10 +145,10 @@ def _supplied(
     i_a: Array,
     groups: list[Index],
     noise: Noise,
-    period_s: float,
     ideal: bool,
 ) -> Waveform | None:
     """The waveform of a supply, None where none describes the samples."""
+    period_s = float(np.median(np.diff(t_s)))
     level_of = np.zeros(v_v.size, dtype=np.intp)
     for group in groups:
         level_of[group[-1] + 1 :] += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.method import Method
@@ -59,7 +60,8 @@ def _named(name: str, value: float, ke: Estimate) -> Estimate:
     power = -1.0 if name == "kv_ll_peak_rpm_v" else 1.0
     unit = METHOD.unit(name)
     terms = [(power * value / ke.number, ke)]
-    return derived(name, unit, value, terms, METHOD.name, ke.at, f"from Ke of {ke.method}")
+    named = derived(name, unit, value, terms, METHOD.name, ke.at)
+    return replace(named, note=f"from Ke of {ke.method}")
 
 
 ESTIMATOR = Estimator(

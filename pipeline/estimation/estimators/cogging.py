@@ -72,10 +72,10 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         return METHOD.nothing(GIVES, note)
     highest = largest_order(turns, int(options["highest_order"]))
     spec, lines = find_orders(turns, highest, options["level"])
-    body, slow = part_orders(lines, known, campaign)
-    estimates = _cogging(captures, spec, body, slow, known, campaign, options)
+    parted = part_orders(lines, known, campaign)
+    estimates = _cogging(captures, spec, parted, known, campaign, options)
     estimates += (_friction(captures, turns, spec, known),)
-    return Fit(estimates, _evidence(turns, spec, body))
+    return Fit(estimates, _evidence(turns, spec, parted[0]))
 
 
 def part_orders(
@@ -187,12 +187,12 @@ def name_orders(lines: Sequence[OrderLine], known: Constants, campaign: Campaign
 def _cogging(
     captures: Sequence[Capture],
     spec: Spectrum,
-    lines: Sequence[OrderLine],
-    slow: Sequence[OrderLine],
+    parted: tuple[Sequence[OrderLine], Sequence[OrderLine]],
     known: Constants,
     campaign: Campaign,
     options: Mapping[str, float],
 ) -> tuple[Estimate, ...]:
+    lines, slow = parted
     also = f"; also {name_orders(slow, known, campaign)} N·m, of unbalance or coupling" * bool(slow)
     tested = f"{spec.orders.size} orders tested over {spec.turns} turns at {options['level']:g}"
     if not lines:
@@ -208,9 +208,9 @@ def _cogging(
     peak, u_peak = half_peak_to_peak(peak_orders(lines, spec, _teeth(known, campaign), sides))
     note += "; " * bool(unstated_note(captures, ("torque",))) + unstated_note(captures, ("torque",))
     dof = min(line.dof for line in lines)
+    order = METHOD.measured("cogging_order", leading.order, captures=captures, notes=note)
     return (
-        METHOD.measured("cogging_order", leading.order, captures=captures, notes=note,
-                        bounds=(1.0, float(spec.orders[-1]))),
+        replace(order, bounds=(1.0, float(spec.orders[-1]))),
         replace(
             _torque("cogging_amplitude_nm", amplitude, leading.u, leading.dof, captures, note),
             orders=_published(lines),
@@ -234,13 +234,11 @@ def _torque(
     dof: float,
     captures: Sequence[Capture],
     note: str,
-    speed_rad_s: float | None = None,
 ) -> Estimate:
     parts = [METHOD.scatter(name, u, dof)]
     gains = instrument_uncertainties(captures, ("torque",))
     parts += [Contribution(source, value * gain, "B") for source, gain in gains.items()]
-    at = {} if speed_rad_s is None else {"omega_mech_rad_s": speed_rad_s}
-    return METHOD.measured(name, value, parts, captures, at, note)
+    return METHOD.measured(name, value, parts, captures, notes=note)
 
 
 def _friction(
@@ -265,7 +263,8 @@ def _friction(
         f"drag at creep speed, with Stribeck's excess in it{words}; transducer zero {zero:.2g} N·m "
         f"parted by direction; {len(turns)} turns"
     )
-    return _torque(name, value, u, dof, captures, note, speed)
+    torque = _torque(name, value, u, dof, captures, note)
+    return torque if speed is None else replace(torque, at={"omega_mech_rad_s": speed})
 
 
 def _viscous_share(speed_rad_s: float | None, known: Constants) -> tuple[float, str]:

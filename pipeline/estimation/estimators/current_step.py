@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -223,7 +224,7 @@ def _estimate(
         words.append(f"no saturation seen up to {largest:.3g} A on this axis")
     bounds = (1e-3 * value, 1e3 * value)
     used = [r.capture for r in solution.model.records]
-    return METHOD.measured(name, value, parts, used, at, words, bounds)
+    return replace(METHOD.measured(name, value, parts, used, at, words), bounds=bounds)
 
 
 def _share(record: StepRecord, name: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -245,8 +246,8 @@ def _cogging(
         note += f"; {rms_a:.3g} A rms left in held-out sectors"
     leading, alias = _true_order(lines[0].order, positions, known, campaign)
     note += alias
-    bounds = (1.0, float(spec.orders[-1]))
-    order = METHOD.measured(names[0], leading, captures=captures, notes=note, bounds=bounds)
+    order = METHOD.measured(names[0], leading, captures=captures, notes=note)
+    order = replace(order, bounds=(1.0, float(spec.orders[-1])))
     read = (
         METHOD.scatter(names[1], lines[0].u, lines[0].dof),
         *_gains(captures, lines[0].amplitude),

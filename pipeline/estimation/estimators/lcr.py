@@ -108,8 +108,8 @@ def fit_lcr(campaign: Campaign, known: Constants, options: Mapping[str, float]) 
         return METHOD.nothing(GIVES, EXPERIMENT)
     used = tuple(captures[k] for k in sorted({int(k) for k in table.capture}))
     estimates = {
-        name: _estimate(name, value, u, dof, found.note, used, options)
-        for name, (value, u, dof) in found.values.items()
+        name: _estimate(name, read, found.note, used, options)
+        for name, read in found.values.items()
     }
     resistance = _resistance(used, options)
     if resistance is not None:
@@ -253,13 +253,13 @@ def _swing_of_noise(swing_h: Array) -> bool:
 
 def _estimate(
     name: str,
-    value: float,
-    u: float,
-    dof: float,
+    read: tuple[float, float, float],
     note: str,
     used: Sequence[Capture],
     options: Mapping[str, float],
 ) -> Estimate:
+    """The estimate of a value read with its scatter and degrees of freedom."""
+    value, u, dof = read
     parts = [METHOD.scatter(name, u, dof)]
     words = [note]
     if METHOD.unit(name) != "deg":
@@ -301,7 +301,7 @@ def _resistance(used: Sequence[Capture], options: Mapping[str, float]) -> Estima
     u = float(values.std(ddof=1)) / math.sqrt(values.size)
     note = "at the meter's frequency and the winding's temperature of the day"
     mean = float(values.mean())
-    return _estimate("r_lcr_ohm", mean, u, float(values.size - 1), note, used, options)
+    return _estimate("r_lcr_ohm", (mean, u, float(values.size - 1)), note, used, options)
 
 
 def _evidence(table: Table, found: Found) -> tuple[Evidence, ...]:

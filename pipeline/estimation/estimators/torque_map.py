@@ -107,11 +107,12 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         groups = len({p.group for p in points})
         note = f"{len(points)} settled points at {groups} speeds; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
-    alpha, alpha_parts = magnet_coefficient(known)
+    alpha, _ = magnet_coefficient(known)
     chosen = _chosen(points, alpha, options["level"])
     model = _regress(points, alpha, chosen)
     still = angle_doubt(points, model.kt_nm_a, pairs, known)
-    estimates = _estimates(captures, points, table, model, chosen, alpha, alpha_parts, still, known)
+    note = _note(captures, table, points, chosen)
+    estimates = _estimates(points, model, chosen, still, known, note)
     return Fit(estimates, _evidence(points, model, alpha, chosen))
 
 
@@ -200,16 +201,14 @@ def _sigma(points: Sequence[Point]) -> Array:
 
 
 def _estimates(
-    captures: Sequence[Capture],
     points: Sequence[Point],
-    table: PointTable,
     model: Regression,
     chosen: Sequence[str],
-    alpha: float,
-    alpha_parts: Budget,
     still: Budget,
     known: Constants,
+    note: str,
 ) -> tuple[Estimate, ...]:
+    alpha, alpha_parts = magnet_coefficient(known)
     used = list({p.capture.path: p.capture for p in points}.values())
     slope_k = _slope(points, alpha, chosen, model)
     type_b = _type_b(points, chosen, alpha, instrument_uncertainties(used, ("current", "torque")))
@@ -218,7 +217,6 @@ def _estimates(
     if not _d_logged(points):
         share = policy().torque_map.unlogged_d_share
         type_b[0].append(Contribution("assumed:id_a", share * slope_k.kt_nm_a, "B"))
-    note = _note(captures, table, points, chosen)
     paths = sorted({p.capture.path for p in points})
     at = {"temp_magnet_degc": 25.0, "iq_a": float(np.max(np.abs(_column(points, "iq_a"))))}
 
