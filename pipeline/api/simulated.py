@@ -25,6 +25,10 @@ from pipeline.simulator.design import EXACT, Bench, Motor, Recording
 from pipeline.simulator.outside import with_unknown
 from pipeline.simulator.truth import truth
 
+Plan = tuple[tuple[str, str, Mapping[str, Any]], ...]
+Job = tuple[str, Motor, Bench, int, Plan]
+"""Subfolder, motor, bench, seed, captures to record (all of the campaign where empty)."""
+
 
 def simulate(
     motor: str = "gimbal-5208",
@@ -115,12 +119,6 @@ def _capture(recording: Recording) -> Capture:
         meta=capture_meta(recording.meta),
         tables=tuple(pl.DataFrame(dict(table)) for table in recording.tables),
     )
-
-
-Plan = tuple[tuple[str, str, Mapping[str, Any]], ...]
-
-Job = tuple[str, Motor, Bench, int, Plan]
-"""Subfolder, motor, bench, seed, captures to record (all of the campaign where empty)."""
 
 
 def single(settings: SimulateSettings) -> Iterable[Job]:

@@ -10,6 +10,9 @@ from pipeline.records.errors import UsageError
 
 WYE = "wye equivalent: what a drive sees a phase, published for wye and delta alike"
 PAIRS = ("ab", "bc", "ca")
+# A bridge reads to a part in a thousand: below that the angle is that of its errors.
+EQUAL = 1e-3
+PHASE = "inductances of one phase, wye equivalent"
 
 
 def _wye_delta(given: Given) -> Answer | None:
@@ -206,11 +209,6 @@ def _saliency(given: Given) -> Answer | None:
             formula = f"(L_d+L_q) + (L_d−L_q)·cos(2θ {shift})"
             lines.append(Line(f"l{pair}_h", read, "H", formula, f"between terminals {pair}"))
     return Answer(tuple(lines), f"{PHASE}; a meter across two terminals reads twice as much")
-
-
-# A bridge reads to a part in a thousand: below that the angle is that of its errors.
-EQUAL = 1e-3
-PHASE = "inductances of one phase, wye equivalent"
 
 
 def _from_three_pairs(given: Given, pairs: tuple[str, ...]) -> Answer:

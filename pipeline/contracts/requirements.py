@@ -16,6 +16,8 @@ LINE_VOLTAGES = tuple(f"v{pair}_v" for pair in PAIRS)
 LINE_CURRENTS = ("ia_a", "ib_a", "ic_a")
 
 Alternative = tuple[str, ...]
+PHASE_VOLTAGES = ("va_v", "vb_v", "vc_v")
+DQ = ("vd_v", "vq_v", "id_a", "iq_a")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +56,6 @@ def _terminals(pair: str) -> tuple[Alternative, ...]:
     return tuple((f"v{pair}_v", f"i{phase}_a") for phase in pair)
 
 
-PHASE_VOLTAGES = ("va_v", "vb_v", "vc_v")
 TERMINAL_VOLTAGES = Requirement(
     (
         *combinations(LINE_VOLTAGES, 2),
@@ -64,7 +65,6 @@ TERMINAL_VOLTAGES = Requirement(
     ),
     "vab_v or another voltage between two terminals or of a phase",
 )
-DQ = ("vd_v", "vq_v", "id_a", "iq_a")
 
 _FIXED: dict[str, tuple[Requirement, ...]] = {
     "resistance": (),

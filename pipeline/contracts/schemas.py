@@ -24,6 +24,13 @@ if TYPE_CHECKING:
 EXAMPLES = 3
 
 Rule = Callable[[str], pl.Expr]
+_MOTION = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
+REMEDIES = {
+    "time_not_finite": "give every row its sampling instant, or leave the row out",
+    "time_not_increasing": "sort the rows by t_s, drop repeats, or fix the logger's clock",
+    "infinite_value": "write NaN where a value is missing",
+    "implausible_value": "map the column's unit in conf/source, or write NaN where it is missing",
+}
 
 
 def _is_time(column: str) -> pl.Expr:
@@ -51,7 +58,6 @@ def _in_range(column: str) -> pl.Expr:
     return inside | value.is_nan() | value.is_infinite() | value.is_null()
 
 
-_MOTION = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
 RULES: dict[str, Rule] = {
     "time_not_finite": _is_time,
     "time_not_increasing": _increases,
@@ -167,14 +173,6 @@ def _not_numbers(table: pl.DataFrame, column: str) -> CaptureError:
         f"{column} holds {table.schema[column]} instead of numbers",
         "write plain numbers, and NaN or nothing where a value is missing",
     )
-
-
-REMEDIES = {
-    "time_not_finite": "give every row its sampling instant, or leave the row out",
-    "time_not_increasing": "sort the rows by t_s, drop repeats, or fix the logger's clock",
-    "infinite_value": "write NaN where a value is missing",
-    "implausible_value": "map the column's unit in conf/source, or write NaN where it is missing",
-}
 
 
 def _fault(table: pl.DataFrame, column: str, code: str) -> CaptureError:

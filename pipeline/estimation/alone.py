@@ -24,6 +24,9 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import Budget, Contribution, coverage_factor
 
 Options = Mapping[str, Mapping[str, float]]
+UNPOWERED = ("open_circuit", "hand_turn", "spin_down")
+LINES = ("ia_a", "ib_a", "ic_a")
+TEMPERATURES = ("temp_magnet_degc", "temp_winding_degc")
 
 
 class Quantity(NamedTuple):
@@ -43,11 +46,6 @@ QUANTITIES: Mapping[str, Quantity] = {
     "ld_h": Quantity("ld_h", "H"),
     "lq_h": Quantity("lq_h", "H"),
 }
-
-
-UNPOWERED = ("open_circuit", "hand_turn", "spin_down")
-LINES = ("ia_a", "ib_a", "ic_a")
-TEMPERATURES = ("temp_magnet_degc", "temp_winding_degc")
 
 
 def repeated(campaign: Campaign) -> tuple[Capture, ...]:

@@ -26,6 +26,8 @@ from pipeline.records.uncertainty import without_between
 
 BROKEN = (ValueError, ArithmeticError, LookupError, TypeError, np.linalg.LinAlgError)
 REPORT = "the other constants stand; report the capture with this line"
+Recall = Callable[[Estimator, Constants, Mapping[str, float], Callable[[], Fit]], Fit]
+"""Gives a fit that was kept, or does it: (estimator, the constants it uses, options, fit)."""
 
 
 class Failure(NamedTuple):
@@ -72,10 +74,6 @@ def estimators() -> tuple[Estimator, ...]:
         for e in sorted(found.values(), key=lambda e: (e.rank, e.name))
     }
     return tuple(found[name] for name in TopologicalSorter(graph).static_order())
-
-
-Recall = Callable[[Estimator, Constants, Mapping[str, float], Callable[[], Fit]], Fit]
-"""Gives a fit that was kept, or does it: (estimator, the constants it uses, options, fit)."""
 
 
 def fit_all(

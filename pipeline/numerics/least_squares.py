@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pipeline.numerics.identifiability import TIED, Identified, identify
 
 Array = NDArray[np.float64]
+Model = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,9 +256,6 @@ class NonlinearFit:
 
         """
         return self.u_of(np.eye(self.parameters.size)[index])
-
-
-Model = Callable[[Array], tuple[Array, Array]]
 
 
 def gauss_newton(

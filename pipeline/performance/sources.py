@@ -28,6 +28,16 @@ ASSUMED = {
     MAGNET: (-1.0e-3, 4e-4, "from ferrite to sintered NdFeB: half of that range either side"),
 }
 """Coefficients [1/K] where they were not measured, with their u."""
+TESTS = {
+    "r_phase_ohm": "resistance",
+    "ld_h": "current_step or lcr with the rotor on the d axis",
+    "lq_h": "current_step or lcr with the rotor on the q axis",
+    "psi_pm_wb": "open_circuit",
+    "pole_pairs": "open_circuit with the shaft's angle",
+    "torque_coulomb_nm": "spin_down, with j_rotor_kgm2 from a drive",
+    "b_visc_nm_s_rad": "spin_down, with j_rotor_kgm2 from a drive",
+    "rth_winding_k_w": "heat_run of three thermal time constants",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,18 +178,6 @@ def heat_of(sources: Sources) -> Heat | None:
         return None
     body = d.get(HEAT[3], np.full(sources.size, 1.0))
     return Heat(d[HEAT[0]], d[HEAT[1]], d[HEAT[2]], body)
-
-
-TESTS = {
-    "r_phase_ohm": "resistance",
-    "ld_h": "current_step or lcr with the rotor on the d axis",
-    "lq_h": "current_step or lcr with the rotor on the q axis",
-    "psi_pm_wb": "open_circuit",
-    "pole_pairs": "open_circuit with the shaft's angle",
-    "torque_coulomb_nm": "spin_down, with j_rotor_kgm2 from a drive",
-    "b_visc_nm_s_rad": "spin_down, with j_rotor_kgm2 from a drive",
-    "rth_winding_k_w": "heat_run of three thermal time constants",
-}
 
 
 def missing(sources: Sources, names: tuple[str, ...], of: str, words: str) -> Blank | None:

@@ -43,6 +43,11 @@ CouplingName = Literal[
     "kt_power_invariant_nm_a",
     "kt_six_step_nm_a",
 ]
+PAIR_AXES_RAD: dict[str, float] = {
+    "ab": -math.pi / 6.0,
+    "bc": math.pi / 2.0,
+    "ca": 7.0 * math.pi / 6.0,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -484,13 +489,6 @@ def linear_resistance_ohm(
         * (1.0 + alpha_1_k * (temp_degc - alpha_at_degc))
         / (1.0 + alpha_1_k * (reference_degc - alpha_at_degc))
     )
-
-
-PAIR_AXES_RAD: dict[str, float] = {
-    "ab": -math.pi / 6.0,
-    "bc": math.pi / 2.0,
-    "ca": 7.0 * math.pi / 6.0,
-}
 
 
 def terminal_inductance_h(

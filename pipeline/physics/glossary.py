@@ -14,6 +14,27 @@ from typing import Literal
 from pipeline.physics.units import SUFFIX_UNITS
 
 TermKind = Literal["column", "constant", "metadata"]
+# What a motor cannot be without; an exact zero is a dead channel, not a measurement.
+TINY = 1e-12
+TESTS: dict[str, str] = {
+    "resistance": "DC steps through one terminal pair, four-wire",
+    "current_step": "rotor locked, voltage step on one terminal pair",
+    "lcr": "LCR meter across a pair at several rotor angles",
+    "open_circuit": "terminals open, shaft driven at several speeds",
+    "hand_turn": "one mechanical turn by hand, terminals open",
+    "cogging": "zero current, slow turn, both directions",
+    "torque_map": "dynamometer holds speed, steps of d and q current",
+    "spin_down": "coasts with terminals open",
+    "heat_run": "current on a locked or slow rotor until it warms",
+    "holding_current": "rotor held at many angles, both directions",
+    "flux_map": "table of currents and flux linkages",
+    "drive": "everyday closed-loop log",
+    "torque_table": "static table of torque and current",
+}
+TESTS_WITHOUT_CLOCK = frozenset({"lcr", "flux_map", "torque_table"})
+"""Tests whose captures are tables: their rows come in no time."""
+OHMMETER = ("rab_ohm", "rbc_ohm", "rca_ohm")
+"""What an ohmmeter shows of each terminal pair: a `resistance` capture may be a table of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,10 +155,6 @@ def _columns() -> Iterable[Term]:
     yield column("freq_hz", "Hz", "frequency of the LCR meter", 0.0, 1e7)
 
 
-# What a motor cannot be without; an exact zero is a dead channel, not a measurement.
-TINY = 1e-12
-
-
 def _constants() -> Iterable[Term]:
     def constant(
         name: str, unit: str, words: str, low: float = 0.0, high: float = 1e6, whole: bool = False
@@ -227,25 +244,6 @@ def _index(terms: Iterable[Term]) -> dict[str, Term]:
 COLUMNS = _index(_columns())
 CONSTANTS = _index(_constants())
 METADATA = _index(_metadata())
-TESTS: dict[str, str] = {
-    "resistance": "DC steps through one terminal pair, four-wire",
-    "current_step": "rotor locked, voltage step on one terminal pair",
-    "lcr": "LCR meter across a pair at several rotor angles",
-    "open_circuit": "terminals open, shaft driven at several speeds",
-    "hand_turn": "one mechanical turn by hand, terminals open",
-    "cogging": "zero current, slow turn, both directions",
-    "torque_map": "dynamometer holds speed, steps of d and q current",
-    "spin_down": "coasts with terminals open",
-    "heat_run": "current on a locked or slow rotor until it warms",
-    "holding_current": "rotor held at many angles, both directions",
-    "flux_map": "table of currents and flux linkages",
-    "drive": "everyday closed-loop log",
-    "torque_table": "static table of torque and current",
-}
-TESTS_WITHOUT_CLOCK = frozenset({"lcr", "flux_map", "torque_table"})
-"""Tests whose captures are tables: their rows come in no time."""
-OHMMETER = ("rab_ohm", "rbc_ohm", "rca_ohm")
-"""What an ohmmeter shows of each terminal pair: a `resistance` capture may be a table of them."""
 
 
 def has_clock(test: str, columns: frozenset[str]) -> bool:

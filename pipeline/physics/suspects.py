@@ -13,6 +13,7 @@ Quantity = Literal[
 ]
 """What a ratio is of: torque per ampere or volt per speed; power; resistance or inductance; L/R;
 a coefficient per kelvin; pole pairs or cycles."""
+MOST_SUSPECTS = 2
 
 
 class Convention(NamedTuple):
@@ -109,9 +110,6 @@ CONVENTIONS: tuple[Convention, ...] = (
         "time_constant",
     ),
 )
-
-
-MOST_SUSPECTS = 2
 
 
 def convention_suspect(

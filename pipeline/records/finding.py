@@ -12,6 +12,7 @@ from pipeline.records.naming import counted, printable
 from pipeline.records.plain_form import PlainRecord
 
 Severity = Literal["refused", "warning"]
+MOST_LINES_OF_A_KIND = 3
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -59,9 +60,6 @@ class Finding(PlainRecord):
         rows = "" if self.rows is None else f" rows {self.rows[0]}-{self.rows[1]}"
         line = f"{self.severity}: {self.file}{rows}: {self.message}; {self.remedy} [{self.code}]"
         return printable(line)
-
-
-MOST_LINES_OF_A_KIND = 3
 
 
 def lines_of(findings: Iterable[Finding]) -> list[str]:

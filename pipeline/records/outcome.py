@@ -11,6 +11,10 @@ from typing import Any
 from pipeline.records.errors import PipelineError
 from pipeline.records.finding import Finding
 
+INTERRUPTED = 130
+"""128 and the number of SIGINT, as shells have it."""
+PRECEDENCE = (INTERRUPTED, 5, 2, 1, 3, 4, 0)
+
 
 @dataclass(frozen=True, slots=True)
 class Fault:
@@ -105,11 +109,6 @@ class Outcome:
     wrote: str = ""
     next: str = ""
     faults: tuple[Fault, ...] = ()
-
-
-INTERRUPTED = 130
-"""128 and the number of SIGINT, as shells have it."""
-PRECEDENCE = (INTERRUPTED, 5, 2, 1, 3, 4, 0)
 
 
 def first_that_applies(*codes: int) -> int:

@@ -17,6 +17,13 @@ from typing import Literal
 from pipeline.records.field_kinds import Extension, Name, SpreadOrNull
 
 Kind = Literal["A", "B"]
+BETWEEN = "between:"
+"""Begins the source of what independent equations, captures or methods of one constant scatter
+beyond their own uncertainties: part of u like any other, kept separate to show why u is wide."""
+METHODS = f"{BETWEEN}methods:"
+"""Begins the source of what different methods of one constant scatter."""
+COVERAGE = 0.9545
+"""Level at which k is 2 for infinite degrees of freedom (GUM G.6.4 and table G.2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +54,6 @@ class Contribution:
 
 
 Budget = tuple[Contribution, ...]
-
-BETWEEN = "between:"
-"""Begins the source of what independent equations, captures or methods of one constant scatter
-beyond their own uncertainties: part of u like any other, kept separate to show why u is wide."""
 
 
 def type_a(source: str, u: float, dof: float = math.inf) -> Budget:
@@ -145,10 +148,6 @@ def standard_uncertainty(budget: Budget, kind: Kind | None = None) -> float:
     return math.sqrt(sum(part.u**2 for part in budget if kind in (None, part.kind)))
 
 
-METHODS = f"{BETWEEN}methods:"
-"""Begins the source of what different methods of one constant scatter."""
-
-
 def without_between(budget: Budget, source: str = BETWEEN) -> Budget:
     """The budget as it was before the scatter between equations, captures and methods joined.
 
@@ -218,10 +217,6 @@ def effective_dof(budget: Budget) -> float:
     total = standard_uncertainty(budget) ** 2
     spread = sum(part.u**4 / part.dof for part in budget if math.isfinite(part.dof))
     return math.inf if spread == 0.0 else total**2 / spread
-
-
-COVERAGE = 0.9545
-"""Level at which k is 2 for infinite degrees of freedom (GUM G.6.4 and table G.2)."""
 
 
 def coverage_factor(dof: float, level: float = COVERAGE) -> float:

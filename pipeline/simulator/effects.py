@@ -13,6 +13,28 @@ from dataclasses import dataclass
 from pipeline.simulator.design import Motor, Size
 
 Defaults = Callable[[Motor], dict[str, float]]
+NEVER_NEGATIVE = frozenset(
+    {
+        "copper_temperature",
+        "skin_effect",
+        "dead_time",
+        "current_delay",
+        "torque_lag",
+        "saturation",
+        "iron_eddy",
+        "iron_hysteresis",
+        "coulomb_friction",
+        "stribeck",
+        "windage",
+        "load_dependent_friction",
+        "presliding",
+        "cogging",
+        "compliance",
+        "backlash",
+    }
+)
+"""Effects whose `size` is a loss, a time, a gap or an amplitude that has a phase of its own."""
+ALWAYS = ("copper_temperature", "magnet_temperature", "coulomb_friction")
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,29 +229,6 @@ FORMS: dict[str, Form] = {
         "N·m", "transducer plus size", lambda m: {"size": 0.006 * m.torque_rated_nm}
     ),
 }
-
-NEVER_NEGATIVE = frozenset(
-    {
-        "copper_temperature",
-        "skin_effect",
-        "dead_time",
-        "current_delay",
-        "torque_lag",
-        "saturation",
-        "iron_eddy",
-        "iron_hysteresis",
-        "coulomb_friction",
-        "stribeck",
-        "windage",
-        "load_dependent_friction",
-        "presliding",
-        "cogging",
-        "compliance",
-        "backlash",
-    }
-)
-"""Effects whose `size` is a loss, a time, a gap or an amplitude that has a phase of its own."""
-ALWAYS = ("copper_temperature", "magnet_temperature", "coulomb_friction")
 
 
 def parameters(name: str, motor: Motor, size: Size | None = None) -> dict[str, float]:

@@ -23,6 +23,7 @@ from pipeline.views.status_text import exported, not_exported
 
 MOST_LINES = 200
 """Lines of a configuration that are printed; tables of effects run to thousands."""
+BASE = {"r_ohm": "r_phase_ohm", "ld_h": "ld_h", "lq_h": "lq_h", "psi_wb": "psi_pm_wb"}
 
 
 def main(settings: ExportSettings) -> Outcome:
@@ -68,9 +69,6 @@ def main(settings: ExportSettings) -> Outcome:
         errors=(which, *notes, *left, f"note: wrote {path.as_posix()}"),
         result={"path": path, "content": text},
     )
-
-
-BASE = {"r_ohm": "r_phase_ohm", "ld_h": "ld_h", "lq_h": "lq_h", "psi_wb": "psi_pm_wb"}
 
 
 def _effects(sheet: Datasheet) -> EffectTables:

@@ -29,6 +29,7 @@ SCATTER, DISAGREEMENT, ASSUMED = "scatter", "disagreement", "assumptions"
 _KINDS = {"scatter": SCATTER, "between": DISAGREEMENT, "assumed": ASSUMED, "lcr": "LCR meter"}
 LEAST_SHARE = 0.05
 """Share of u² from which on a source is named beside its bar."""
+_LOW, _HIGH = "low", "high"
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,9 +220,6 @@ def _dof(estimate: Estimate) -> str:
     if not estimate.known or estimate.u == 0.0:
         return ""
     return f"{estimate.dof:.0f}" if estimate.dof < 1e4 else "∞"
-
-
-_LOW, _HIGH = "low", "high"
 
 
 def conditions(at: Conditions) -> str:

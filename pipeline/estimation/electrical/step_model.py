@@ -25,6 +25,8 @@ SHARED = ("ld_h", "d_1", "d_2", "d_3", "d_4", "lq_h", "q_1", "q_2", "q_3", "q_4"
 TERMS = 4
 LD, LQ = 0, 1 + TERMS
 SPACE = 2.0 / math.sqrt(3.0)
+Inductances = Callable[[Array, Array, Array], tuple[Array, Array]]
+"""Incremental Ld and Lq [m, H] of shared parameters [m, 10] and the currents' fluxes [m, Wb]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,10 +217,6 @@ def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
         begin.append(nodes[:-1])
         end.append(nodes[1:])
     return np.array(segments, dtype=np.intp), np.concatenate(begin), np.concatenate(end)
-
-
-Inductances = Callable[[Array, Array, Array], tuple[Array, Array]]
-"""Incremental Ld and Lq [m, H] of shared parameters [m, 10] and the currents' fluxes [m, Wb]."""
 
 
 class StepModel:

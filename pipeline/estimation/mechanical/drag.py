@@ -22,19 +22,18 @@ KNOTS = (0.0, 0.03, 0.06, 0.1, 0.16, 0.24, 0.34, 0.46, 0.6, 0.78, 1.0)
 # Widths of Stribeck's excess, from what the slowest rows resolve (`SLOWEST_SHARE`) to where it is
 # as good as viscous drag. A fifth apart, the nearest one is off by 7 % of the excess at most.
 BUMPS = tuple(float(f"{0.008 * 1.2**k:.3g}") for k in range(19))
+SHAPES: dict[str, Callable[[Array], Array]] = {
+    "gauss": lambda x: np.asarray(np.exp(-(x**2))),
+    "exponential": lambda x: np.asarray(np.exp(-np.abs(x))),
+    "rational": lambda x: np.asarray(1.0 / (1.0 + x**2)),
+}
+CURVE = tuple(f"knot {k}" for k in range(len(KNOTS)))
 
 
 def _hat(index: int) -> Callable[[Array], Array]:
     """Odd function of speed that is 1 at one knot and falls linearly to 0 at its neighbours."""
     heights = [1.0 if k == index else 0.0 for k in range(len(KNOTS))]
     return lambda x: np.sign(x) * np.interp(np.abs(x), KNOTS, heights)
-
-
-SHAPES: dict[str, Callable[[Array], Array]] = {
-    "gauss": lambda x: np.asarray(np.exp(-(x**2))),
-    "exponential": lambda x: np.asarray(np.exp(-np.abs(x))),
-    "rational": lambda x: np.asarray(1.0 / (1.0 + x**2)),
-}
 
 
 def _bump(shape: str, width: float) -> Callable[[Array], Array]:
@@ -52,7 +51,6 @@ DRAG_FORMS: dict[str, Callable[[Array], Array]] = {
 }
 STRIBECK = tuple(_BUMPS)
 FORMS = ("windage", *STRIBECK)
-CURVE = tuple(f"knot {k}" for k in range(len(KNOTS)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ ACCELERATION_NOISE, CURRENT_NOISE = "acceleration noise", "current noise"
 SAMPLED = "sampled current"
 """Column of a current that is sampled off the middle of its pulse: by a dead time pulses are late,
 and the back-EMF moves the current on in proportion to speed."""
+SpeedFunction = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,9 +113,6 @@ class _Part:
     direct: Array
     warm: Array
     load: Array
-
-
-SpeedFunction = Callable[[Array], Array]
 
 
 def shaft_rows(

@@ -35,6 +35,8 @@ OF_BATCH = frozenset((*KEY_CONSTANTS, *PARTIAL_CONSTANTS))
 MOST_NAMED = 5
 """Most names of removed files in a note; datasheets come first."""
 FOLDERS = ("datasheets", "report", "recordings", "performance", "sheet", "diagnosis", ".cache")
+Others = Mapping[str, tuple[str, ...]]
+"""Files of the motors of earlier runs that an output holds beside the batch, by motor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +53,6 @@ class Fleet:
     def every(self) -> tuple[Datasheet, ...]:
         """All datasheets of the output, by motor."""
         return tuple(sorted((*self.datasheets, *self.others), key=lambda one: one.motor_id))
-
-
-Others = Mapping[str, tuple[str, ...]]
-"""Files of the motors of earlier runs that an output holds beside the batch, by motor."""
 
 
 def other_motors(output: Path, batch: Collection[str], *, prune: bool) -> Others:

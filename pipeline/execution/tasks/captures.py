@@ -16,6 +16,8 @@ from pipeline.records.finding import Finding
 from pipeline.records.naming import printable
 from pipeline.records.outcome import Stopwatch
 
+Usable = tuple[tuple[Capture, ...], tuple[Finding, ...]]
+
 
 @dataclass(frozen=True, slots=True)
 class ReadTask(OfFiles):
@@ -31,9 +33,6 @@ class ReadTask(OfFiles):
     def name(self) -> str:
         """What the task works on."""
         return f"motor {printable(self.motor_id)}"
-
-
-Usable = tuple[tuple[Capture, ...], tuple[Finding, ...]]
 
 
 def usable_captures(task: ReadTask, watch: Stopwatch | None = None) -> Usable:

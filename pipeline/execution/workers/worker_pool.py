@@ -31,6 +31,7 @@ START = (
     "is there memory for a process? A script of your own needs its work under "
     "`if __name__ == '__main__':`, and cannot come from standard input"
 )
+Done = Callable[[int, Any], None]
 
 
 class Task(Protocol):
@@ -53,9 +54,6 @@ class Task(Protocol):
 
         """
         ...
-
-
-Done = Callable[[int, Any], None]
 
 
 @dataclass

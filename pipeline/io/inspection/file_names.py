@@ -17,6 +17,8 @@ _SERIAL = re.compile(r"[A-Za-z]{0,8}-?\d{1,10}[A-Za-z]?|[A-Za-z]+\d+-\d+")
 _DATE = re.compile(r"(19|20)\d{2}-?(0[1-9]|1[0-2])-?([0-2]\d|3[01])")
 _TIME = re.compile(r"([01]\d|2[0-3])[-h]?[0-5]\d([-m]?[0-5]\d)?")
 _PAIRS = {"ab": "ab", "bc": "bc", "ca": "ca", "uv": "ab", "vw": "bc", "wu": "ca"}
+_SPEED = re.compile(r"(?<![A-Za-z\d.])(-?\d{2,6})[_ ]?(rpm|RPM|Upm|upm|Umin|umin)(?![A-Za-z\d])")
+MOTION = frozenset({"omega_mech_rad_s", "theta_mech_rad", "theta_elec_rad"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +29,6 @@ class NamePatterns:
     values: dict[str, dict[str, str]] = field(default_factory=dict)
     keys: frozenset[str] = frozenset()
     """Metadata that every name gives."""
-
-
-_SPEED = re.compile(r"(?<![A-Za-z\d.])(-?\d{2,6})[_ ]?(rpm|RPM|Upm|upm|Umin|umin)(?![A-Za-z\d])")
-MOTION = frozenset({"omega_mech_rad_s", "theta_mech_rad", "theta_elec_rad"})
 
 
 def name_patterns(

@@ -26,6 +26,7 @@ LEAST_HELD_S = 2.0
 MOST_PARTS = 60
 """More parts are no set of tests: such a log starts and stops as it works."""
 _SPEED, _ANGLE, _CURRENT = "omega_mech_rad_s", "theta_mech_rad", "iq_a"
+_TESTS = {"coast": "spin_down", "hold": "torque_map", "drive": "drive", "rest": None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +82,6 @@ def parts_of(file: str, columns: Mapping[str, Array]) -> tuple[PartSeen, ...]:
             test, why = None, "too short for a test"
         found.append(PartSeen(file, a, b, test, why))
     return tuple(found) if 1 < len(found) <= MOST_PARTS else ()
-
-
-_TESTS = {"coast": "spin_down", "hold": "torque_map", "drive": "drive", "rest": None}
 
 
 def _speed_of(columns: Mapping[str, Array]) -> Array | None:

@@ -26,6 +26,7 @@ NONE = "none"
 _WITHIN = 0.02
 _MOST_CLOCK_JITTER = 0.5
 _ELECTRICAL = frozenset({"erpm", "elec", "el", "electrical", "elektrisch"})
+_ANGLES = ("theta_mech_rad", "theta_elec_rad", "theta_elec_deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,9 +199,6 @@ def _seen(
         wraps=wraps,
         per_pole_pair=electrical,
     )
-
-
-_ANGLES = ("theta_mech_rad", "theta_elec_rad", "theta_elec_deg")
 
 
 def _why(name: str, evidence: Evidence, options: Sequence[str]) -> str:

@@ -9,6 +9,19 @@ from pipeline.io.maps.units import COUNTS, FOREIGN_UNITS
 from pipeline.physics.glossary import COLUMNS, METADATA, TESTS
 
 SCHEMA_ID = "source-map.schema.json"
+_KIND_WORDS = {
+    "text": "text",
+    "texts": "list of texts",
+    "pattern": "regular expression",
+    "patterns": "list of regular expressions",
+    "number": "number",
+    "whole": "whole number",
+    "flag": "`true` or `false`",
+    "metadata": "metadata by key",
+    "maps": "list of maps",
+    "fields": "as `fields`",
+}
+_SCALAR: dict[str, Any] = {"type": ["string", "number", "boolean"]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,19 +44,6 @@ class Key:
             return " or ".join(f"`{word}`" for word in self.kind)
         return _KIND_WORDS[self.kind]
 
-
-_KIND_WORDS = {
-    "text": "text",
-    "texts": "list of texts",
-    "pattern": "regular expression",
-    "patterns": "list of regular expressions",
-    "number": "number",
-    "whole": "whole number",
-    "flag": "`true` or `false`",
-    "metadata": "metadata by key",
-    "maps": "list of maps",
-    "fields": "as `fields`",
-}
 
 KEYS: tuple[Key, ...] = (
     Key("about", "text", "what the map is for; nothing reads it"),
@@ -254,9 +254,6 @@ def _any_name(key: Key, prefix: str) -> dict[str, Any]:
     if key.place.startswith("metadata."):
         return _SCALAR
     return {"type": "object", "additionalProperties": _SCALAR}
-
-
-_SCALAR: dict[str, Any] = {"type": ["string", "number", "boolean"]}
 
 
 def _leaf(key: Key) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from pipeline.records.parse import number
 
 TimeFrom = Literal["field", "even", "log", "increment"]
 MessageForm = Literal["auto", "row", "block"]
+Pairs = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +84,6 @@ class TimeMap:
 
 
 TIME_FROM_FIELD = TimeMap()
-
-
-Pairs = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, slots=True)

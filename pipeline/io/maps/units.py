@@ -14,70 +14,6 @@ from pipeline.records.errors import CaptureError
 _POUND_FORCE_N = 4.4482216152605
 _INCH_M = 0.0254
 _KILOGRAM_FORCE_N = 9.80665
-
-
-@dataclass(frozen=True, slots=True)
-class Scale:
-    """value [glossary unit] = factor * value [foreign unit] + shift."""
-
-    factor: float
-    shift: float = 0.0
-
-
-def _prefixed(unit: str, *prefixes: str) -> dict[str, Scale]:
-    powers = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
-    return {prefix + unit: Scale(powers[prefix]) for prefix in prefixes}
-
-
-_SHARE = {"percent": Scale(0.01), "%": Scale(0.01), "1": Scale(1.0)}
-_ANGLE = {
-    "rad": Scale(1.0),
-    "mrad": Scale(1e-3),
-    "deg": Scale(math.pi / 180),
-    "rev": Scale(TURN_RAD),
-    "rotation": Scale(TURN_RAD),
-    "arcmin": Scale(math.pi / 180 / 60),
-}
-_TORQUE = {
-    "N·m": Scale(1.0),
-    "mN·m": Scale(1e-3),
-    "uN·m": Scale(1e-6),
-    "kN·m": Scale(1e3),
-    "N·mm": Scale(1e-3),
-    "N·cm": Scale(1e-2),
-    "ozf·in": Scale(_POUND_FORCE_N / 16 * _INCH_M),
-    "lbf·in": Scale(_POUND_FORCE_N * _INCH_M),
-    "lbf·ft": Scale(_POUND_FORCE_N * _INCH_M * 12),
-    "kgf·cm": Scale(_KILOGRAM_FORCE_N * 1e-2),
-    "gf·cm": Scale(_KILOGRAM_FORCE_N * 1e-5),
-}
-FOREIGN_UNITS: dict[str, dict[str, Scale]] = {
-    "s": _prefixed("s", "", "m", "u", "n") | {"min": Scale(60.0), "h": Scale(3600.0)},
-    "V": _prefixed("V", "", "m", "u", "k") | _SHARE,
-    "A": _prefixed("A", "", "m", "u", "k"),
-    "rad": _ANGLE,
-    "deg": {name: Scale(scale.factor * 180 / math.pi) for name, scale in _ANGLE.items()}
-    | {"deg": Scale(1.0), "rev": Scale(360.0), "rotation": Scale(360.0)},
-    "rad/s": {
-        "rad/s": Scale(1.0),
-        "deg/s": Scale(math.pi / 180),
-        "rpm": Scale(TURN_RAD / 60),
-        "krpm": Scale(TURN_RAD / 60 * 1e3),
-        "rev/s": Scale(TURN_RAD),
-        "Hz": Scale(TURN_RAD),
-    },
-    "N·m": _TORQUE,
-    "degC": {
-        "degC": Scale(1.0),
-        "K": Scale(1.0, -273.15),
-        "degF": Scale(5 / 9, -160 / 9),
-        "mdegC": Scale(1e-3),
-    },
-    "Wb": {"Wb": Scale(1.0), "mWb": Scale(1e-3), "uWb": Scale(1e-6)},
-    "H": _prefixed("H", "", "m", "u", "n"),
-    "ohm": _prefixed("ohm", "", "m", "u", "k"),
-    "Hz": _prefixed("Hz", "", "k", "M"),
-}
 COUNTS = "counts"
 _SPELLINGS = {
     "count": COUNTS,
@@ -203,10 +139,72 @@ _SPELLINGS = {
     "kΩ": "kohm",
     "pct": "percent",
 }
-
-
 _LETTERS_ALIKE = str.maketrans("µμΩ⋅・･∙", "uuΩ····")
 """Micro signs, the ohm sign, and the dots between factors, those of Japanese text among them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """value [glossary unit] = factor * value [foreign unit] + shift."""
+
+    factor: float
+    shift: float = 0.0
+
+
+def _prefixed(unit: str, *prefixes: str) -> dict[str, Scale]:
+    powers = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
+    return {prefix + unit: Scale(powers[prefix]) for prefix in prefixes}
+
+
+_SHARE = {"percent": Scale(0.01), "%": Scale(0.01), "1": Scale(1.0)}
+_ANGLE = {
+    "rad": Scale(1.0),
+    "mrad": Scale(1e-3),
+    "deg": Scale(math.pi / 180),
+    "rev": Scale(TURN_RAD),
+    "rotation": Scale(TURN_RAD),
+    "arcmin": Scale(math.pi / 180 / 60),
+}
+_TORQUE = {
+    "N·m": Scale(1.0),
+    "mN·m": Scale(1e-3),
+    "uN·m": Scale(1e-6),
+    "kN·m": Scale(1e3),
+    "N·mm": Scale(1e-3),
+    "N·cm": Scale(1e-2),
+    "ozf·in": Scale(_POUND_FORCE_N / 16 * _INCH_M),
+    "lbf·in": Scale(_POUND_FORCE_N * _INCH_M),
+    "lbf·ft": Scale(_POUND_FORCE_N * _INCH_M * 12),
+    "kgf·cm": Scale(_KILOGRAM_FORCE_N * 1e-2),
+    "gf·cm": Scale(_KILOGRAM_FORCE_N * 1e-5),
+}
+FOREIGN_UNITS: dict[str, dict[str, Scale]] = {
+    "s": _prefixed("s", "", "m", "u", "n") | {"min": Scale(60.0), "h": Scale(3600.0)},
+    "V": _prefixed("V", "", "m", "u", "k") | _SHARE,
+    "A": _prefixed("A", "", "m", "u", "k"),
+    "rad": _ANGLE,
+    "deg": {name: Scale(scale.factor * 180 / math.pi) for name, scale in _ANGLE.items()}
+    | {"deg": Scale(1.0), "rev": Scale(360.0), "rotation": Scale(360.0)},
+    "rad/s": {
+        "rad/s": Scale(1.0),
+        "deg/s": Scale(math.pi / 180),
+        "rpm": Scale(TURN_RAD / 60),
+        "krpm": Scale(TURN_RAD / 60 * 1e3),
+        "rev/s": Scale(TURN_RAD),
+        "Hz": Scale(TURN_RAD),
+    },
+    "N·m": _TORQUE,
+    "degC": {
+        "degC": Scale(1.0),
+        "K": Scale(1.0, -273.15),
+        "degF": Scale(5 / 9, -160 / 9),
+        "mdegC": Scale(1e-3),
+    },
+    "Wb": {"Wb": Scale(1.0), "mWb": Scale(1e-3), "uWb": Scale(1e-6)},
+    "H": _prefixed("H", "", "m", "u", "n"),
+    "ohm": _prefixed("ohm", "", "m", "u", "k"),
+    "Hz": _prefixed("Hz", "", "k", "M"),
+}
 
 
 def normal_unit(text: str) -> str:

@@ -28,6 +28,9 @@ from pipeline.records.errors import CaptureError
 
 WantedIn = Callable[[str, str], bool]
 """Whether a field of a topic is worth decoding: (topic, dotted name)."""
+JOINT_STATE = frozenset({"sensor_msgs/msg/JointState", "sensor_msgs/JointState"})
+QUANTITIES = ("position", "velocity", "effort")
+_SLACK = 1.05
 
 
 @dataclass(slots=True)
@@ -201,10 +204,6 @@ def _counts(
     return first, True
 
 
-JOINT_STATE = frozenset({"sensor_msgs/msg/JointState", "sensor_msgs/JointState"})
-QUANTITIES = ("position", "velocity", "effort")
-
-
 def pick_joint(batch: Batch, leaves: dict[str, Leaf], joint: str | None) -> dict[str, Leaf]:
     """The quantities of one joint of joint states.
 
@@ -286,9 +285,6 @@ def _place(batch: Batch, names: Leaf, counts: Integers, joint: str | None) -> In
             (row, row),
         )
     return place[same].astype(np.int64)
-
-
-_SLACK = 1.05
 
 
 class Column:

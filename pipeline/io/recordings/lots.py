@@ -72,6 +72,9 @@ if TYPE_CHECKING:
 
 DIGITS = 5
 """Significant digits of a constant in the table of motors."""
+MOST_OUTLIERS = 12
+MOST_SHOWN, GRID, PERIODS = 2, 3, 6
+FILL_ALPHA, FILL_WIDTH = 40, 3.0
 
 
 def lots_name(result: LotRegression) -> str:
@@ -189,9 +192,6 @@ def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
         send_trace(stream, Trace(f"{MOTORS}/{one.name}", PLACE, frame))
 
 
-MOST_OUTLIERS = 12
-
-
 def verdict_markdown(result: LotRegression) -> str:
     """Verdict, headline, reasons, one line a constant, outliers and notes as a page.
 
@@ -248,10 +248,6 @@ def _line(row: ConstantRow) -> str:
         f"| {row.mark} | {strong}{plain(row.name)}{strong} | {row.before} | {row.after} "
         f"| {strong}{plain(row.change)}{strong} | {row.p_value} |"
     )
-
-
-MOST_SHOWN, GRID, PERIODS = 2, 3, 6
-FILL_ALPHA, FILL_WIDTH = 40, 3.0
 
 
 def lots_layout(result: LotRegression) -> Blueprint:

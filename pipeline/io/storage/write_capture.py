@@ -28,6 +28,8 @@ Compression = Literal["none", "lz4", "zstd"]
 LIBRARY = "motor-datasheets"
 CDR_HEADER = b"\x00\x01\x00\x00"
 NANOSECONDS = 1_000_000_000
+Payloads = Iterator[tuple[int, bytes]]
+"""First row and encoded bytes of each message."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +40,6 @@ class Format:
     block_rows: int | None = 500
     compression: Compression = "zstd"
     chunk_bytes: int = 1 << 20
-
-
-Payloads = Iterator[tuple[int, bytes]]
-"""First row and encoded bytes of each message."""
 
 
 def write_capture(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline.records.evidence import Series
 
 Array = NDArray[np.float64]
+FEWEST = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +30,6 @@ class ResidualScale:
     def ratio(self) -> float | None:
         """The rms over the noise: 1 for white noise, more where neighbours share an error."""
         return None if self.noise is None else self.rms / self.noise
-
-
-FEWEST = 5
 
 
 def residual_of(series: Series) -> Array:
