@@ -37,18 +37,18 @@ def discover(package: str, attribute: str, kind: type) -> tuple[PlugIn, ...]:
     The group of the entry points is the last part of the name of `package`. Raises UsageError for
     an outside plug-in that cannot be loaded, is no `kind`, or takes a name that there is.
     """
-    found: dict[str, PlugIn] = {}
+    plug_ins: dict[str, PlugIn] = {}
     for name in sorted(m.name for m in pkgutil.iter_modules(import_module(package).__path__)):
         module = f"{package}.{name}"
         value = getattr(import_module(module), attribute)
-        found[value.name] = PlugIn(value.name, module, value)
+        plug_ins[value.name] = PlugIn(value.name, module, value)
     for point in _outside()[package.rpartition(".")[2]]:
         value = _loaded(point, kind)
-        if value.name in found:
-            other = found[value.name].module
+        if value.name in plug_ins:
+            other = plug_ins[value.name].module
             raise UsageError(f"{point.value}: {value.name} is in {other} already", "rename one")
-        found[value.name] = PlugIn(value.name, point.module, value)
-    return tuple(found[name] for name in sorted(found))
+        plug_ins[value.name] = PlugIn(value.name, point.module, value)
+    return tuple(plug_ins[name] for name in sorted(plug_ins))
 
 
 @cache
@@ -79,7 +79,7 @@ def _sources(home: str) -> list[Path]:
 def _outside() -> dict[str, list[EntryPoint]]:
     """The entry points of each group by name, read once a process."""
     named = {name: entry_points(group=f"{PREFIX}.{name}") for name in GROUPS}
-    return {name: sorted(found, key=lambda point: point.name) for name, found in named.items()}
+    return {name: sorted(points, key=lambda point: point.name) for name, points in named.items()}
 
 
 def _loaded(point: EntryPoint, kind: type) -> Any:

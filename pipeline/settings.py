@@ -351,11 +351,11 @@ def named_file(group: str, name: str, config_dir: str | None = None) -> Path:
         if config_dir is None
         else [Path(config_dir), configuration_folder()]
     )
-    found = {path.stem: path for at in reversed(places) for path in (at / group).glob("*.yaml")}
-    if name in found:
-        return found[name]
+    files = {path.stem: path for at in reversed(places) for path in (at / group).glob("*.yaml")}
+    if name in files:
+        return files[name]
     noun = "limits file" if group == "limits" else group
-    raise UsageError(f"no {noun} {name!r}", meant(name, sorted(found)))
+    raise UsageError(f"no {noun} {name!r}", meant(name, sorted(files)))
 
 
 def configuration_folder() -> Path:

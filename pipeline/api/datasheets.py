@@ -183,8 +183,8 @@ def _datasheet(
         model_gates=model_gates,
     )
     checked = work.check(job, fit.campaign, fit.constants, Stopwatch())
-    found = work.with_verdict(job, fit.campaign, checked, None, Stopwatch())
-    return work.assemble(job, fit.campaign, found, stamp_of(job, fit.campaign))
+    judged = work.with_verdict(job, fit.campaign, checked, None, Stopwatch())
+    return work.assemble(job, fit.campaign, judged, stamp_of(job, fit.campaign))
 
 
 def load(output: str | Path) -> Datasheets:

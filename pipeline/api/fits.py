@@ -133,8 +133,8 @@ class Fits(ByMotor[MotorFit]):
     def _rows(self, *, alternatives: bool) -> pl.DataFrame:
         rows = []
         for motor_id, fit in self.motors.items():
-            found = fit.constants
-            chosen = found.rest() if alternatives else tuple(found.chosen().values())
+            constants = fit.constants
+            chosen = constants.rest() if alternatives else tuple(constants.chosen().values())
             motor_type, lot = (fit.campaign.text(key) for key in ("motor_type", "lot"))
             rows += constant_rows(motor_id, motor_type, lot, chosen)
         return frames.frame(rows, CONSTANT_SCHEMA)

@@ -189,14 +189,14 @@ def read(
     place = str(folder)
     input_folder(place)
     sources = source_maps(source)
-    found = survey(Path(place), sources, recover=recover)
+    surveyed = survey(Path(place), sources, recover=recover)
     entries: dict[str, list[Entry]] = {}
-    for entry in found.entries:
+    for entry in surveyed.entries:
         entries.setdefault(entry.stated["motor_id"], []).append(entry)
     if motor is not None and motor not in entries:
         there = f"there are {', '.join(sorted(entries))}" if entries else "there is none"
         raise UsageError(f"no capture of motor {motor} in {place}", there)
-    findings, campaigns = list(found.findings), {}
+    findings, campaigns = list(surveyed.findings), {}
     for name in sorted(entries) if motor is None else [motor]:
         task = ReadTask(name, place, tuple(entries[name]), limits or ReadLimits(), gates or {})
         captures, doubts = usable_captures(task)

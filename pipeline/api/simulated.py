@@ -96,12 +96,12 @@ def simulate(
     captures, findings = [], []
     for recording in recorded:
         try:
-            capture, found = validate(_capture(recording), gates or {})
+            capture, doubts = validate(_capture(recording), gates or {})
         except CaptureError as error:
             findings.append(Finding.refusal(recording.stem, error))
         else:
             captures.append(capture)
-            findings += found
+            findings += doubts
     found_captures = Campaign(name, tuple(sorted(captures, key=lambda capture: capture.path)))
     return Recordings({name: found_captures}, tuple(findings), {name: true})
 

@@ -32,19 +32,21 @@ def _wye_delta(given: Given) -> Answer | None:
 def _balanced(given: Given, letter: str, unit: str, what: str) -> list[Line]:
     suffix = unit.lower()
     line, phase, delta = (f"{letter}_{x}_{suffix}" for x in ("ll", "phase", "delta"))
-    found: dict[str, float] = {}
+    line_values: dict[str, float] = {}
     if given.has(line):
-        found[line] = c.phase_from_line(given.one(line))
+        line_values[line] = c.phase_from_line(given.one(line))
     if given.has(phase):
-        found[phase] = given.one(phase)
+        line_values[phase] = given.one(phase)
     if given.has(delta):
-        found[delta] = c.wye_from_delta(given.one(delta))
-    if not found:
+        line_values[delta] = c.wye_from_delta(given.one(delta))
+    if not line_values:
         return []
-    value = agreed(given, found, "impedance")
+    value = agreed(given, line_values, "impedance")
     big = letter.upper()
-    from_phase = f"3·{big}_phase" if phase in found else f"1.5·{big}_ll"
-    phase_formula = f"{big}_delta/3" if line not in found and delta in found else f"{big}_ll/2"
+    from_phase = f"3·{big}_phase" if phase in line_values else f"1.5·{big}_ll"
+    phase_formula = (
+        f"{big}_delta/3" if line not in line_values and delta in line_values else f"{big}_ll/2"
+    )
     return [
         Line(phase, value, unit, phase_formula, f"{what} of the wye equivalent"),
         Line(line, c.line_from_phase(value), unit, f"2·{big}_phase", "between two terminals"),
@@ -212,18 +214,18 @@ def _saliency(given: Given) -> Answer | None:
 
 
 def _from_three_pairs(given: Given, pairs: tuple[str, ...]) -> Answer:
-    found = c.unaligned_inductances_h(*(given.one(name) for name in pairs))
-    if found.low_h <= 0.0:
+    inductances = c.unaligned_inductances_h(*(given.one(name) for name in pairs))
+    if inductances.low_h <= 0.0:
         raise UsageError(
             f"calc {given.kind}: these three readings are of no three-phase winding",
             "read all three pairs at one rotor angle, the third terminal open",
         )
-    ratio = found.high_h / found.low_h
-    angle = math.degrees(found.theta_low_rad)
+    ratio = inductances.high_h / inductances.low_h
+    angle = math.degrees(inductances.theta_low_rad)
     words = "L_d with interior magnets; the back-EMF or an alignment shows which is which"
     lines = [
-        Line("l_low_h", found.low_h, "H", "(m − A)/2, m mean, A = √(⅔·Σ(L−m)²)", words),
-        Line("l_high_h", found.high_h, "H", "(m + A)/2", "L_q with interior magnets"),
+        Line("l_low_h", inductances.low_h, "H", "(m − A)/2, m mean, A = √(⅔·Σ(L−m)²)", words),
+        Line("l_high_h", inductances.high_h, "H", "(m + A)/2", "L_q with interior magnets"),
         Line("saliency_ratio", ratio, "1", "high/low", c.saliency_words(ratio)),
     ]
     if ratio - 1.0 > EQUAL:

@@ -30,29 +30,29 @@ def _pole_pairs(given: Given) -> Answer | None:
 
 def _implied(given: Given) -> dict[str, int]:
     """Pole pairs as each given quantity implies them."""
-    found: dict[str, int] = {}
+    pairs: dict[str, int] = {}
     if given.has("cycles"):
         turns = given.one("turns") if given.has("turns") else 1.0
-        found["cycles"] = _whole(given, given.one("cycles"), turns)
+        pairs["cycles"] = _whole(given, given.one("cycles"), turns)
     if given.has("f_elec_hz", "f_mech_hz"):
-        found["f_elec_hz"] = _whole(given, given.one("f_elec_hz"), given.one("f_mech_hz"))
+        pairs["f_elec_hz"] = _whole(given, given.one("f_elec_hz"), given.one("f_mech_hz"))
     if given.has("pole_pairs"):
-        found["pole_pairs"] = _whole(given, given.one("pole_pairs"), 1.0)
+        pairs["pole_pairs"] = _whole(given, given.one("pole_pairs"), 1.0)
     if given.has("poles"):
-        found["poles"] = _whole(given, given.one("poles"), 2.0)
+        pairs["poles"] = _whole(given, given.one("poles"), 2.0)
     if given.has("told", "speed_ratio"):
-        found["told·speed_ratio"] = _whole(given, given.one("told") * given.one("speed_ratio"), 1.0)
-    return found
+        pairs["told·speed_ratio"] = _whole(given, given.one("told") * given.one("speed_ratio"), 1.0)
+    return pairs
 
 
 def _whole(given: Given, electrical: float, mechanical: float) -> int:
-    found = pole_pairs_from(electrical, mechanical)
-    if found.number is None:
+    pairs = pole_pairs_from(electrical, mechanical)
+    if pairs.number is None:
         raise UsageError(
-            f"calc {given.kind}: {found.ratio:.4g} is not within 0.02 of a whole number",
+            f"calc {given.kind}: {pairs.ratio:.4g} is not within 0.02 of a whole number",
             "count over more turns, or check the gear and the belt",
         )
-    return found.number
+    return pairs.number
 
 
 POLE_PAIRS = Calculator(

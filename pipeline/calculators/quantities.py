@@ -229,16 +229,16 @@ def _values(kind: str, key: Key, text: str) -> tuple[float, ...]:
 
 
 def _value(kind: str, key: Key, text: str) -> float:
-    found = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text)
     units = {key.unit: 1.0, "" if key.unit == "1" else key.unit: 1.0} | _MULTIPLES.get(key.unit, {})
     scales = {unit.translate(_SPELLINGS): factor for unit, factor in units.items()}
-    typed = "" if found is None else found[2].translate(_SPELLINGS)
-    if found is None or (typed and typed not in scales):
+    typed = "" if match is None else match[2].translate(_SPELLINGS)
+    if match is None or (typed and typed not in scales):
         raise UsageError(
             f"calc {kind}: {key.name}={text} is no number of {key.unit or 'no unit'}",
             f"write a number, or a number with one of {', '.join(u for u in units if u)}",
         )
-    value = float(found[1]) * scales.get(typed, 1.0)
+    value = float(match[1]) * scales.get(typed, 1.0)
     if not math.isfinite(value):
         raise UsageError(f"calc {kind}: {key.name}={text}", "it is too large for a number")
     if value <= key.low:

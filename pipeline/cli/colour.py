@@ -68,7 +68,7 @@ def _line(line: str) -> str:
     head = line.split(" ", 1)[0]
     if head in _HEADS:
         return line.replace(head, _in(_HEADS[head], head), 1)
-    return _STATUS.sub(lambda found: _in(WORDS[found[1]], found[1]), line)
+    return _STATUS.sub(lambda status: _in(WORDS[status[1]], status[1]), line)
 
 
 def _in(code: str, text: str) -> str:

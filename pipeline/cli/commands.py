@@ -230,11 +230,11 @@ class _Key:
 
 def _keys(settings: type[Any], group: str) -> list[_Key]:
     """Two lines or more a key; a group of keys as `group.key`."""
-    found = []
+    keys = []
     for key in fields(settings):
         made = None if key.default_factory is MISSING else key.default_factory()
         if is_dataclass(made):
-            found += _keys(type(made), f"{key.name}.")
+            keys += _keys(type(made), f"{key.name}.")
             continue
         lines = [f"  {group}{key.name.rstrip('_')}={_default(key)}"]
         if words := key.metadata.get("words"):
@@ -242,8 +242,8 @@ def _keys(settings: type[Any], group: str) -> list[_Key]:
         if package := key.metadata.get("package"):
             names = sorted(module.name for module in iter_modules(import_module(package).__path__))
             lines += _wrapped(", ".join(names), INDENT)
-        found.append(_Key(group.rstrip(".") or key.name.rstrip("_"), tuple(lines)))
-    return found
+        keys.append(_Key(group.rstrip(".") or key.name.rstrip("_"), tuple(lines)))
+    return keys
 
 
 def _wrapped(text: str, first: str) -> list[str]:

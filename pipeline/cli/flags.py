@@ -63,7 +63,7 @@ def split_flags(arguments: Sequence[str]) -> tuple[Flags, list[str]]:
         For a flag that there is not, and for one whose value is missing or unknown.
 
     """
-    found: dict[str, Any] = {}
+    flags: dict[str, Any] = {}
     rest: list[str] = []
     words = list(arguments)
     while words:
@@ -77,15 +77,15 @@ def split_flags(arguments: Sequence[str]) -> tuple[Flags, list[str]]:
         if not name.startswith("--") or field not in Flags.__dataclass_fields__:
             raise UsageError(f"no flag {typed}", _known(typed))
         if name not in _TAKES:
-            found[field] = True
+            flags[field] = True
             continue
         if not given:
             value = words.pop(0) if words else ""
         if not value or (_TAKES[name] and value not in _TAKES[name]):
             takes = " or ".join(_TAKES[name]) or "a folder"
             raise UsageError(f"{typed} {value}".rstrip() + " is none", f"{typed} takes {takes}")
-        found[field] = value
-    return Flags(**found), rest
+        flags[field] = value
+    return Flags(**flags), rest
 
 
 def _known(typed: str) -> str:

@@ -76,7 +76,7 @@ def _rows(capture: Capture) -> int:
 
 def _fingerprint(capture: Capture) -> dict[str, Array]:
     """The columns [rows each] by which rows are known again, without time and blanks."""
-    found = {}
+    columns = {}
     for table in capture.tables:
         for name in table.columns:
             values = table[name].to_numpy()
@@ -84,8 +84,8 @@ def _fingerprint(capture: Capture) -> dict[str, Array]:
             values = values if there.all() else values[there]
             few = values[:: max(1, values.size // POLICY.sample)]
             if name != "t_s" and np.unique(few).size >= POLICY.values:
-                found[name] = values
-    return found
+                columns[name] = values
+    return columns
 
 
 def _same_rows(long: dict[str, Array], short: dict[str, Array]) -> bool:

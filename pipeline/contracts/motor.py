@@ -181,8 +181,8 @@ def _extremes(capture: Capture) -> tuple[float, float]:
 
 
 def _step_clocks(campaign: Campaign) -> list[Finding]:
-    found = [(c, _settling_s(c)) for c in campaign.of("current_step")]
-    times = [seconds for _, seconds in found if 0.0 < seconds < math.inf]
+    settling = [(c, _settling_s(c)) for c in campaign.of("current_step")]
+    times = [seconds for _, seconds in settling if 0.0 < seconds < math.inf]
     if not times or max(times) < SETTLING_RATIO * min(times):
         return []
     usual = float(np.exp(np.median(np.log(times))))
@@ -196,7 +196,7 @@ def _step_clocks(campaign: Campaign) -> list[Finding]:
             f"{campaign.motor_id}: no Ld and Lq from steps while one clock is wrong",
             "correct t_s, in seconds, or take the capture out",
         )
-        for c, seconds in found
+        for c, seconds in settling
         if 0.0 < seconds < math.inf and not usual / least < seconds < usual * least
     ]
 

@@ -169,8 +169,8 @@ def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:
         return capture, []
     words = f"{', '.join(sorted(blanks))}: no row holds a value, so the column counts as missing"
     remedy = "find out why the channel gave nothing, or leave it out of the file"
-    found = warning(capture, "empty_column", words, remedy)
-    return replace(capture, tables=tuple(tables)), [found]
+    blank_columns = warning(capture, "empty_column", words, remedy)
+    return replace(capture, tables=tuple(tables)), [blank_columns]
 
 
 def _streams_split(capture: Capture, dense_share: float) -> Capture:

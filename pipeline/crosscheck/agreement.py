@@ -80,12 +80,12 @@ def disagreements(readings: Iterable[Reading]) -> tuple[Disagreement, ...]:
     by_quantity: dict[str, list[Reading]] = {}
     for reading in readings:
         by_quantity.setdefault(reading.quantity, []).append(reading)
-    found = []
+    checks = []
     for _, own in sorted(by_quantity.items()):
         groups = max((_clusters(way) for way in _ways(own)), key=len, default=[])
         if len(groups) > 1:
-            found.append(_disagreement(own, groups))
-    return tuple(found)
+            checks.append(_disagreement(own, groups))
+    return tuple(checks)
 
 
 def _ways(readings: Sequence[Reading]) -> list[list[Reading]]:
@@ -171,11 +171,11 @@ def _disagreement(readings: Sequence[Reading], groups: list[list[Reading]]) -> D
         near = sorted((abs(math.log(reading.value / m[0])), n) for n, m in enumerate(means))
         if reading.path not in placed and near[0][0] < min(POLICY.link, 0.5 * near[1][0]):
             joined[near[0][1]].add(reading.path)
-    found = [Group(tuple(sorted(paths)), *mean) for paths, mean in zip(joined, means, strict=True)]
-    found.sort(key=lambda group: (-len(group.paths), group.paths))
-    tied = len(found[0].paths) == len(found[1].paths)
+    apart = [Group(tuple(sorted(paths)), *mean) for paths, mean in zip(joined, means, strict=True)]
+    apart.sort(key=lambda group: (-len(group.paths), group.paths))
+    tied = len(apart[0].paths) == len(apart[1].paths)
     return Disagreement(
-        readings[0].quantity, readings[0].unit, found[0], tuple(found[1:]), p_value, tied
+        readings[0].quantity, readings[0].unit, apart[0], tuple(apart[1:]), p_value, tied
     )
 
 
@@ -295,6 +295,6 @@ def failing(name: str, concerned: Sequence[Disagreement]) -> Check:
         u = value * math.hypot(worst.u / worst.mean, one.usual.u / one.usual.mean)
         return value, 3.0 * u
 
-    value, limit = max(map(ratio, concerned), key=lambda found: abs(math.log(found[0])))
+    value, limit = max(map(ratio, concerned), key=lambda pair: abs(math.log(pair[0])))
     words = f"its captures disagree: {'; '.join(map(describe, concerned))}"
     return Check(name, "fail", words, value, limit, "1", suspects(concerned))

@@ -343,10 +343,10 @@ def _constants_in_doubt(known: Known, ways: tuple[Way, ...], aims: Aims) -> list
     names = sorted({name for way in ways for name in way.gives} & set(CONSTANTS) | aims.required)
     doubts = []
     for name in names:
-        found = _doubt_of(name, known.constants.get(name), aims)
-        if found is None:
+        doubt = _doubt_of(name, known.constants.get(name), aims)
+        if doubt is None:
             continue
-        kind, words = found
+        kind, words = doubt
         settled = name in known.constants and known.constants[name].settled
         tests = frozenset() if settled else settling_tests(name, known, ways)
         if kind == "uncertain" and _mostly_instrument(known.constants[name]):

@@ -64,16 +64,16 @@ def estimators() -> tuple[Estimator, ...]:
         In an order in which each comes after those that it uses; by rank and name otherwise.
 
     """
-    found: dict[str, Estimator] = {one.name: one.value for one in _found()}
+    plug_ins: dict[str, Estimator] = {one.name: one.value for one in _found()}
     givers: dict[str, list[str]] = {}
-    for estimator in found.values():
+    for estimator in plug_ins.values():
         for constant in estimator.gives:
             givers.setdefault(constant, []).append(estimator.name)
     graph = {
         e.name: sorted({g for used in e.uses for g in givers.get(used, ()) if g != e.name})
-        for e in sorted(found.values(), key=lambda e: (e.rank, e.name))
+        for e in sorted(plug_ins.values(), key=lambda e: (e.rank, e.name))
     }
-    return tuple(found[name] for name in TopologicalSorter(graph).static_order())
+    return tuple(plug_ins[name] for name in TopologicalSorter(graph).static_order())
 
 
 def fit_all(
@@ -115,7 +115,7 @@ def _fit_all(
     changes: Mapping[str, Any],
     recall: Recall | None,
 ) -> tuple[Constants, tuple[Evidence, ...], tuple[Failure, ...]]:
-    found: list[tuple[int, int, Fit]] = []
+    fits: list[tuple[int, int, Fit]] = []
     failures: list[Failure] = []
     stated = stated_constants(campaign)
     known = Constants(stated)
@@ -132,12 +132,12 @@ def _fit_all(
                 result = Fit(_missing(estimator, reason))
         else:
             result = Fit(_missing(estimator, estimator.experiment))
-        found.append((estimator.rank, order, _possible(estimator, result)))
-        ranked = sorted(found, key=lambda item: item[:2])
+        fits.append((estimator.rank, order, _possible(estimator, result)))
+        ranked = sorted(fits, key=lambda item: item[:2])
         measured = reconciled(Constants(tuple(e for _, _, fit in ranked for e in fit.estimates)))
         known = Constants((*measured.estimates, *stated))
     known = Constants(tuple(_untorn(e) for e in known.estimates))
-    evidence = tuple(e for _, _, fit in found for e in fit.evidence)
+    evidence = tuple(e for _, _, fit in fits for e in fit.evidence)
     return known, evidence, tuple(failures)
 
 

@@ -71,9 +71,9 @@ def drag_polynomial(table: EffectTable) -> Array | None:
     wanted = np.interp(even, speed, drag)
     columns = np.stack([even, even**2, even**3], axis=1)
     scale = columns.max(axis=0)
-    found = np.linalg.lstsq(columns / scale, wanted, rcond=None)[0] / scale
-    missed = np.abs(columns @ found - wanted).max()
-    return found if missed <= OF_PEAK * np.abs(wanted).max() else None
+    coefficients = np.linalg.lstsq(columns / scale, wanted, rcond=None)[0] / scale
+    missed = np.abs(columns @ coefficients - wanted).max()
+    return coefficients if missed <= OF_PEAK * np.abs(wanted).max() else None
 
 
 def _odd_half(table: EffectTable) -> tuple[Array, Array | None]:
@@ -112,17 +112,17 @@ def waves(tables: Sequence[EffectTable]) -> list[Wave]:
         Drag over the angle of the shaft; the torque on the shaft is minus their sum.
 
     """
-    found: dict[int, complex] = {}
+    amplitudes: dict[int, complex] = {}
     for table in tables:
         values = np.array(table.values)
         spectrum = -2.0 * np.fft.rfft(values) / values.size
         peak = np.abs(spectrum[1:]).max(initial=0.0)
         for order in np.flatnonzero(np.abs(spectrum) > 1e-9 * peak):
             if order:
-                found[int(order)] = found.get(int(order), 0.0) + complex(spectrum[order])
+                amplitudes[int(order)] = amplitudes.get(int(order), 0.0) + complex(spectrum[order])
     # Re(c exp(jkθ)) = |c| sin(kθ + arg c + π/2)
     each = [
         Wave(order, abs(c), math.remainder(math.atan2(c.imag, c.real) + math.pi / 2, math.tau))
-        for order, c in found.items()
+        for order, c in amplitudes.items()
     ]
     return sorted(each, key=lambda wave: -wave.amplitude_nm)

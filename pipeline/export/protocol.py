@@ -53,8 +53,8 @@ class Source:
             glossary, or in another unit.
 
         """
-        found = self.optional(name)
-        if found is None:
+        constant = self.optional(name)
+        if constant is None:
             estimate = self.sheet.constants.get(name)
             status = "missing" if estimate is None else estimate.status
             note = "" if estimate is None or not estimate.note else f" ({estimate.note})"
@@ -62,7 +62,7 @@ class Source:
                 f"motor {self.sheet.motor_id!r}: {name} is {status}{note}",
                 "an export holds measured and derived constants only",
             )
-        return found
+        return constant
 
     def optional(self, name: str) -> Estimate | None:
         """A constant where it may be exported, else None; raises UsageError as `estimate` does
@@ -109,8 +109,8 @@ class Source:
 
     def all(self) -> list[Estimate]:
         """Every constant that may be exported, by name; raises as `optional` does."""
-        found = (self.optional(name) for name in sorted(self.sheet.constants))
-        return [estimate for estimate in found if estimate is not None]
+        estimates = (self.optional(name) for name in sorted(self.sheet.constants))
+        return [estimate for estimate in estimates if estimate is not None]
 
     def sizes(self) -> Mapping[str, Parameters]:
         """Parameters of the effects that are known of the motor, asked for or found."""

@@ -12,5 +12,5 @@ from pipeline.plugins import discover
 @cache
 def exporters() -> Mapping[str, Exporter]:
     """Every exporter by the name of its format."""
-    found = discover("pipeline.export.exporters", "EXPORTER", Exporter)
-    return {one.name: one.value for one in found}
+    plug_ins = discover("pipeline.export.exporters", "EXPORTER", Exporter)
+    return {one.name: one.value for one in plug_ins}

@@ -129,14 +129,16 @@ def conformity(
         Without risks where a limit, `sd` or a motor is missing.
 
     """
-    found = [(held.decisions.get(v.motor_id, "not_evaluated"), v) for v in candidate]
+    decided = [(held.decisions.get(v.motor_id, "not_evaluated"), v) for v in candidate]
     counts = tuple(
         Count(decision, number)
         for decision in WORST
-        if (number := sum(1 for one, _ in found if one == decision))
+        if (number := sum(1 for one, _ in decided if one == decision))
     )
     worst: Decision = counts[0].decision if counts else "not_evaluated"
-    inside = {v.motor_id: _inside(held, corrected[v.motor_id]) for one, v in found if one == worst}
+    inside = {
+        v.motor_id: _inside(held, corrected[v.motor_id]) for one, v in decided if one == worst
+    }
     named = min(inside, key=lambda motor: (inside[motor], motor), default=None)
     risk: Risks | None = None
     if held.tolerance is not None and sd is not None and candidate:

@@ -263,10 +263,10 @@ def _checks(pairs: Sequence[Pair]) -> tuple[EffectChange, ...]:
     before: dict[str, set[str]] = {}
     after: dict[str, set[str]] = {}
     for pair in pairs:
-        for member, found in ((pair.before, before), (pair.after, after)):
+        for member, motors_by_check in ((pair.before, before), (pair.after, after)):
             for check in member.sheet.checks:
                 if check.status == "fail":
-                    found.setdefault(check.name, set()).add(member.sheet.motor_id)
+                    motors_by_check.setdefault(check.name, set()).add(member.sheet.motor_id)
     changed = []
     for name in sorted({*before, *after}):
         old, new = before.get(name, set()), after.get(name, set())

@@ -36,14 +36,14 @@ def spectra_of(members: Iterable[Member], side: Side) -> list[tuple[Order, ...]]
         One a motor that was tested for cogging; an empty tuple where none was found.
 
     """
-    found = []
+    spectra = []
     for member in members:
         estimate = member.sheet.constants.get(SPECTRUM)
         if member.side != side or estimate is None:
             continue
         if estimate.orders or estimate.note.startswith(NO_COGGING):
-            found.append(estimate.orders)
-    return found
+            spectra.append(estimate.orders)
+    return spectra
 
 
 def order_levels(members: Sequence[Member]) -> tuple[OrderLevel, ...]:

@@ -83,17 +83,19 @@ def result(
         With its verdict and the reason.
 
     """
-    found = made.assessment
-    candidate = [v for v in found.values if v.side == "candidate"]
-    lots = {lot: list(v) for side in (found.base, found.candidate) for lot, v in side.items()}
-    mean = float(np.mean(found.candidate_means)) if found.candidate else 0.0
-    flat = [value for values in found.candidate.values() for value in values]
+    assessment = made.assessment
+    candidate = [v for v in assessment.values if v.side == "candidate"]
+    lots = {
+        lot: list(v) for side in (assessment.base, assessment.candidate) for lot, v in side.items()
+    }
+    mean = float(np.mean(assessment.candidate_means)) if assessment.candidate else 0.0
+    flat = [value for values in assessment.candidate.values() for value in values]
     spread = float(np.std(flat, ddof=1)) if len(flat) > 1 else None
-    conform = conformity(made.held, candidate, found.corrected, mean, spread)
-    test = _test(found, family, limits)
-    same = _equivalence(found, made.held.margin, limits.alpha)
+    conform = conformity(made.held, candidate, assessment.corrected, mean, spread)
+    test = _test(assessment, family, limits)
+    same = _equivalence(assessment, made.held.margin, limits.alpha)
     answers = Answers(conform, test, same, family.motor_p_holm, limits.alpha)
-    decided = judge(made.limits, made.unit, found, answers)
+    decided = judge(made.limits, made.unit, assessment, answers)
     tolerance = made.held.tolerance
     return ConstantResult(
         name=made.limits.name,
@@ -103,14 +105,14 @@ def result(
         why=decided.why,
         decides=made.limits.decides,
         temperature_degc=25.0,
-        motors=_motors(found, made.held),
-        lots=_lots(found, limits, started),
+        motors=_motors(assessment, made.held),
+        lots=_lots(assessment, limits, started),
         bounds=made.held.bounds,
         conformity=conform,
         test=test,
         equivalence=same,
-        effect=_effect(found, limits.k),
-        power=_power(found, limits, family.size),
+        effect=_effect(assessment, limits.k),
+        power=_power(assessment, limits, family.size),
         capability=capability(flat, tolerance.lower, tolerance.upper)
         if tolerance is not None
         else NO_CAPABILITY,
@@ -297,21 +299,21 @@ def gauge_of(repeats: Sequence[Value]) -> Gauge | None:
 
 
 def _stations(made: Material) -> tuple[StationBias, ...]:
-    found = made.assessment
-    seen = {station: value for value in found.values if (station := label(value))}
+    assessment = made.assessment
+    seen = {station: value for value in assessment.values if (station := label(value))}
     golden: dict[str, set[str]] = {}
     for value in made.golden:
         golden.setdefault(label(value), set()).add(value.motor_id)
     rows = []
     for name in sorted(seen):
-        bias = found.correction.bias.get(name)
+        bias = assessment.correction.bias.get(name)
         motors = len(golden.get(name, ()))
         by = "golden" if bias is not None and motors else "lots" if bias is not None else ""
         if not by:
-            sides = {v.side for v in found.values if label(v) == name}
+            sides = {v.side for v in assessment.values if label(v) == name}
             both = sides >= {"baseline", "candidate"} and seen[name].station is not None
             by = "same_station" if both else "unreferenced"
-        u = found.correction.u_of(name) if bias is not None else None
+        u = assessment.correction.u_of(name) if bias is not None else None
         shown = seen[name].station or "(not stated)"
         rows.append(StationBias(shown, bias, u, by, motors))  # type: ignore[arg-type]
     return tuple(rows)

@@ -197,17 +197,17 @@ def study(values: Array, level: float = LEVEL) -> Gauge:
 
     """
     table = anova(values)
-    found = components(table)
+    parts = components(table)
     low, high = _interval(table, level)
-    share = found.percent
+    share = parts.percent
     return Gauge(
         motors=table.motors,
         stations=table.stations,
         repeats=table.repeats,
-        repeatability=math.sqrt(found.repeatability),
-        reproducibility=math.sqrt(found.station + found.interaction),
-        rr=math.sqrt(found.rr),
-        part=math.sqrt(found.part),
+        repeatability=math.sqrt(parts.repeatability),
+        reproducibility=math.sqrt(parts.station + parts.interaction),
+        rr=math.sqrt(parts.rr),
+        part=math.sqrt(parts.part),
         percent=100.0 * share,
         percent_low=100.0 * low,
         percent_high=100.0 * high,

@@ -32,16 +32,16 @@ def lint(limits: Limits, terms: Mapping[str, Term]) -> tuple[str, ...]:
     designed. What is left of the tolerance after the guard band must not be empty.
 
     """
-    found = list(_rules(limits))
+    messages = list(_rules(limits))
     for name, count in Counter(limits.golden).items():
         if count > 1:
-            found.append(f"golden: {name} is there {count} times")
+            messages.append(f"golden: {name} is there {count} times")
     for one in limits.constants:
         if one.name not in terms:
-            found.append(f"{one.name}: no such constant; docs/glossary.md lists them")
+            messages.append(f"{one.name}: no such constant; docs/glossary.md lists them")
             continue
-        found += [f"{one.name}: {fault}" for fault in _constant(one, terms[one.name])]
-    return tuple(found)
+        messages += [f"{one.name}: {fault}" for fault in _constant(one, terms[one.name])]
+    return tuple(messages)
 
 
 def _rules(limits: Limits) -> Iterable[str]:

@@ -154,15 +154,15 @@ def _material(
     golden, _ = values_of(of_constant.name, samples.golden)
     repeats, _ = values_of(of_constant.name, samples.repeats)
     golden = independent(golden)
-    found = assess(values, golden, order)
-    mean = float(np.mean(found.base_means)) if found.base else None
+    assessment = assess(values, golden, order)
+    mean = float(np.mean(assessment.base_means)) if assessment.base else None
     term = terms.get(of_constant.name)
     return Material(
         of_constant,
         term.unit if term else "1",
         term.words if term else of_constant.name,
-        found,
-        hold(of_constant, values, found.corrected, mean, found.within_sd, limits.k),
+        assessment,
+        hold(of_constant, values, assessment.corrected, mean, assessment.within_sd, limits.k),
         tuple(golden),
         tuple(independent(repeats)),
         tuple(missing) if values else (),
@@ -234,7 +234,7 @@ def _headline(
 
 def _outliers(constants: Sequence[ConstantResult]) -> tuple[Outlier, ...]:
     """The motors apart from their lot, the furthest first."""
-    found = [
+    outliers = [
         Outlier(
             motor.motor_id,
             motor.lot,
@@ -251,7 +251,7 @@ def _outliers(constants: Sequence[ConstantResult]) -> tuple[Outlier, ...]:
         for motor in one.motors
         if motor.outlier
     ]
-    return tuple(sorted(found, key=lambda o: (-abs(o.z), o.motor_id, o.constant)))
+    return tuple(sorted(outliers, key=lambda o: (-abs(o.z), o.motor_id, o.constant)))
 
 
 def _notes(materials: Sequence[Material]) -> list[str]:

@@ -246,10 +246,10 @@ def _midnight(day: date) -> datetime:
 
 
 def _instant(when: str) -> datetime:
-    found = utc_moment(when)
-    if found is None:
+    instant = utc_moment(when)
+    if instant is None:
         raise ValueError(f"{when[:60]!r} is no date")
-    return found
+    return instant
 
 
 def _within(day: datetime, low: datetime, high: datetime) -> bool:

@@ -134,7 +134,7 @@ def effects_shown(
         angle have their amplitude [N·m].
 
     """
-    found = []
+    shown = []
     for member in members:
         diagnosis = diagnoses.get(member.sheet.motor_id)
         if member.side is None or diagnosis is None or diagnosis.verdict == "insufficient":
@@ -152,19 +152,19 @@ def effects_shown(
             units |= {f"{order_name(k)} (diagnosed)": "N·m" for k in waves}
         if diagnosis.verdict == "unknown":
             sizes["unknown structure"] = None
-        found.append(Shown(member.sheet.motor_id, member.lot, member.side, sizes, units))
-    return found
+        shown.append(Shown(member.sheet.motor_id, member.lot, member.side, sizes, units))
+    return shown
 
 
 def _orders(parameters: Mapping[str, tuple[float, str]]) -> dict[int, float]:
     """Amplitude by order of an effect that is a sum of waves over the angle [N·m]."""
-    found: dict[int, float] = {}
+    amplitudes: dict[int, float] = {}
     for name, (value, _) in parameters.items():
         if match := WAVE.fullmatch(name):
             order = int(match[1])
-            found[order] = math.hypot(found.get(order, 0.0), value)
-    largest = max(found.values(), default=0.0)
-    return {order: size for order, size in found.items() if size >= 0.1 * largest}
+            amplitudes[order] = math.hypot(amplitudes.get(order, 0.0), value)
+    largest = max(amplitudes.values(), default=0.0)
+    return {order: size for order, size in amplitudes.items() if size >= 0.1 * largest}
 
 
 def compare_traits(shown: Sequence[Shown], source: Source) -> tuple[EffectChange, ...]:

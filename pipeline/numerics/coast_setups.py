@@ -178,13 +178,13 @@ def _both(one: Fall, other: Fall, limits: Limits) -> Array | None:
 
 def _ratios(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> list[float]:
     """Decelerations of coasts over those of others, of all halves that can be compared."""
-    found = []
+    ratios = []
     for one in falls:
         for other in others:
             speeds = _both(one, other, limits)
             for high, low in pairwise([] if speeds is None else speeds):
-                found.append(one.deceleration(high, low) / other.deceleration(high, low))
-    return found
+                ratios.append(one.deceleration(high, low) / other.deceleration(high, low))
+    return ratios
 
 
 def _differ(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> bool:

@@ -37,15 +37,15 @@ def coasting_rows(speed: Array) -> list[tuple[slice, int]]:
     fastest = float(np.max(np.abs(speed), initial=0.0))
     if fastest == 0.0:
         return []
-    found = []
+    runs = []
     for sense in (1, -1):
         along = speed * sense
         for start, stop in true_runs(along >= REST * fastest):
             top = float(along[start:stop].max())
             if top >= LEAST_TOP * fastest:
                 high = np.flatnonzero(along[start:stop] >= TOP * top)
-                found.append((slice(start + int(high[-1]), stop), sense))
-    return found
+                runs.append((slice(start + int(high[-1]), stop), sense))
+    return runs
 
 
 def coast_down(

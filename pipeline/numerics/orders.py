@@ -93,7 +93,7 @@ def passes(theta_rad: Array, back_rad: float = 0.2) -> list[tuple[slice, int]]:
     Of a long record every k-th row is looked at, 20,000 to 40,000 of them.
 
     """
-    found: list[tuple[slice, int]] = []
+    senses: list[tuple[slice, int]] = []
     start, extreme, sense = 0, 0, 0
     step = max(1, theta_rad.size // 20_000)
     for i in range(0, theta_rad.size, step):
@@ -105,11 +105,11 @@ def passes(theta_rad: Array, back_rad: float = 0.2) -> list[tuple[slice, int]]:
         elif moved * sense >= 0:
             extreme = i
         elif abs(moved) > back_rad:
-            found.append((slice(start, extreme + 1), sense))
+            senses.append((slice(start, extreme + 1), sense))
             start, extreme, sense = extreme + 1, i, -sense
     if sense != 0:
-        found.append((slice(start, theta_rad.size), sense))
-    return found
+        senses.append((slice(start, theta_rad.size), sense))
+    return senses
 
 
 def whole_turns(theta_rad: Array, value: Array) -> list[Turn]:
@@ -426,10 +426,10 @@ def find_orders(
 def _fit_orders(turn: Turn, orders: Sequence[int]) -> tuple[ComplexArray, Turn]:
     """Coefficients of the orders in one turn by least squares, and the turn without them."""
     design = harmonic_design(turn.theta_rad, list(orders))
-    found = linear_fit(design, turn.value)
-    mean = float(found.coefficients[0])
-    left = Turn(turn.theta_rad, found.residuals + mean, turn.sense)
-    coefficients: ComplexArray = found.coefficients[1::2] - 1j * found.coefficients[2::2]
+    fit = linear_fit(design, turn.value)
+    mean = float(fit.coefficients[0])
+    left = Turn(turn.theta_rad, fit.residuals + mean, turn.sense)
+    coefficients: ComplexArray = fit.coefficients[1::2] - 1j * fit.coefficients[2::2]
     return coefficients, left
 
 

@@ -153,12 +153,12 @@ def find_plateaus(
     rounding = float(np.finfo(np.float64).eps) * n * float(np.max(np.abs(signal)))
     limit = max(6.0 * sigma * math.sqrt(2.0 / window), tolerance * span, rounding)
     moving = jump[:n] > limit
-    found = []
+    plateaus = []
     for start, stop in true_runs(~moving):
         trimmed = _trim(signal, start, stop, window, sigma, limit)
         if stop - trimmed >= least:
-            found.append(Plateau(trimmed, stop))
-    return tuple(found)
+            plateaus.append(Plateau(trimmed, stop))
+    return tuple(plateaus)
 
 
 def true_runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -48,10 +48,10 @@ def operation_of(campaign: Campaign, stated: Stated) -> Operation | None:
         "vdc_v": _bus_voltage(campaign),
         "current_a": _highest(campaign.captures, "id_a", "iq_a"),
     }
-    found = {name: given.get(name, value) for name, value in usual.items()}
-    if found["vdc_v"] is None or found["current_a"] is None:
+    conditions = {name: given.get(name, value) for name, value in usual.items()}
+    if conditions["vdc_v"] is None or conditions["current_a"] is None:
         return None
-    origin = {name: STATED if name in given else SEEN for name in found}
+    origin = {name: STATED if name in given else SEEN for name in conditions}
     defaults = {
         "temp_winding_degc": (25.0, "the reference of the constants"),
         "temp_magnet_degc": (25.0, "the reference of the constants"),
@@ -59,15 +59,15 @@ def operation_of(campaign: Campaign, stated: Stated) -> Operation | None:
         "voltage_share": (1.0, "linear range of space-vector modulation"),
     }
     for name, (value, why) in defaults.items():
-        found[name] = given.get(name, value)
+        conditions[name] = given.get(name, value)
         origin[name] = STATED if name in given else why
     ambient = given.get("temp_ambient_degc", AMBIENT_DEGC)
-    found["temp_limit_degc"] = given.get("temp_limit_degc", ambient + RISE_K)
+    conditions["temp_limit_degc"] = given.get("temp_limit_degc", ambient + RISE_K)
     origin["temp_limit_degc"] = (
         STATED if "temp_limit_degc" in given else "80 K: IEC 60034-1, 8.10, class 130 (B)"
     )
     drops = {name: given.get(name) for name in ("drop_v", "on_ohm")}
-    return Operation(**found, **drops, origin=origin)  # type: ignore[arg-type]
+    return Operation(**conditions, **drops, origin=origin)  # type: ignore[arg-type]
 
 
 def check_stated(stated: Stated) -> dict[str, float]:
@@ -124,15 +124,15 @@ def _bus_voltage(campaign: Campaign) -> float | None:
 
 def _highest(captures: Iterable[Capture], d: str, q: str) -> float | None:
     """The highest length of a dq vector in any capture."""
-    found = []
+    currents = []
     for capture in captures:
         if capture.has(d, q):
             data = capture.arrays(d, q)
             length = np.hypot(data[d], data[q])
             length = length[np.isfinite(length)]
             if length.size:
-                found.append(float(np.percentile(length, HIGH)))
-    return _rounded(max(found)) if found and max(found) > 0.0 else None
+                currents.append(float(np.percentile(length, HIGH)))
+    return _rounded(max(currents)) if currents and max(currents) > 0.0 else None
 
 
 def _rounded(value: float) -> float:

@@ -199,7 +199,7 @@ def _numbers(case: _Case, stall: Point, corner: Array) -> list[Derived]:
     torque = shaft_torque_nm(machine, stall, 0.0)
     at = most_torque(machine, case.limit_a, case.limit_v, float(corner[0]))
     corner_torque = shaft_torque_nm(machine, at, float(corner[0]))
-    found = [
+    numbers = [
         _derived(
             "torque_peak_nm", "peak torque, at standstill", "N·m", torque,
             "1.5 p (ψ i_q + (L_d − L_q) i_d i_q) − T_c at MTPA and the current limit",
@@ -217,7 +217,7 @@ def _numbers(case: _Case, stall: Point, corner: Array) -> list[Derived]:
             corner_torque * float(corner[0]), "T ω",
         ),
     ]  # fmt: skip
-    return found + (_without_load(case) if case.sources.has(*MECHANICAL) else [])
+    return numbers + (_without_load(case) if case.sources.has(*MECHANICAL) else [])
 
 
 def _without_load(case: _Case) -> list[Derived]:
@@ -267,7 +267,7 @@ def _thermal(
         return shaft_torque_nm(machine, point, omega)
 
     conditions = "at the winding's limit; the magnet between ambient and that"
-    found = [
+    numbers = [
         _derived(
             "torque_continuous_stall_nm", "continuous stall torque", "N·m", torque(0.0),
             "MTPA at I = √(ΔT/(1.5 R R_th))", f"{S1}, {conditions}",
@@ -281,7 +281,7 @@ def _thermal(
     curve = _curve(
         "torque_continuous", "continuous torque (S1)", speeds, [torque(w) for w in speeds]
     )
-    return [*found, *lasting], [curve], blanks
+    return [*numbers, *lasting], [curve], blanks
 
 
 def _times(case: _Case, heat: Heat, stall: Point) -> tuple[list[Derived], list[Blank]]:
@@ -292,7 +292,7 @@ def _times(case: _Case, heat: Heat, stall: Point) -> tuple[list[Derived], list[B
     loss = 1.5 * r_ohm * (stall.id_a**2 + stall.iq_a**2)
     growth = d[COPPER] / (1.0 + d[COPPER] * ambient)
     time = time_to_limit_s(heat, loss, growth, op.temp_limit_degc - op.temp_ambient_degc)
-    found = [
+    numbers = [
         _derived(
             name, words, "s", d[name], "from the heat run's network of two nodes"
         )
@@ -303,15 +303,15 @@ def _times(case: _Case, heat: Heat, stall: Point) -> tuple[list[Derived], list[B
         if name in d
     ]  # fmt: skip
     if np.isfinite(time[0]) and np.all(np.isfinite(np.percentile(time[1:], [2.5, 97.5]))):
-        found.append(
+        numbers.append(
             _derived(
                 "time_peak_s", "time at peak torque until the limit", "s", time,
                 "step response of the network with R(T)", S2,
             )
         )  # fmt: skip
-        return found, []
+        return numbers, []
     why = "the current limit never heats the winding to its limit: peak torque is continuous"
-    return found, [Blank("time_peak_s", "time at peak torque", why, "operate.current_a= higher")]
+    return numbers, [Blank("time_peak_s", "time at peak torque", why, "operate.current_a= higher")]
 
 
 def _curve(

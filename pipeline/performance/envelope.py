@@ -244,5 +244,5 @@ def current_for(
     least = np.where(fits, current, np.inf)
     at = np.argmin(least, axis=1)
     rows = np.arange(torque.size)
-    found = np.where(np.isfinite(least[rows, at]), current[rows, at], np.nan)
-    return -found * sine[at], found * cosine[at]
+    amps = np.where(np.isfinite(least[rows, at]), current[rows, at], np.nan)
+    return -amps * sine[at], amps * cosine[at]

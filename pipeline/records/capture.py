@@ -136,8 +136,8 @@ class CaptureMeta:
             From 0 to 1; None where there is no such key or its text is no such number.
 
         """
-        found = number(self.extra.get(key, ""))
-        return found if found is not None and 0.0 <= found <= 1.0 else None
+        stated = number(self.extra.get(key, ""))
+        return stated if stated is not None and 0.0 <= stated <= 1.0 else None
 
 
 @dataclass(frozen=True, slots=True)

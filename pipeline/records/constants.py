@@ -69,8 +69,8 @@ class Constants:
             None where that method gave no value.
 
         """
-        found = (e for e in self.estimates if e.name == name and e.method == method and e.known)
-        return next(found, None)
+        estimates = (e for e in self.estimates if e.name == name and e.method == method and e.known)
+        return next(estimates, None)
 
     def all_of(self, name: str) -> tuple[Estimate, ...]:
         """Every estimate of a constant, with a value or without, in order of preference.

@@ -322,25 +322,27 @@ def faults(events: Sequence[Event]) -> list[str]:
         published twice, a decision on no version, a chain that does not hold.
 
     """
-    found: list[str] = []
+    sentences: list[str] = []
     chain, revisions, seen = START, dict[str, int](), set[tuple[str, str]]()
     for expected, event in enumerate(events, start=1):
         name = f"row {event.sequence} ({event.kind} {event.motor_id!r})"
         if event.sequence != expected:
-            found.append(f"{name}: row {expected} is expected here")
+            sentences.append(f"{name}: row {expected} is expected here")
         if event.linked(chain).chain != event.chain:
-            found.append(f"{name}: does not follow from the row before; it or that was changed")
+            sentences.append(f"{name}: does not follow from the row before; it or that was changed")
         chain = event.chain
         if event.kind != "publish":
             if event.key not in seen:
-                found.append(f"{name}: version {event.version[:12]} was never published")
+                sentences.append(f"{name}: version {event.version[:12]} was never published")
             continue
         if event.key in seen:
-            found.append(f"{name}: version {event.version[:12]} is there twice")
+            sentences.append(f"{name}: version {event.version[:12]} is there twice")
             continue
         seen.add(event.key)
         revisions[event.motor_id] = revisions.get(event.motor_id, 0) + 1
         if event.revision != revisions[event.motor_id]:
             counted = revisions[event.motor_id]
-            found.append(f"{name}: says revision {event.revision}, is the {counted}. of its motor")
-    return found
+            sentences.append(
+                f"{name}: says revision {event.revision}, is the {counted}. of its motor"
+            )
+    return sentences

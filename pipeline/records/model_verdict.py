@@ -159,8 +159,8 @@ class ModelVerdict(PlainRecord):
         """The error of captures predicted without themselves, and with the effects found, in noise
         floors: `15 → 0.61`; empty where no model was fitted.
         """
-        found = [one for one in (self.held_out, self.held_out_with) if one is not None]
-        return " → ".join(map(number, found))
+        held_out = [one for one in (self.held_out, self.held_out_with) if one is not None]
+        return " → ".join(map(number, held_out))
 
     def command(self, motor_id: str, folder: str = "FOLDER") -> str:
         """The command that diagnoses the captures of a folder.

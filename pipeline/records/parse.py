@@ -116,9 +116,11 @@ def utc_moment(text: str) -> datetime | None:
         None for a text of another form, and where UTC would be before the year 1 or after 9999.
 
     """
-    found = moment(text)
+    instant = moment(text)
     try:
-        return found and (found if found.tzinfo else found.replace(tzinfo=UTC)).astimezone(UTC)
+        return instant and (instant if instant.tzinfo else instant.replace(tzinfo=UTC)).astimezone(
+            UTC
+        )
     except OverflowError:
         return None
 
@@ -195,8 +197,8 @@ def json_value(data: bytes, *, unique_keys: bool = False) -> Any:
     """
     hook = _unique if unique_keys else None
     try:
-        found = json.loads(decoded(data), parse_int=_json_whole, object_pairs_hook=hook)
-        if b"\\u" in data and not is_text(json.dumps(found, ensure_ascii=False)):
+        value = json.loads(decoded(data), parse_int=_json_whole, object_pairs_hook=hook)
+        if b"\\u" in data and not is_text(json.dumps(value, ensure_ascii=False)):
             raise ParseError("holds half of a surrogate pair, which is no text")
     except ParseError:
         raise
@@ -204,7 +206,7 @@ def json_value(data: bytes, *, unique_keys: bool = False) -> Any:
         raise ParseError("nests too deep") from None
     except ValueError as fault:
         raise ParseError(f"cannot be read: {fault}"[:160]) from None
-    return found
+    return value
 
 
 def _json_whole(digits: str) -> int | float:
@@ -217,7 +219,7 @@ def _json_whole(digits: str) -> int | float:
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) != len(pairs):
+    members = dict(pairs)
+    if len(members) != len(pairs):
         raise ParseError("has a key twice")
-    return found
+    return members

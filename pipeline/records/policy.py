@@ -159,7 +159,7 @@ def overrides(policy: Any, given: Mapping[str, Any]) -> Overrides:
 
     """
     known = {entry.name: entry.value for entry in entries(policy)}
-    found = {}
+    changed = {}
     for name, value in _flat(given):
         if name not in known:
             near = get_close_matches(name, known, 1, 0.5) or _same_field(name, known)
@@ -167,8 +167,8 @@ def overrides(policy: Any, given: Mapping[str, Any]) -> Overrides:
             raise UsageError(f"policy: no field {name!r}", hint)
         number = _as(known[name], value, name)
         if number != known[name]:
-            found[name] = number
-    return tuple(sorted(found.items()))
+            changed[name] = number
+    return tuple(sorted(changed.items()))
 
 
 def with_overrides(policy: Made, changes: Overrides) -> Made:

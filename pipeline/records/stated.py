@@ -49,7 +49,7 @@ def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:
     counts. Without `u_NAME` it is `UNSTATED_SHARE` of the value.
 
     """
-    found = []
+    estimates = []
     names = {key for c in campaign.captures for key in c.meta.extra} | set(campaign.stated)
     for name in sorted(filter(may_be_stated, names)):
         stated = _stated_value(campaign.stated, name)
@@ -61,8 +61,8 @@ def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:
                 continue
             stated = max(counts, key=counts.__getitem__)
             paths = tuple(path for path, pair in pairs.items() if pair == stated)
-        found.append(_estimate(name, *stated, paths))
-    return tuple(found)
+        estimates.append(_estimate(name, *stated, paths))
+    return tuple(estimates)
 
 
 def _stated_value(stated: Mapping[str, float], name: str) -> tuple[float, float | None] | None:

@@ -160,10 +160,10 @@ def with_effects(motor: Motor, text: str) -> Motor:
     for word in (item.strip() for item in inside.split(",")):
         if not word:
             continue
-        found = _ITEM.fullmatch(word)
-        if found is None:
+        match = _ITEM.fullmatch(word)
+        if match is None:
             raise ValueError(f"effects: {word!r} is no name, name=size or name.parameter=value")
-        name, key, value = found["name"], found["key"], found["value"]
+        name, key, value = match["name"], match["key"], match["value"]
         if name in OUTSIDE and key is None:
             motor = with_unknown(motor, name, _number(value or "1", name))
             continue

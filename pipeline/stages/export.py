@@ -73,8 +73,8 @@ def main(settings: ExportSettings) -> Outcome:
 
 def _effects(sheet: Datasheet) -> EffectTables:
     """What the effects known of a motor add to it; none where its own constants are not known."""
-    found = {name: sheet.constants.get(own) for name, own in BASE.items()}
-    base = {name: one.number for name, one in found.items() if one is not None and one.known}
+    estimates = {name: sheet.constants.get(own) for name, own in BASE.items()}
+    base = {name: one.number for name, one in estimates.items() if one is not None and one.known}
     poles = sheet.constants.get("pole_pairs")
     if len(base) < len(BASE) or poles is None or not poles.known:
         return EffectTables()
@@ -99,11 +99,11 @@ def _version(registry: Registry, settings: ExportSettings) -> tuple[Version, tup
             f"no motor {settings.motor!r} in {registry.place}", "`registry list` shows all"
         )
     if settings.revision is None and settings.version is None:
-        found, last = in_force(history), history[-1]
-        if found is None:
+        in_force_now, last = in_force(history), history[-1]
+        if in_force_now is None:
             raise _unreleased(last, settings)
         newer = f"note: {not_exported(last)}"
-        return found, (newer,) * (last.revision > found.revision)
+        return in_force_now, (newer,) * (last.revision > in_force_now.revision)
     wanted = Selection(settings.motor, revision=_whole(settings.revision), version=settings.version)
     version = one_of([v for v in history if wanted.takes(v)], wanted, registry.place)
     if version.status != "released":

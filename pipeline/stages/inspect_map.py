@@ -247,22 +247,22 @@ def _questions(
     groups: Sequence[tuple[Shape, list[str]]], names: NamePatterns, settings: InspectSettings
 ) -> dict[str, str]:
     """What must be answered before the map reads every capture, and in what words."""
-    found: dict[str, str] = {}
+    questions: dict[str, str] = {}
     for shape, _ in groups:
-        found |= dict(seen.question for seen in shape.fields if seen.question)
+        questions |= dict(seen.question for seen in shape.fields if seen.question)
         timeless = settings.answers.get("test") in TESTS_WITHOUT_CLOCK or shape.topics
         columns = {seen.column for seen in shape.fields}
         if not timeless and columns.isdisjoint(("t_s", *OHMMETER)):
-            found["increment_s"] = "s from row to row, where rows follow a clock"
+            questions["increment_s"] = "s from row to row, where rows follow a clock"
         if any(seen.per_pole_pair for seen in shape.fields):
-            found["pole_pairs"] = "electrical speed is divided by them"
-    found |= {"motor_id": "the serial number", "test": "which test of the contract it is"}
+            questions["pole_pairs"] = "electrical speed is divided by them"
+    questions |= {"motor_id": "the serial number", "test": "which test of the contract it is"}
     given = set(settings.answers) | names.keys
     if any(stream.parts for shape, _ in groups for stream in shape.streams):
-        found["captures"] = "whether the files are cut into the parts above: captures=proposed"
+        questions["captures"] = "whether the files are cut into the parts above: captures=proposed"
     if "captures" in settings.answers:
         given |= {"test"}
-    return {key: text for key, text in found.items() if key not in given}
+    return {key: text for key, text in questions.items() if key not in given}
 
 
 def preview_of(task: PreviewTask) -> list[str]:
@@ -295,14 +295,14 @@ def _check(
             source = str(Path(place) / "proposed.yaml")
             write_whole(Path(source), text.encode())
         limits = _read_limits(settings)
-        found = campaigns(root, source, limits=limits, config_dir=settings.config_dir, only=only)
-    motors = [motor_record(campaign) for campaign in found.campaigns]
+        read = campaigns(root, source, limits=limits, config_dir=settings.config_dir, only=only)
+    motors = [motor_record(campaign) for campaign in read.campaigns]
     lines = [line for motor in motors for line in motor_lines(motor)]
-    refused = any(one.severity == "refused" for one in found.findings)
-    if not found.campaigns:
+    refused = any(one.severity == "refused" for one in read.findings)
+    if not read.campaigns:
         lines.append("no capture can be used yet")
-    code = first_that_applies(3 if refused else 0, 0 if found.campaigns else 4)
-    errors = tuple(lines_of(found.findings))
+    code = first_that_applies(3 if refused else 0, 0 if read.campaigns else 4)
+    errors = tuple(lines_of(read.findings))
     return Outcome(
-        code, "\n".join(lines), errors, result={"motors": motors}, faults=faults_of(found.findings)
+        code, "\n".join(lines), errors, result={"motors": motors}, faults=faults_of(read.findings)
     )

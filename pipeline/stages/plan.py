@@ -70,16 +70,16 @@ def main(settings: PlanSettings) -> Outcome:
 def _of_captures(settings: PlanSettings, folder: str, required: frozenset[str]) -> Outcome:
     """The plans of what a run of these captures would find; nothing is written."""
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
-    found = campaigns(folder, settings.source, settings.motor, limits, settings.config_dir)
+    read = campaigns(folder, settings.source, settings.motor, limits, settings.config_dir)
     plans = []
-    for recorded in found.campaigns:
+    for recorded in read.campaigns:
         campaign = replace(recorded, stated=settings.constants)
         constants = fit_all(campaign, {})[0]
         tests = frozenset(capture.meta.test for capture in campaign.captures)
         checks = check_all(constants, campaign, {})
         known = Known(campaign.motor_id, constants.chosen(), checks, tests)
         plans.append(_planned(known, required))
-    outcome = outcome_of(folder, found, [plan.text() for plan in plans], undecided=not plans)
+    outcome = outcome_of(folder, read, [plan.text() for plan in plans], undecided=not plans)
     return replace(outcome, result=plans)
 
 

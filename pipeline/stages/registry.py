@@ -70,14 +70,16 @@ def place_of(settings: RegistrySettings) -> str:
 
 def _list(registry: Registry, settings: RegistrySettings) -> Outcome:
     events = registry.events()
-    found = select(events, Selection(motor_id=settings.motor))
-    if settings.motor is not None and not found:
+    selected = select(events, Selection(motor_id=settings.motor))
+    if settings.motor is not None and not selected:
         raise _unknown(registry, settings.motor)
-    motors = len({version.motor_id for version in found})
-    lines = [versions_table(found), ""] if found else []
-    count = f"{counted(motors, 'motor')}, {counted(len(found), 'version')}"
-    next_ = f"registry show {shlex.quote(found[0].motor_id)}{_where(settings)}" if found else ""
-    return Outcome(text="\n".join([*lines, count]), result=found, next=next_)
+    motors = len({version.motor_id for version in selected})
+    lines = [versions_table(selected), ""] if selected else []
+    count = f"{counted(motors, 'motor')}, {counted(len(selected), 'version')}"
+    next_ = (
+        f"registry show {shlex.quote(selected[0].motor_id)}{_where(settings)}" if selected else ""
+    )
+    return Outcome(text="\n".join([*lines, count]), result=selected, next=next_)
 
 
 def _show(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -111,8 +113,8 @@ def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
         wanted = Selection(motor_id=motor, revision=number)
         pair.append(one_of([v for v in history if wanted.takes(v)], wanted, registry.place))
     one, other = registry.datasheets(pair)
-    found = changes(one.constants, other.constants)
-    return Outcome(text=difference_text(pair[0], pair[1], found), result=found)
+    differences = changes(one.constants, other.constants)
+    return Outcome(text=difference_text(pair[0], pair[1], differences), result=differences)
 
 
 def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -136,13 +138,16 @@ def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
 
 
 def _verify(registry: Registry, settings: RegistrySettings) -> Outcome:
-    found = registry.verify()
-    count = f"{counted(found.versions, 'version')}, {counted(found.decisions, 'decision')}"
-    faults = counted(len(found.faults), "mismatch")
-    verdict = faults if found.faults else "all of it as published"
-    errors = (*(f"mismatch: {line}" for line in found.faults), *(f"note: {n}" for n in found.notes))
+    broken = registry.verify()
+    count = f"{counted(broken.versions, 'version')}, {counted(broken.decisions, 'decision')}"
+    faults = counted(len(broken.faults), "mismatch")
+    verdict = faults if broken.faults else "all of it as published"
+    errors = (
+        *(f"mismatch: {line}" for line in broken.faults),
+        *(f"note: {n}" for n in broken.notes),
+    )
     text = f"{place_of(settings)}: {count}, {verdict}"
-    return Outcome(1 if found.faults else 0, text, errors, result=found)
+    return Outcome(1 if broken.faults else 0, text, errors, result=broken)
 
 
 def _decide(
@@ -222,10 +227,10 @@ def moment(text: str) -> datetime:
 
     """
     try:
-        found = datetime.fromisoformat(text)
+        instant = datetime.fromisoformat(text)
         if len(text) <= len("2026-03-01"):
-            found = datetime.combine(found.date(), time.max)
-        return (found if found.tzinfo else found.replace(tzinfo=UTC)).astimezone(UTC)
+            instant = datetime.combine(instant.date(), time.max)
+        return (instant if instant.tzinfo else instant.replace(tzinfo=UTC)).astimezone(UTC)
     except (ValueError, OverflowError) as error:
         remedy = "write 2026-03-01 or 2026-03-01T12:00Z"
         raise UsageError(f"date={text} is no date", remedy) from error
@@ -237,10 +242,10 @@ def _version(registry: Registry, settings: RegistrySettings, *, newest: bool) ->
     history = registry.history(wanted.motor_id or "")
     if not history:
         raise _unknown(registry, wanted.motor_id or "")
-    found = [version for version in history if wanted.takes(version)]
+    versions = [version for version in history if wanted.takes(version)]
     if newest and wanted.revision is None and wanted.version is None:
-        found = found[-1:]
-    return one_of(found, wanted, registry.place)
+        versions = versions[-1:]
+    return one_of(versions, wanted, registry.place)
 
 
 def _wanted(settings: RegistrySettings) -> Selection:

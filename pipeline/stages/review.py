@@ -125,15 +125,15 @@ def _chosen(output: Path, settings: ReviewSettings) -> Opened:
 def _of_motor(folder: Path, motor_id: str) -> Opened:
     stem = file_stem(motor_id)
     named = [folder / f"{kind}-{stem}.rrd" for kind in ("motor", "ladder", "comparison")]
-    found = [*(path for path in named if path.is_file())]
-    found += sorted((folder / stem).rglob("*.rrd"))
-    if not found:
+    recordings = [*(path for path in named if path.is_file())]
+    recordings += sorted((folder / stem).rglob("*.rrd"))
+    if not recordings:
         raise UsageError(
             f"there are no recordings of motor {motor_id} in {folder.parent}",
             "run the pipeline on its captures first, or name another motor",
         )
     # The viewer shows what comes last: the motor.
-    return Opened((), tuple(reversed(found)))
+    return Opened((), tuple(reversed(recordings)))
 
 
 def _stems_of_lot(output: Path, lot: str) -> set[str]:

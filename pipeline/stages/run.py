@@ -151,13 +151,13 @@ def _run(
     cache = RunCache(folder, output, on=settings.cache)
     with waiting("looking at the files of " + settings.input), watch.stage("survey"):
         ask = partial(_answers, settings, sources, workers, cache)
-        found = survey(folder, sources, ask, recover=settings.recover)
+        files = survey(folder, sources, ask, recover=settings.recover)
         surveyed()
-    plain = _jobs(settings, found, limits)
-    batch = _batch_key(settings, plain, found, registry)
+    plain = _jobs(settings, files, limits)
+    batch = _batch_key(settings, plain, files, registry)
     if (cached := _cached_outcome(settings, registry, cache, batch)) is not None:
         return replace(cached, timings=watch.table())
-    return _computed(settings, registry, (workers, cache, watch), found, plain)
+    return _computed(settings, registry, (workers, cache, watch), files, plain)
 
 
 def _computed(
@@ -293,8 +293,8 @@ def _answers(
             answers[number] = answer
     open_ = [number for number in range(len(questions)) if number not in answers]
     unanswered = [questions[number] for number in open_]
-    found = survey_with(workers, folder, sources, limits, unanswered, recover=settings.recover)
-    answers.update(zip(open_, found, strict=True))
+    surveyed = survey_with(workers, folder, sources, limits, unanswered, recover=settings.recover)
+    answers.update(zip(open_, surveyed, strict=True))
     all_answers = [answers[number] for number in range(len(questions))]
     if open_:
         cache.keep_answers(questions, all_answers)
@@ -397,8 +397,8 @@ def _process(
             bar.advance(at)
 
     with progress([_size(settings, job) for job in motors]) as bar:
-        found = workers.map_tasks(process_motor, [*motors, *beside], advance)
-    for number, end in zip(due, found, strict=False):
+        outcomes = workers.map_tasks(process_motor, [*motors, *beside], advance)
+    for number, end in zip(due, outcomes, strict=False):
         ends[number] = end
     died = tuple(end for end in ends if isinstance(end, MachineError))
     return [end for end in ends if isinstance(end, MotorResult)], died

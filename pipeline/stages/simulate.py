@@ -89,10 +89,10 @@ def _ours(output: Path, folders: Iterable[str]) -> None:
     What an earlier simulation left is taken away when the new one is written.
     """
     for folder in folders:
-        found = sorted(_captures(output / folder))
-        if found and not (output / folder / TRUTH).is_file():
+        captures = sorted(_captures(output / folder))
+        if captures and not (output / folder / TRUTH).is_file():
             raise UsageError(
-                f"{output / folder} holds {found[0].name}, and no {TRUTH}: it is not simulated",
+                f"{output / folder} holds {captures[0].name}, and no {TRUTH}: it is not simulated",
                 "name another folder by output=",
             )
 

@@ -117,8 +117,8 @@ def known_estimates(name: str, sheets: Sequence[Datasheet]) -> list[Estimate]:
         The datasheets.
 
     """
-    found = (sheet.constants.get(name) for sheet in sheets)
-    return [estimate for estimate in found if estimate is not None and estimate.known]
+    estimates = (sheet.constants.get(name) for sheet in sheets)
+    return [estimate for estimate in estimates if estimate is not None and estimate.known]
 
 
 def _scale(name: str, sheets: Sequence[Datasheet]) -> Scale | None:

@@ -104,12 +104,12 @@ def _rows(model: ModelVerdict) -> list[tuple[str, str]]:
         size = quantity(model.worst.size, model.worst.unit, 2)
         rows.append(("where", f"{model.worst.description}, {size} beyond the noise"))
         rows.append(("places over their floor", str(model.over)))
-    for effect, found in model.missing.items():
-        sizes = (f"{name} {number_text(*reading)}" for name, reading in found.parameters.items())
+    for effect, addition in model.missing.items():
+        sizes = (f"{name} {number_text(*reading)}" for name, reading in addition.parameters.items())
         rows.append((effect.replace("_", " "), "; ".join(sizes)))
-        if found.confused_with:
-            others = ", ".join(found.confused_with).replace("_", " ")
-            rows.append(("which could as well be", f"{others}; to tell: {found.experiment}"))
+        if addition.confused_with:
+            others = ", ".join(addition.confused_with).replace("_", " ")
+            rows.append(("which could as well be", f"{others}; to tell: {addition.experiment}"))
     if model.unknown:
         rows.append(("not explained", model.unknown))
     if model.note:

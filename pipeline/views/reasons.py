@@ -29,5 +29,5 @@ def shared_reasons(reasons: Iterable[tuple[str, str]]) -> tuple[Reason, ...]:
     members: dict[str, dict[str, None]] = {}
     for member, text in reasons:
         members.setdefault(text, {})[member] = None
-    found = [Reason(text, tuple(own)) for text, own in members.items() if len(own) >= SHARED]
-    return tuple(sorted(found, key=lambda reason: (-len(reason.members), reason.text)))
+    shared = [Reason(text, tuple(own)) for text, own in members.items() if len(own) >= SHARED]
+    return tuple(sorted(shared, key=lambda reason: (-len(reason.members), reason.text)))

@@ -107,20 +107,20 @@ def found_estimates(sheet: Datasheet) -> list[Estimate]:
         The datasheet.
 
     """
-    found = []
+    estimates = []
     for effect, one in () if sheet.model is None else sheet.model.missing.items():
         for parameter, (value, u, unit) in one.parameters.items():
             name = f"{effect}.{parameter}"
             if value is None or u is None:
                 note = one.experiment or "these captures do not determine it"
-                found.append(not_identifiable(name, unit, "residual_test", note))
+                estimates.append(not_identifiable(name, unit, "residual_test", note))
             else:
                 budget = type_a(f"scatter:residual_test:{name}", u)
                 words = one.headline
-                found.append(
+                estimates.append(
                     Estimate(name, value, unit, "measured", "residual_test", budget, note=words)
                 )
-    return found
+    return estimates
 
 
 def fleet_files(frames: Sequence[pl.DataFrame]) -> dict[str, bytes]:

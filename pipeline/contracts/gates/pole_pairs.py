@@ -54,14 +54,16 @@ def _unit(count: float, u: float, from_whole: float, stated: int | None) -> str:
     or a gear may meet a unit's factor by chance. Whatever is whole in rpm is so in degrees too, so
     the one that makes the nameplate's number goes first.
     """
-    found: list[tuple[bool, str]] = []
+    readings: list[tuple[bool, str]] = []
     for factor, words in UNITS.items():
         cycles = count * factor
         whole = round(cycles)
         near = abs(cycles - whole) <= from_whole + 2.0 * u * factor
         if near and u * factor < 0.1 and whole > 0 and (whole == stated or count < 0.5):
-            found.append((whole == stated, f"{words}, which makes {cycles:.3f}"))
-    return ", or ".join(words for same, words in found if same or not any(one for one, _ in found))
+            readings.append((whole == stated, f"{words}, which makes {cycles:.3f}"))
+    return ", or ".join(
+        words for same, words in readings if same or not any(one for one, _ in readings)
+    )
 
 
 GATE = Gate(

@@ -35,30 +35,30 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     return LOOKS[capture.meta.test](capture, options)
 
 
-def _judge(capture: Capture, found: float, refuse: float, warn: float, per: str) -> Passed:
-    words = f"{found:.3g} samples {per}"
-    if found < refuse:
+def _judge(capture: Capture, samples: float, refuse: float, warn: float, per: str) -> Passed:
+    words = f"{samples:.3g} samples {per}"
+    if samples < refuse:
         raise CaptureError(CODE, f"{words}, where {refuse:g} is the least", REMEDY)
-    if found < warn:
+    if samples < warn:
         few = f"{words}, where {warn:g} would be good"
         return Passed(findings=(warning(capture, CODE, few, REMEDY),))
     return Passed()
 
 
 def _step(capture: Capture, options: Mapping[str, float]) -> Passed:
-    found = math.inf
+    samples = math.inf
     for name in (n for n in LINE_CURRENTS if capture.has(n)):
         current = capture.arrays(name)[name]
         current = current[np.isfinite(current)]
         if current.size and np.ptp(current) > 20.0 * noise_of(current):
-            found = min(found, samples_per_time_constant(current))
+            samples = min(samples, samples_per_time_constant(current))
     least, good = options["step_refuse"], options["step_warn"]
-    if found == 0.0:
+    if samples == 0.0:
         words = "no sample falls on the way of the current from one level to the next, where"
         raise CaptureError(
             CODE, f"{words} {least:g} in an electrical time constant are the least", REMEDY
         )
-    return _judge(capture, found, least, good, "in an electrical time constant")
+    return _judge(capture, samples, least, good, "in an electrical time constant")
 
 
 def _spin(capture: Capture, options: Mapping[str, float]) -> Passed:
@@ -68,17 +68,17 @@ def _spin(capture: Capture, options: Mapping[str, float]) -> Passed:
         top_hz = max(top_hz, stated * _top_speed_rad_s(capture) / TURN_RAD)
     if top_hz == 0.0:
         return Passed()
-    found = 1.0 / (top_hz * usual_s)
+    samples = 1.0 / (top_hz * usual_s)
     least, good = options["period_refuse"], options["period_warn"]
-    return _judge(capture, found, least, good, "in the shortest electrical period")
+    return _judge(capture, samples, least, good, "in the shortest electrical period")
 
 
 def _rotor_frame(capture: Capture, options: Mapping[str, float]) -> Passed:
     stated, top = capture.meta.pole_pairs, _top_speed_rad_s(capture)
     if stated is None or top == 0.0 or not capture.has("vq_v"):
         return Passed()
-    found = TURN_RAD / (stated * top * _interval_s(capture))
-    return _judge(capture, found, 0.0, options["frame_warn"], "in the shortest electrical period")
+    samples = TURN_RAD / (stated * top * _interval_s(capture))
+    return _judge(capture, samples, 0.0, options["frame_warn"], "in the shortest electrical period")
 
 
 def _slow_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
@@ -89,9 +89,9 @@ def _slow_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
     if pole_pairs is None or slots is None or travel == 0.0:
         return Passed()
     order = cogging_order(slots, pole_pairs)
-    found = angle.size * TURN_RAD / (np.ptp(angle) * order) if np.ptp(angle) else math.inf
+    samples = angle.size * TURN_RAD / (np.ptp(angle) * order) if np.ptp(angle) else math.inf
     least, good = options["cogging_refuse"], options["cogging_warn"]
-    return _judge(capture, found, least, good, f"in a cogging period (order {order})")
+    return _judge(capture, samples, least, good, f"in a cogging period (order {order})")
 
 
 def _interval_s(capture: Capture) -> float:

@@ -40,10 +40,10 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     warns, by more than `refuse` [1] refuses, with the unit or count that it lands on within 2 %.
 
     """
-    found = speed_over_angle(capture, options["turns"])
-    if found is None:
+    ratio_and_u = speed_over_angle(capture, options["turns"])
+    if ratio_and_u is None:
         return Passed()
-    ratio, u = found
+    ratio, u = ratio_and_u
     off = abs(ratio - 1.0)
     if off <= options["refuse"] and off - 2.0 * u <= options["warn"]:
         return Passed()

@@ -31,8 +31,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _in_utc(stated: str) -> bool:
-    found = moment(stated)
-    return found is not None and found.utcoffset() == timedelta(0)
+    instant = moment(stated)
+    return instant is not None and instant.utcoffset() == timedelta(0)
 
 
 GATE = Gate(NAME, tuple(TESTS), check)

@@ -35,17 +35,19 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
         words = "no cogging was found, so there is no cogging_order to judge"
         needs = "needs cogging found in a cogging test, pole pairs and slots"
         return not_evaluated(NAME, words if none else needs)
-    found, p = round(order.number), round(pairs.number)
+    leading, p = round(order.number), round(pairs.number)
     fundamental = cogging_order(slots, p)
-    words = f"order {found} a turn; {slots} slots and {2 * p} poles make multiples of {fundamental}"
-    ratio = found / fundamental
-    if found % fundamental == 0:
+    words = (
+        f"order {leading} a turn; {slots} slots and {2 * p} poles make multiples of {fundamental}"
+    )
+    ratio = leading / fundamental
+    if leading % fundamental == 0:
         return Check(NAME, "pass", words, ratio, 0.0, "1")
-    if found % slots == 0:
+    if leading % slots == 0:
         return Check(NAME, "marginal", words, ratio, 0.0, "1", "unequal slots or teeth")
-    if found % p == 0:
+    if leading % p == 0:
         return Check(NAME, "marginal", words, ratio, 0.0, "1", "unequal magnets or poles")
-    if found <= 2:
+    if leading <= 2:
         return Check(NAME, "marginal", words, ratio, 0.0, "1", "unbalance or eccentricity")
     return Check(NAME, "fail", words, ratio, 0.0, "1", "another motor's slots, or a gear")
 

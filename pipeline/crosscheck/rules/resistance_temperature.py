@@ -45,9 +45,9 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
 def _missing(constants: Constants) -> str:
     """What is missing, with what a heat run that is there came to."""
-    found = [e for e in constants.all_of("temp_coeff_copper_1_k") if e.impossible]
-    if found:
-        return f"the heat_run gives no coefficient: it {found[0].note}"
+    impossible = [e for e in constants.all_of("temp_coeff_copper_1_k") if e.impossible]
+    if impossible:
+        return f"the heat_run gives no coefficient: it {impossible[0].note}"
     return "needs a heat_run over some tens of kelvin"
 
 

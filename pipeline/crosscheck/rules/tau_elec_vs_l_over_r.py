@@ -47,10 +47,10 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     unlogged = 0
     for capture in _smallest_steps(campaign):
         expected = _expected_s(capture, ld.number, lq.number, r_phase.number)
-        found = step_time_constant_s(*_trace(capture))
-        if found is not None:
-            ratios.append(found[0] / expected)
-            errors.append(found[1] / expected)
+        tau_s = step_time_constant_s(*_trace(capture))
+        if tau_s is not None:
+            ratios.append(tau_s[0] / expected)
+            errors.append(tau_s[1] / expected)
             unlogged += not capture.has(WINDING)
     if not ratios:
         return not_evaluated(NAME, "needs current_step captures that settle within the recording")

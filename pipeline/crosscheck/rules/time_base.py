@@ -138,11 +138,11 @@ def _line(blocks: Array) -> tuple[float, float]:
     scale = np.maximum(np.abs(blocks).max(axis=0), 1e-300)
     y, x = blocks[:, 0] / scale[0], blocks[:, 1:] / scale[1:]
     inverse = np.linalg.pinv(x.T @ x, rcond=1e-10)
-    found = inverse @ (x.T @ y)
-    scatter = y - x @ found
+    coefficients = inverse @ (x.T @ y)
+    scatter = y - x @ coefficients
     variance = float(scatter @ scatter) / (y.size - x.shape[1]) * inverse[0, 0]
     unit = float(scale[0] / scale[1])
-    return float(found[0]) * unit, math.sqrt(max(variance, 0.0)) * unit
+    return float(coefficients[0]) * unit, math.sqrt(max(variance, 0.0)) * unit
 
 
 RULE = Rule(

@@ -33,17 +33,17 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     """
     names = ("kt_peak_nm_a", "kt_reluctance_nm_a2", "kt_from_ke_nm_a", "ld_h", "lq_h")
     known = {name: constants.best(name) for name in (*names, "pole_pairs")}
-    found = {name: estimate for name, estimate in known.items() if estimate is not None}
-    if len(found) < len(known):
-        missing = ", ".join(name for name in known if name not in found)
+    present = {name: estimate for name, estimate in known.items() if estimate is not None}
+    if len(present) < len(known):
+        missing = ", ".join(name for name in known if name not in present)
         return not_evaluated(NAME, f"needs {missing}: a torque_map with d currents, steps, a spin")
     id_a = _strongest_d_current_a(campaign)
     if id_a == 0.0:
         return not_evaluated(NAME, "needs a torque_map with d currents")
-    pairs = round(found["pole_pairs"].number)
+    pairs = round(present["pole_pairs"].number)
     return judge_ratio(
         NAME,
-        _ratio(found, pairs, id_a),
+        _ratio(present, pairs, id_a),
         options["allowance"],
         f"torque at i_d = {id_a:.3g} A, dynamometer over magnet and reluctance terms",
         "coupling",

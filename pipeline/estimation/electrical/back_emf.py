@@ -121,8 +121,8 @@ def _analytic(t_s: Array, values: Array) -> Complex:
     from scipy.signal import hilbert
 
     even = np.linspace(t_s[0], t_s[-1], t_s.size)
-    found = hilbert(np.interp(even, t_s, values - np.mean(values)))
-    return np.interp(t_s, even, found.real) + 1j * np.interp(t_s, even, found.imag)
+    signal = hilbert(np.interp(even, t_s, values - np.mean(values)))
+    return np.interp(t_s, even, signal.real) + 1j * np.interp(t_s, even, signal.imag)
 
 
 def read_spin(capture: Capture, temp_column: str | None) -> Spin:
@@ -268,29 +268,29 @@ def _unbroken(t_s: Array, vector: Complex, moving: NDArray[np.bool_]) -> list[tu
     usual_s, after_s = float(np.median(np.diff(t_s)[both])), np.diff(t_s)
     lost = float(np.quantile(advance, 0.9)) * after_s > math.pi * usual_s
     gaps = np.flatnonzero(lost & (after_s > 1.5 * usual_s)) + 1 if usual_s > 0.0 else both[:0]
-    found: list[tuple[int, int]] = []
+    pieces: list[tuple[int, int]] = []
     for start, stop in true_runs(moving):
         inner = gaps[(gaps > start) & (gaps < stop)]
         edges = [start, *(int(k) for k in inner), stop]
-        found += pairwise(edges)
-    return found
+        pieces += pairwise(edges)
+    return pieces
 
 
 def _one_way(phase: Array) -> list[tuple[int, int]]:
     """Rows start..stop that split a phase [n] wherever it turns back by a cycle or more."""
-    open_pieces, found = [(0, phase.size)], []
+    open_pieces, pieces = [(0, phase.size)], []
     while open_pieces:
         start, stop = open_pieces.pop()
         forward = phase[start:stop] * (1.0 if phase[stop - 1] >= phase[start] else -1.0)
         back = np.maximum.accumulate(forward) - forward
         low = int(np.argmax(back))
         if back[low] < TURN_RAD:
-            found.append((start, stop))
+            pieces.append((start, stop))
             continue
         high = int(np.argmax(forward[: low + 1]))
         edges = sorted({start, start + high, start + low, stop})
         open_pieces += pairwise(edges)
-    return sorted(found)
+    return sorted(pieces)
 
 
 def _smooth_phase(t_s: Array, phase: Array) -> tuple[Array, Array, Rows] | None:
@@ -319,16 +319,16 @@ def _split(rows: Rows, phase: Array, omega: Array, number: Rows, change: float) 
     speeds = np.bincount(number[inside], omega[inside], cycles) / np.bincount(
         number[inside], minlength=cycles
     )
-    found, start = [], 0
+    pieces, start = [], 0
     for stop in range(1, cycles + 1):
         level = float(speeds[start:stop].mean())
         if stop == cycles or abs(float(speeds[stop]) - level) > change * abs(level):
             first, last = _steady_core(speeds, start, stop)
             if last - first >= policy().back_emf.least_cycles:
                 keep = np.flatnonzero((number >= first) & (number < last))
-                found.append(Stretch(rows[keep], phase[keep], omega[keep]))
+                pieces.append(Stretch(rows[keep], phase[keep], omega[keep]))
             start = stop
-    return found
+    return pieces
 
 
 def _steady_core(speeds: Array, start: int, stop: int) -> tuple[int, int]:

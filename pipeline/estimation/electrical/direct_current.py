@@ -186,10 +186,10 @@ def uncertainties_of(points: Sequence[Point], captures: Sequence[Capture]) -> di
         By source: relative for gains [1], absolute for temperatures [K].
 
     """
-    found = instrument_uncertainties(captures)
+    u_rel = instrument_uncertainties(captures)
     if any(not point.temp_logged for point in points):
-        found[UNLOGGED] = policy().magnet.unlogged_k
-    return found
+        u_rel[UNLOGGED] = policy().magnet.unlogged_k
+    return u_rel
 
 
 def _standard_error(samples: Array) -> float:

@@ -226,11 +226,11 @@ def _lateness(
     spread = np.ptp(omegas) > 0.1 * np.max(np.abs(omegas))
     columns = [np.ones(len(omegas)), np.array(omegas)] if spread else [np.array(omegas)]
     design = np.column_stack(columns)
-    found = np.linalg.lstsq(design, np.array(angles), rcond=None)[0]
+    lateness = np.linalg.lstsq(design, np.array(angles), rcond=None)[0]
     free = len(angles) - design.shape[1]
-    left = np.array(angles) - design @ found
+    left = np.array(angles) - design @ lateness
     wobble = float(np.sqrt(left @ left / free)) if free > 0 else 0.0
-    return (float(found[0]) if spread else 0.0), float(found[-1]), wobble
+    return (float(lateness[0]) if spread else 0.0), float(lateness[-1]), wobble
 
 
 def current_lag(points: Sequence[Point], pole_pairs: int, offset: float) -> float:
@@ -274,13 +274,13 @@ def current_lag(points: Sequence[Point], pole_pairs: int, offset: float) -> floa
     ratio, ones = 0.0, np.ones(torque.size)
     for _ in range(3):
         turned = omega * (i_d + ratio * (i_d**2 - i_q**2))
-        found = linear_fit(np.column_stack([*shared, turned]), torque, ones)
-        kt, reluctance = (float(found.coefficients[len(groups) + k]) for k in (0, 1))
-        if not found.full_rank or found.dof < 3 or kt == 0.0:
+        solution = linear_fit(np.column_stack([*shared, turned]), torque, ones)
+        kt, reluctance = (float(solution.coefficients[len(groups) + k]) for k in (0, 1))
+        if not solution.full_rank or solution.dof < 3 or kt == 0.0:
             return 0.0
         ratio = reluctance / kt
-    slope = float(found.coefficients[-1])
-    u = float(np.sqrt(found.covariance[-1, -1] * found.chi2_dof))
+    slope = float(solution.coefficients[-1])
+    u = float(np.sqrt(solution.covariance[-1, -1] * solution.chi2_dof))
     return slope / (kt * np.cos(offset)) if abs(slope) > policy().evidence.sigmas * u else 0.0
 
 

@@ -176,11 +176,11 @@ def _by_vector(spin: Spin) -> list[Turn]:
         flux = flux - (complex(c[0], c[1]) + complex(c[2], c[3]) * time)
     phase = np.unwrap(np.angle(flux))
     cycles = abs(float(phase[-1] - phase[0])) / TURN_RAD
-    found = (
+    vector_turns = (
         _amplitude(spin, channel, _flux_of(spin, channel), phase, cycles)
         for channel in spin.channels
     )
-    return [turn for turn in found if turn is not None]
+    return [turn for turn in vector_turns if turn is not None]
 
 
 def _least(value: Callable[[float], float], low: float, high: float) -> float:
@@ -332,7 +332,7 @@ def _cycles(ends: LinearFit, extremes: int, sense: float, reversal: float) -> fl
 
 def _extremes(flux: Array, reversal: float) -> NDArray[np.intp]:
     """Rows of alternating maxima and minima reached and left again by at least `reversal`."""
-    found: list[int] = []
+    places: list[int] = []
     low = high = 0
     rising: bool | None = None
     for row in range(flux.size):
@@ -340,10 +340,10 @@ def _extremes(flux: Array, reversal: float) -> NDArray[np.intp]:
         high = row if flux[row] > flux[high] else high
         if rising is not False and flux[high] - flux[row] > reversal:
             if rising or flux[high] - flux[0] > reversal:
-                found.append(high)
+                places.append(high)
             rising, low = False, row
         elif rising is not True and flux[row] - flux[low] > reversal:
             if rising is False or flux[0] - flux[low] > reversal:
-                found.append(low)
+                places.append(low)
             rising, high = True, row
-    return np.array(found, dtype=np.intp)
+    return np.array(places, dtype=np.intp)

@@ -91,13 +91,13 @@ def magnet_uncertainties(captures: Iterable[Capture]) -> dict[str, float]:
     """
     captures = tuple(captures)
     logged = [c for c in captures if magnet_column(c) == "temp_magnet_degc"]
-    found = instrument_uncertainties(logged, ("temperature",))
+    u_k = instrument_uncertainties(logged, ("temperature",))
     for capture in captures:
         column = magnet_column(capture)
         if column != "temp_magnet_degc":
             magnet = policy().magnet
-            found[magnet_source(capture)] = magnet.elsewhere_k if column else magnet.unlogged_k
-    return dict(sorted(found.items()))
+            u_k[magnet_source(capture)] = magnet.elsewhere_k if column else magnet.unlogged_k
+    return dict(sorted(u_k.items()))
 
 
 def unlogged_note(captures: Iterable[Capture]) -> str:
@@ -114,12 +114,12 @@ def unlogged_note(captures: Iterable[Capture]) -> str:
         Empty where a thermometer of the magnets recorded all of them.
 
     """
-    found = {}
+    unlogged = {}
     for capture in captures:
         column = magnet_column(capture)
         if column != "temp_magnet_degc":
             size = policy().magnet.elsewhere_k if column else policy().magnet.unlogged_k
-            found[column or "ambient"] = f"{column or 'ambient temperature'} ± {size:g} K"
-    if not found:
+            unlogged[column or "ambient"] = f"{column or 'ambient temperature'} ± {size:g} K"
+    if not unlogged:
         return ""
-    return f"temp_magnet_degc not logged, magnets taken at {', '.join(found.values())}"
+    return f"temp_magnet_degc not logged, magnets taken at {', '.join(unlogged.values())}"

@@ -161,7 +161,7 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
         Means with standard errors, and how many rows they rest on.
 
     """
-    found: list[Point] = []
+    points: list[Point] = []
     total = 0
     for capture in captures:
         data = _columns(capture)
@@ -171,8 +171,8 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
             continue
         for rows in _stretches(data):
             kept = _whole_cycles(rows, data, pole_pairs)
-            found.append(_point(capture, data, kept))
-    numbered = _numbered(found)
+            points.append(_point(capture, data, kept))
+    numbered = _numbered(points)
     return PointTable(tuple(numbered), sum(p.rows for p in numbered), total)
 
 
@@ -247,9 +247,9 @@ def _stretches(data: Mapping[str, Array]) -> list[slice]:
     for names in (("id_a", "iq_a", "torque_shaft_nm"), ("id_a", "iq_a")):
         wide = _settled(data, names)
         little = 2 * _rows_in(wide) < data["iq_a"].size
-        found = max(wide, _settled(data, names, fewest) if little else [], key=_rows_in)
-        if found:
-            return found
+        stretches = max(wide, _settled(data, names, fewest) if little else [], key=_rows_in)
+        if stretches:
+            return stretches
     return []
 
 
@@ -274,15 +274,15 @@ def _settled(
             inside[plateau.rows] = True
             edges |= {plateau.start, plateau.stop}
         flags &= inside
-    found, last = [], 0
+    stretches, last = [], 0
     for a, b in pairwise(sorted(edges)):
         if b - a < policy().evidence.rows or not flags[a:b].all():
             continue
         start = a + min(a - last, (b - a) // 2)
         last = b
         if b - start >= policy().evidence.rows and _steady(data, slice(start, b), names):
-            found.append(slice(start, b))
-    return found
+            stretches.append(slice(start, b))
+    return stretches
 
 
 def _steady(data: Mapping[str, Array], rows: slice, names: Sequence[str]) -> bool:

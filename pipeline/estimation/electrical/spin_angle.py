@@ -77,16 +77,16 @@ def count_pole_pairs(method: Method, groups: Sequence[Group]) -> tuple[Estimate,
     if not ratios:
         return method.missing("pole_pairs", missing), method.missing("phase_order", missing)
     counts = [pole_pairs_from(abs(r), 1.0).number for r in ratios]
-    found = ", ".join(f"{abs(r):.5f}" for r in ratios)
+    listed = ", ".join(f"{abs(r):.5f}" for r in ratios)
     if counts[0] is None or len(set(counts)) > 1:
         note = (
-            f"electrical cycles a turn of {words} are {found}: no whole number within 0.02; check "
+            f"electrical cycles a turn of {words} are {listed}: no whole number within 0.02; check "
             "for a gear or slip between motor and angle sensor, then repeat the open_circuit"
         )
         pairs = method.missing("pole_pairs", note)
     else:
         worst = max(abs(abs(r) - counts[0]) for r in ratios)
-        note = f"electrical cycles a turn of {words}: {found}; {worst:.1g} from the whole number"
+        note = f"electrical cycles a turn of {words}: {listed}; {worst:.1g} from the whole number"
         pairs = method.measured("pole_pairs", counts[0], captures=paths, notes=note)
     if not senses:
         note = "one voltage does not show it; record two line voltages in the open_circuit capture"

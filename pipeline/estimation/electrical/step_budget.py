@@ -44,20 +44,20 @@ def gains(name: str, solution: Solution) -> list[Contribution]:
     records = solution.model.records
     days = sorted({_day(record) for record in records})
     lever = _lever(name, solution)
-    found = []
+    parts = []
     for source, u in instrument_uncertainties(
         [r.capture for r in records], ("voltage", "current")
     ).items():
         change = _under_gain(source, solution)
         acting = [float(lever @ (change * _rows_of(day, solution))) for day in days]
         if len(days) == 1:
-            found.append(Contribution(source, u * acting[0], "B"))
+            parts.append(Contribution(source, u * acting[0], "B"))
             continue
         half = u * math.sqrt(0.5)
-        found.append(Contribution(source, half * sum(acting), "B"))
+        parts.append(Contribution(source, half * sum(acting), "B"))
         for day, own in zip(days, acting, strict=True):
-            found.append(Contribution(f"{source}:{day}", half * own, "B"))
-    return found
+            parts.append(Contribution(f"{source}:{day}", half * own, "B"))
+    return parts
 
 
 def _under_gain(source: str, solution: Solution) -> Array:
@@ -112,7 +112,7 @@ def rotor_angles(name: str, solution: Solution, u_theta_rad: float) -> list[Cont
     lever, now = _lever(name, solution), _weighted(solution, solution.model)
     records = solution.model.records
     places = sorted({_place(r) for r in records})
-    found = []
+    parts = []
     for place in places:
         ends = []
         for side in (-1.0, 1.0):
@@ -123,8 +123,8 @@ def rotor_angles(name: str, solution: Solution, u_theta_rad: float) -> list[Cont
             ends.append(float(lever @ (_weighted(solution, solution.model.of(turned)) - now)))
         odd, even = 0.5 * (ends[1] - ends[0]), 0.5 * (ends[1] + ends[0])
         u = math.copysign(math.hypot(odd, math.sqrt(3.0) * even), odd)
-        found.append(Contribution(f"theta_elec:{place[1]:g}@{place[0]}", u, "B"))
-    return found
+        parts.append(Contribution(f"theta_elec:{place[1]:g}@{place[0]}", u, "B"))
+    return parts
 
 
 def rounded_levels(name: str, solution: Solution) -> float:
@@ -180,15 +180,15 @@ def unexplained(solution: Solution) -> dict[str, float]:
         Root mean square over the span of the current [1], by path.
 
     """
-    found, first = {}, 0
+    parts, first = {}, 0
     for record, weight in zip(solution.model.records, solution.weights, strict=True):
         rows = slice(first, first + record.i_a.size)
         first = rows.stop + record.i_a.size
         left = solution.fit.residuals[rows] / weight[0]
         noise = record.current_noise.sigma**2 / record.count
         excess = max(float(np.mean(left**2)) - float(np.mean(noise)), 0.0)
-        found[record.capture.path] = math.sqrt(excess) / max(float(np.ptp(record.i_a)), 1e-300)
-    return found
+        parts[record.capture.path] = math.sqrt(excess) / max(float(np.ptp(record.i_a)), 1e-300)
+    return parts
 
 
 def birge_ratio(solution: Solution) -> float:

@@ -304,7 +304,7 @@ def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sigmas) -> Solutio
     scale = np.linalg.norm(fit.jacobian, axis=0)
     scale[scale == 0.0] = 1.0
     scatter = np.ones(fit.residuals.size)
-    found, first = [], 0
+    scaled, first = [], 0
     for pair, weight, share in zip(sigmas, weights, shares, strict=True):
         own = []
         for sigma, w, white in zip(pair, weight, share, strict=True):
@@ -313,14 +313,14 @@ def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sigmas) -> Solutio
             power = _white_power(fit.residuals[rows], np.where(w > 0.0, white, 0.0))
             scatter[rows] = np.sqrt(power * white + 1.0 - white)
             own.append(sigma * max(math.sqrt(power), 1e-9))
-        found.append((own[0], own[1]))
+        scaled.append((own[0], own[1]))
     spread = fit.jacobian / scale * scatter[:, None]
     bread = fit.covariance * np.outer(scale, scale)
     covariance = bread @ (spread.T @ spread) @ bread / np.outer(scale, scale)
     honest = NonlinearFit(
         fit.parameters, covariance, fit.residuals, fit.jacobian, fit.cost, fit.converged
     )
-    return Solution(model, parameters, free, honest, weights, tuple(found), scatter)
+    return Solution(model, parameters, free, honest, weights, tuple(scaled), scatter)
 
 
 def _white_power(residuals: Array, white: Array) -> float:

@@ -394,7 +394,7 @@ class StepModel:
             belongs to no level of the supply is 0.
 
         """
-        found = []
+        predicted = []
         for current, record, rows, at, own in zip(
             self.predict(variants),
             self.records,
@@ -408,8 +408,8 @@ class StepModel:
             there = record.level != BETWEEN
             through = current[there] - drive.offset_a
             volts[there] = drive.levels_v.T[record.level[there]] - drive.source_ohm * through
-            found.append((current, volts))
-        return found
+            predicted.append((current, volts))
+        return predicted
 
     def bounds(self, start: Array) -> tuple[Array, Array]:
         """Where the search may go; beyond, a current would run away without end.

@@ -205,10 +205,10 @@ def disagreement(records: Sequence[StepRecord]) -> str:
     A clock or a current in another unit scales L by a thousand, and a common fit would follow it.
 
     """
-    found = np.log([record.l_start_h for record in records])
-    if found.size < 2 or np.ptp(found) < math.log(policy().steps.most_apart):
+    logs = np.log([record.l_start_h for record in records])
+    if logs.size < 2 or np.ptp(logs) < math.log(policy().steps.most_apart):
         return ""
-    apart = found - np.median(found)
+    apart = logs - np.median(logs)
     odd = [
         f"{record.capture.path} ({math.exp(ratio):.3g} times the usual L)"
         for record, ratio in zip(records, apart, strict=True)

@@ -43,13 +43,15 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     ke = known.best(KE)
     if ke is None or ke.status != "measured" or set(ke.captures) <= _spins(campaign):
         return METHOD.nothing(GIVES, EXPERIMENT)
-    found = [_named(name, coupling_as(as_name, ke.number), ke) for name, as_name in NAMES.items()]
+    estimates = [
+        _named(name, coupling_as(as_name, ke.number), ke) for name, as_name in NAMES.items()
+    ]
     pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
     if pairs is None:
         flux = METHOD.missing("psi_pm_wb", "state pole_pairs: the flux is Ke over the pole pairs")
     else:
         flux = _named("psi_pm_wb", ke.number / pairs, ke)
-    return Fit((flux, *found))
+    return Fit((flux, *estimates))
 
 
 def _spins(campaign: Campaign) -> set[str]:

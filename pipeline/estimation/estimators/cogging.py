@@ -72,10 +72,10 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         return METHOD.nothing(GIVES, note)
     highest = largest_order(turns, int(options["highest_order"]))
     spec, lines = find_orders(turns, highest, options["level"])
-    parted = part_orders(lines, known, campaign)
-    estimates = _cogging(captures, spec, parted, known, campaign, options)
+    by_cause = part_orders(lines, known, campaign)
+    estimates = _cogging(captures, spec, by_cause, known, campaign, options)
     estimates += (_friction(captures, turns, spec, known),)
-    return Fit(estimates, _evidence(turns, spec, parted[0]))
+    return Fit(estimates, _evidence(turns, spec, by_cause[0]))
 
 
 def part_orders(
@@ -159,8 +159,8 @@ def _teeth(known: Constants, campaign: Campaign) -> list[int]:
     """Slots and poles a turn, as far as they are known."""
     pairs, slots = known.best("pole_pairs"), campaign.nameplate("slots")
     poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
-    found = [slots, 2 * poles if isinstance(poles, int) else None]
-    return [n for n in found if isinstance(n, int) and n > 1]
+    counts = [slots, 2 * poles if isinstance(poles, int) else None]
+    return [n for n in counts if isinstance(n, int) and n > 1]
 
 
 def name_orders(lines: Sequence[OrderLine], known: Constants, campaign: Campaign) -> str:
@@ -187,12 +187,12 @@ def name_orders(lines: Sequence[OrderLine], known: Constants, campaign: Campaign
 def _cogging(
     captures: Sequence[Capture],
     spec: Spectrum,
-    parted: tuple[Sequence[OrderLine], Sequence[OrderLine]],
+    by_cause: tuple[Sequence[OrderLine], Sequence[OrderLine]],
     known: Constants,
     campaign: Campaign,
     options: Mapping[str, float],
 ) -> tuple[Estimate, ...]:
-    lines, slow = parted
+    lines, slow = by_cause
     also = f"; also {name_orders(slow, known, campaign)} N·m, of unbalance or coupling" * bool(slow)
     tested = f"{spec.orders.size} orders tested over {spec.turns} turns at {options['level']:g}"
     if not lines:

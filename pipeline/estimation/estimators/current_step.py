@@ -122,16 +122,16 @@ def along_ramp(shared: Array, cos_g: float, current_a: Array) -> Array:
     """
     one, sin_g = shared[None, :], math.sqrt(max(1.0 - cos_g**2, 0.0))
     flux_d, flux_q = np.zeros(1), np.zeros(1)
-    found = np.empty(current_a.size)
+    volts = np.empty(current_a.size)
     for k in range(current_a.size):
         l_d, l_q = inductances(one, flux_d, flux_q)
-        found[k] = 2.0 * float(cos_g**2 * l_d[0] + sin_g**2 * l_q[0])
+        volts[k] = 2.0 * float(cos_g**2 * l_d[0] + sin_g**2 * l_q[0])
         if k + 1 < current_a.size:
             step = SPACE * float(current_a[k + 1] - current_a[k])
             middle = flux_d + 0.5 * l_d * cos_g * step, flux_q + 0.5 * l_q * sin_g * step
             l_d, l_q = inductances(one, *middle)
             flux_d, flux_q = flux_d + l_d * cos_g * step, flux_q + l_q * sin_g * step
-    return found
+    return volts
 
 
 def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
@@ -256,15 +256,15 @@ def _chord(record: StepRecord, drive: Drive) -> float:
 
 def _evidence(solution: Solution, labels: Sequence[str]) -> list[Evidence]:
     model = solution.model
-    found = [_saturation_plot(solution, labels)]
+    plots = [_saturation_plot(solution, labels)]
     predicted = model.predict([solution.parameters[None, :]] * len(model.records))
     for record, current in zip(model.records, predicted, strict=True):
         rows = decimated(record.t_s.size)
         series = Series("current", record.t_s[rows], record.i_a[rows], current[rows, 0])
         title, axes = f"Step response on {record.pair}", ("t_s", f"i{record.pair[0]}_a")
         caption = "Current of the locked rotor; the fit is one model for all steps."
-        found.append(METHOD.plot(title, axes, "line", (series,), caption, record.capture.path))
-    return found
+        plots.append(METHOD.plot(title, axes, "line", (series,), caption, record.capture.path))
+    return plots
 
 
 def _saturation_plot(solution: Solution, axes: Sequence[str]) -> Evidence:

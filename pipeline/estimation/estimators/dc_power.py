@@ -146,11 +146,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if blocks.dc_w.size < 2 * policy().evidence.rows:
         return METHOD.nothing(GIVES, f"{blocks.dc_w.size} blocks of a second; {EXPERIMENT}")
     chosen = _chosen(blocks, options["level"])
-    found, design = _solve(blocks, chosen)
-    if found is None:
+    solution, design = _solve(blocks, chosen)
+    if solution is None:
         return METHOD.nothing(GIVES, f"torque and speed do not change apart; {EXPERIMENT}")
-    estimates = _estimates(captures, blocks, chosen, (found, design), options["level"])
-    return Fit(estimates, _plots(captures, blocks, found))
+    estimates = _estimates(captures, blocks, chosen, (solution, design), options["level"])
+    return Fit(estimates, _plots(captures, blocks, solution))
 
 
 def _usable(capture: Capture) -> bool:
@@ -230,21 +230,21 @@ def _solve(blocks: Blocks, chosen: Sequence[str]) -> tuple[LinearFit | None, Arr
         there, slopes = losses(blocks, at)
         design = np.column_stack([slopes, *more])
         # of a linearised equation: coefficients are the numbers themselves, not their steps
-        found = linear_fit(design, lost - there + slopes @ at)
-        if not found.full_rank:
+        solution = linear_fit(design, lost - there + slopes @ at)
+        if not solution.full_rank:
             return None, design
-        at = found.coefficients[:4]
-    return found, design
+        at = solution.coefficients[:4]
+    return solution, design
 
 
-def attenuation(blocks: Blocks, found: LinearFit, design: Array) -> Array:
+def attenuation(blocks: Blocks, solution: LinearFit, design: Array) -> Array:
     """What noise of the torque, which is in the losses and in its square, moves each coefficient.
 
     Parameters
     ----------
     blocks
         With the noise of their torque.
-    found
+    solution
         The fit.
     design
         Its columns [w, k], those of `losses` first.
@@ -260,8 +260,8 @@ def attenuation(blocks: Blocks, found: LinearFit, design: Array) -> Array:
 
     """
     torque, speed = blocks.torque_nm, blocks.speed_rad_s
-    own = found.coefficients[1] * np.sign(speed) + found.coefficients[2] * speed
-    error = -speed - 2.0 * found.coefficients[0] * blocks.warm * (torque + own)
+    own = solution.coefficients[1] * np.sign(speed) + solution.coefficients[2] * speed
+    error = -speed - 2.0 * solution.coefficients[0] * blocks.warm * (torque + own)
     moment = np.zeros(design.shape[1])
     moment[0] = float(np.sum(2.0 * torque * blocks.torque_noise_nm**2 * error))
     size = np.linalg.norm(design, axis=0)
@@ -292,8 +292,8 @@ def _moved(
         blocks.kinetic_rad2_s3, blocks.warm + COPPER_COEFFICIENT_25_1_K * warmer,
         blocks.torque_noise_nm, blocks.capture,
     )  # fmt: skip
-    found, _ = _solve(moved, chosen)
-    return np.full(4, np.nan) if found is None else _constants(found.coefficients)
+    solution, _ = _solve(moved, chosen)
+    return np.full(4, np.nan) if solution is None else _constants(solution.coefficients)
 
 
 def _thermometer(capture: Capture) -> str:
@@ -309,17 +309,17 @@ def _estimates(
     solved: tuple[LinearFit, Array],
     level: float,
 ) -> tuple[Estimate, ...]:
-    found, design = solved
+    solution, design = solved
     lost = blocks.dc_w - blocks.shaft_w
-    linear = design @ found.coefficients + found.residuals
+    linear = design @ solution.coefficients + solution.residuals
     cluster = np.arange(lost.size) // 5
     regression = Regression(design, linear, np.ones(lost.size), cluster)
-    deviation, dof = scatter(regression, found, 0.0)
-    bias = attenuation(blocks, found, design)
+    deviation, dof = scatter(regression, solution, 0.0)
+    bias = attenuation(blocks, solution, design)
     gains = instrument_uncertainties(captures, ("voltage", "current", "torque"))
     gains |= {_thermometer(c): policy().magnet.unlogged_k for c in captures if not _warm(c)}
     shared = contributions(lambda shift: _moved(blocks, captures, chosen, shift), gains)
-    values = _constants(found.coefficients)
+    values = _constants(solution.coefficients)
     slopes = [-0.5 * float(values[0]) ** 3, 1.0, 1.0, 1.0]
     notes, estimates = _notes(captures, blocks, chosen), []
     at = {"omega_mech_rad_s": float(np.max(np.abs(blocks.speed_rad_s)))}
@@ -368,13 +368,15 @@ def _partitions(blocks: Blocks, weights: Array) -> list[Partition]:
     ]
 
 
-def _plots(captures: Sequence[Capture], blocks: Blocks, found: LinearFit) -> tuple[Evidence, ...]:
+def _plots(
+    captures: Sequence[Capture], blocks: Blocks, solution: LinearFit
+) -> tuple[Evidence, ...]:
     lost = blocks.dc_w - blocks.shaft_w
     titles = ["Power that does not leave by the shaft, W"] * len(captures)
     number = np.concatenate(
         [np.arange(np.count_nonzero(blocks.capture == n)) for n in range(len(captures))]
     ).astype(float)
-    columns = blocks.capture, number, lost, lost - found.residuals
+    columns = blocks.capture, number, lost, lost - solution.residuals
     return tuple(METHOD.traces(captures, titles, STANDBY.name, columns, "means over blocks"))
 
 

@@ -105,15 +105,15 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     base, even = torque(rows, alpha), np.ones(rows.count)
     chosen = _nuisances(rows, base, pool, options["level"])
     design = np.column_stack([base, *(pool[name] for name in chosen)])
-    found = linear_fit(design, rows.load_nm)
-    if not found.full_rank:
+    solution = linear_fit(design, rows.load_nm)
+    if not solution.full_rank:
         return METHOD.nothing(GIVES, f"the load goes with speed and acceleration; {EXPERIMENT}")
-    bias = attenuation(rows, found, design)
+    bias = attenuation(rows, solution, design)
     regression = Regression(design, rows.load_nm, even, rows.cluster)
-    deviation, dof = scatter(regression, found, policy().shaft_rows.overlap)
-    if reason := _strange(found.coefficients, deviation, bias):
+    deviation, dof = scatter(regression, solution, policy().shaft_rows.overlap)
+    if reason := _strange(solution.coefficients, deviation, bias):
         return METHOD.nothing(GIVES, f"{reason}; {EXPERIMENT}")
-    kt = float(found.coefficients[0])
+    kt = float(solution.coefficients[0])
     warmer = _refit(rows, alpha + STEP_1_K, chosen, pool, {})
     parts = [
         METHOD.scatter("kt", float(deviation[0]), float(dof[0])),
@@ -127,7 +127,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     notes = _notes(rows, chosen, doubt)
     at = {"iq_a": float(np.max(np.abs(rows.q_current_a))), "temp_magnet_degc": 25.0}
     estimate: Estimate = METHOD.measured(GIVES[0], kt, parts, rows.captures, at, notes)
-    return Fit((estimate,), _plots(rows, found))
+    return Fit((estimate,), _plots(rows, solution))
 
 
 def _notes(rows: ShaftRows, chosen: Sequence[str], doubt: Disagreement | None) -> list[str]:
@@ -153,14 +153,14 @@ def _usable(capture: Capture) -> bool:
     return capture.has("iq_a", "torque_shaft_nm")
 
 
-def attenuation(rows: ShaftRows, found: LinearFit, design: Array) -> float:
+def attenuation(rows: ShaftRows, solution: LinearFit, design: Array) -> float:
     """What the noise of current and acceleration takes of the torque constant.
 
     Parameters
     ----------
     rows
         With the noise of their windows.
-    found
+    solution
         The fit.
     design
         Its columns [w, k], those of `torque` first.
@@ -184,7 +184,7 @@ def attenuation(rows: ShaftRows, found: LinearFit, design: Array) -> float:
     noise[3] = float(np.sum(rows.columns[ACCELERATION_NOISE] ** 2))
     size = np.linalg.norm(design, axis=0)
     gram = (design / size).T @ (design / size)
-    moved = np.linalg.solve(gram, noise * found.coefficients / size) / size
+    moved = np.linalg.solve(gram, noise * solution.coefficients / size) / size
     return float(np.abs(moved[0]))
 
 
@@ -234,9 +234,9 @@ def _instruments(
     return contributions(kt, gains | magnet_uncertainties(rows.captures))[0]
 
 
-def _plots(rows: ShaftRows, found: LinearFit) -> tuple[Evidence, ...]:
+def _plots(rows: ShaftRows, solution: LinearFit) -> tuple[Evidence, ...]:
     titles = ["Torque by current and motion"] * len(rows.captures)
-    fitted = rows.load_nm - found.residuals
+    fitted = rows.load_nm - solution.residuals
     columns = rows.capture, rows.time_s, rows.load_nm, fitted
     return tuple(METHOD.traces(rows.captures, titles, "torque_shaft_nm", columns, "window means"))
 

@@ -97,20 +97,20 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     magnet, magnet_parts = magnet_coefficient(known)
     chosen = _chosen(rows, magnet, options["level"])
     design = q_voltage(rows, magnet, chosen, {})
-    found = linear_fit(design, rows.voltage_v)
-    if not found.full_rank:
+    solution = linear_fit(design, rows.voltage_v)
+    if not solution.full_rank:
         return METHOD.nothing(GIVES, f"speed and current of the log go together; {EXPERIMENT}")
     ones = np.ones(rows.voltage_v.size)
-    covariance, dof = cluster_covariance(design, found.residuals, ones, rows.cluster)
+    covariance, dof = cluster_covariance(design, solution.residuals, ones, rows.cluster)
     regression = Regression(design, rows.voltage_v, ones, rows.cluster)
     split = partial(_partitions, rows)
     doubts = [disagreement(regression, k, split, options["level"]) for k in range(len(GIVES))]
-    moved = _moved(rows, found.coefficients, magnet, chosen, pole_pairs or 1)
+    moved = _moved(rows, solution.coefficients, magnet, chosen, pole_pairs or 1)
     scatter = np.sqrt(np.diag(covariance)[: len(GIVES)])
     estimates = _estimates(
-        rows, found, (scatter, dof), (magnet, magnet_parts), chosen, (moved, doubts)
+        rows, solution, (scatter, dof), (magnet, magnet_parts), chosen, (moved, doubts)
     )
-    return Fit(estimates, _evidence(rows, found))
+    return Fit(estimates, _evidence(rows, solution))
 
 
 def _partitions(rows: VoltageRows, information: Array) -> list[Partition]:
@@ -174,7 +174,7 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
     except ValueError:
         return None
     v_d, v_q = _instant(capture, data, speed, pole_pairs, period)
-    found = {
+    columns = {
         "capture": np.full(weak.count, float(index)),
         "cluster": np.floor((weak.centres_s - weak.centres_s[0]) / policy().evidence.cluster_s)
         + 1e6 * index,
@@ -186,8 +186,8 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
         "hold": np.full(weak.count, _hold_doubt(capture, speed, pole_pairs, period)),
     }
     if v_d is not None:
-        found["turned"] = weak.integral(speed * v_d)
-    return found
+        columns["turned"] = weak.integral(speed * v_d)
+    return columns
 
 
 def _finite(capture: Capture, angle: str) -> dict[str, Array]:
@@ -209,7 +209,7 @@ def _integrals(
     rotor = data.get("temp_magnet_degc", np.full(t.size, 25.0)) - 25.0
     modulus = np.hypot(i_d, i_q)
     noise = 0.02 * float(np.max(modulus)) if modulus.size else 0.0
-    found = {
+    integrals = {
         "current_a": weak.integral(i_q),
         "speed_rad_s": weak.integral(theta, 1),
         "warm_current_k_a": weak.integral(i_q * winding),
@@ -220,8 +220,8 @@ def _integrals(
         LATE: weak.integral(theta, 2),
     }
     if "id_a" in data:
-        found[D_FLUX] = weak.integral(speed * i_d)
-    return found
+        integrals[D_FLUX] = weak.integral(speed * i_d)
+    return integrals
 
 
 def _instant(

@@ -187,10 +187,10 @@ def _about(parts: Sequence[Part], columns: Sequence[int], delay_s: float) -> Sol
     if rows.voltage_v.size < policy().evidence.rows:
         return f"{rows.voltage_v.size} windows at speed"
     sigma = _noise_v(rows)
-    found = linear_fit(rows.design, rows.voltage_v, sigma)
-    if not found.full_rank:
+    solution = linear_fit(rows.design, rows.voltage_v, sigma)
+    if not solution.full_rank:
         return "speed and voltage stay as they are"
-    return Solved(rows, found, sigma, delay_s)
+    return Solved(rows, solution, sigma, delay_s)
 
 
 def _part(capture: Capture) -> Part | None:
@@ -272,20 +272,20 @@ def _partitions(rows: Rows, paths: Sequence[str], weights: Array) -> list[Partit
 
 
 def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Estimate]:
-    rows, found = solved.rows, solved.fit
+    rows, solution = solved.rows, solved.fit
     used = [part.capture for part in parts]
     regression = Regression(rows.design, rows.voltage_v, solved.sigma, rows.cluster)
-    deviation, dof = scatter(regression, found, policy().shaft_rows.overlap)
-    values = [*(float(c) for c in found.coefficients[:3]), solved.delay_s]
+    deviation, dof = scatter(regression, solution, policy().shaft_rows.overlap)
+    values = [*(float(c) for c in solution.coefficients[:3]), solved.delay_s]
     split = partial(_partitions, rows, [c.path for c in used])
     gains = _gains(used)
     notes = [
-        f"{rows.voltage_v.size} windows, {np.std(found.residuals):.2g} V left; at the temperatures "
-        "and the load of the log",
+        f"{rows.voltage_v.size} windows, {np.std(solution.residuals):.2g} V left; "
+        "at the temperatures and the load of the log",
         unstated_note(used, ("voltage",)),
     ]
     at = {"omega_mech_rad_s": float(np.max(np.abs(rows.design[:, 1])))}
-    seen = found.coefficients[:3] > policy().evidence.sigmas * deviation[:3]
+    seen = solution.coefficients[:3] > policy().evidence.sigmas * deviation[:3]
     if not seen[1]:
         why = f"voltage and speed do not go together; {EXPERIMENT}"
         return [METHOD.missing(name, why) for name in GIVES]

@@ -69,9 +69,9 @@ def fit_hand_turn(campaign: Campaign, known: Constants, options: Mapping[str, fl
         except KeyError:
             notes.append(f"{capture.path}: no terminal voltage")
             continue
-        found = turns_of(spin)
-        turns += [(capture, turn) for turn in found]
-        if not found:
+        hand_turns = turns_of(spin)
+        turns += [(capture, turn) for turn in hand_turns]
+        if not hand_turns:
             notes.append(
                 f"{capture.path}: the voltage does not stand out of the noise, or not for a cycle"
             )

@@ -114,34 +114,34 @@ class _Look:
 
 
 def _estimate(
-    name: str, find: _Find, found: Result | None, other: Result | None, look: _Look, words: str
+    name: str, find: _Find, result: Result | None, other: Result | None, look: _Look, words: str
 ) -> Estimate:
     """The inductance of one axis, less what the `other` leaves on it in a turned frame."""
-    if found is None:
+    if result is None:
         why = "no settled pair of plus and minus q current at the currents needed"
         return METHOD.missing(name, f"{why}; {EXPERIMENT}")
 
     def value(shift: Mapping[str, float]) -> Array:
         moved = flux_pairs([p.shifted(shift) for p in look.points], look.pole_pairs)
-        return np.array([(find(moved, look.magnet_1_k) or found).value_h])
+        return np.array([(find(moved, look.magnet_1_k) or result).value_h])
 
     parts = contributions(value, instrument_uncertainties(look.captures, ("voltage", "current")))[0]
     hold = _hold_doubt(look.points, look.pole_pairs)
-    across = found.value_h if other is None else other.value_h
+    across = result.value_h if other is None else other.value_h
     angle, behind = look.angle_rad, look.behind_rad
     doubt = 2.0 * abs(angle * behind) + behind**2 + (other is None) * angle**2
     parts += [
-        Contribution(HOLD, found.value_h * hold, "B"),
+        Contribution(HOLD, result.value_h * hold, "B"),
         Contribution(FRAME, across * doubt, "B"),
-        METHOD.scatter(name, found.u_h),
+        METHOD.scatter(name, result.u_h),
     ]
-    inductance = found.value_h - across * float(np.tan(angle)) ** 2
+    inductance = result.value_h - across * float(np.tan(angle)) ** 2
     used = {p.capture.path for p in look.points}
     notes = [words, unstated_note(look.captures, ("voltage", "current"))]
     if name == "ld_rated_h":
         fluxes = flux_pairs(look.points, look.pole_pairs)
-        notes.append(_other_side(fluxes, look.magnet_1_k, found))
-    at = {"id_a": found.id_a, "iq_a": found.iq_a}
+        notes.append(_other_side(fluxes, look.magnet_1_k, result))
+    at = {"id_a": result.id_a, "iq_a": result.iq_a}
     return METHOD.measured(name, inductance, parts, sorted(used), at, notes)
 
 
@@ -236,9 +236,9 @@ def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     return Result(float(weights @ values), u, used[0][0].id_a, smallest)
 
 
-def _other_side(fluxes: Sequence[Flux], magnet: float, found: Result) -> str:
+def _other_side(fluxes: Sequence[Flux], magnet: float, result: Result) -> str:
     """L_d at the largest d current of the other sign in words, empty where there is none."""
-    across = [f for f in fluxes if f.id_a * found.id_a <= 0.0]
+    across = [f for f in fluxes if f.id_a * result.id_a <= 0.0]
     same = policy().flux_pairs.same_current
     reach = max((max(abs(f.id_a), f.iq_a) for f in fluxes), default=0.0)
     near = [f for f in fluxes if abs(f.id_a) < same * reach and f not in across]
@@ -278,7 +278,7 @@ def _evidence(
     same = policy().flux_pairs.same_current
     reach = max(max(abs(f.id_a), f.iq_a) for f in fluxes)
     plots = []
-    for axis, current, flux, found in (
+    for axis, current, flux, result in (
         ("q", "iq_a", "psi_q_wb", quadrature),
         ("d", "id_a", "psi_d_wb", direct),
     ):
@@ -293,12 +293,12 @@ def _evidence(
             amps = float(np.mean([getattr(f, other) for f in mine])) if level else 0.0
             label = f"{other} {amps:.3g} A"
             line = np.array([])
-            if found is not None:
+            if result is not None:
                 still = x[np.abs(x) < same * reach], y[np.abs(x) < same * reach]
                 start = (
-                    float(np.mean(still[1] - found.value_h * still[0])) if still[0].size else 0.0
+                    float(np.mean(still[1] - result.value_h * still[0])) if still[0].size else 0.0
                 )
-                line = start + found.value_h * x if axis == "q" or still[0].size else line
+                line = start + result.value_h * x if axis == "q" or still[0].size else line
             series.append(Series(label, x, y, line))
         title = f"Flux linkage of the {axis} axis at constant speed"
         caption = "line: the published apparent inductance"

@@ -107,9 +107,9 @@ class Doubts:
             half = 0.5 * self.share * value / self.middle(logged)
             parts = [Contribution("assumed:free_shaft", half, "B")]
         for k in {0, index}:
-            found = self.regimes[k]
-            if found is not None:
-                parts.append(found.part(f"{METHOD.name}:{GIVES[k]}", value))
+            regime = self.regimes[k]
+            if regime is not None:
+                parts.append(regime.part(f"{METHOD.name}:{GIVES[k]}", value))
         return parts
 
     def middle(self, logged: bool) -> float:
@@ -204,14 +204,14 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     drag curve left free, T = J (a_driven - a_coasting) at each speed. Coasts whose drag is not that
     of drives with a transducer turn something else as well, and are left out.
     """
-    found = _fit(campaign, known, options)
+    estimates = _fit(campaign, known, options)
     drives = replace(campaign, captures=campaign.of("drive"))
     if not campaign.of("spin_down") or not any(c.has("torque_shaft_nm") for c in drives.captures):
-        return found
+        return estimates
     alone = _fit(drives, known, options)
-    words = another_setup(found.estimates, alone.estimates)
+    words = another_setup(estimates.estimates, alone.estimates)
     if not words:
-        return found
+        return estimates
     noted = tuple(replace(e, note=f"{words}; {e.note}") for e in alone.estimates)
     return replace(alone, estimates=noted)
 
@@ -235,23 +235,23 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
         return METHOD.nothing(GIVES, f"the drive log holds no torque; {EXPERIMENT}")
     if short := too_short(rows):
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
-    found = drag_of(rows, acceleration(rows, driving), nuisances, options["level"])
-    if not torque_is_separable(found.design, found.sigma):
+    drag = drag_of(rows, acceleration(rows, driving), nuisances, options["level"])
+    if not torque_is_separable(drag.design, drag.sigma):
         note = f"the drive's torque cannot be separated from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
-    strange = _share_of_no_torque(rows, found)
+    strange = _share_of_no_torque(rows, drag)
     if strange > policy().drag.loaded_share and not _load_logged(rows):
         return METHOD.nothing(GIVES, f"{_of_no_torque(strange)}; {LOAD}")
-    doubts = Doubts(strange, drag_disagreements(rows, found, options["level"]))
+    doubts = Doubts(strange, drag_disagreements(rows, drag, options["level"]))
     sampled = () if coasts_decide(rows) else sampling_drag(rows.captures, torque.kt_nm_a, known)
-    estimates = _estimates(rows, torque, found, doubts, _left_out(rows, campaign), sampled)
+    estimates = _estimates(rows, torque, drag, doubts, _left_out(rows, campaign), sampled)
     if strange > policy().drag.unexplained_share and not _load_logged(rows):
         drags = METHOD.nothing(GIVES[1:], f"{_of_no_torque(strange)}; {LOAD}").estimates
         estimates = (estimates[0], *drags)
     if len(setups) > 1:
         words = _setups_reason(setups)
         estimates = tuple(replace(e, note=f"{words}; {e.note}") for e in estimates)
-    return Fit(_of_a_known_sign(estimates), _evidence(rows, y, found))
+    return Fit(_of_a_known_sign(estimates), _evidence(rows, y, drag))
 
 
 def _of_a_known_sign(estimates: tuple[Estimate, ...]) -> tuple[Estimate, ...]:
@@ -291,7 +291,7 @@ def _load_logged(rows: ShaftRows) -> bool:
     return not any(_loadless(capture) for capture in rows.captures)
 
 
-def _share_of_no_torque(rows: ShaftRows, found: DragFit) -> float:
+def _share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
     """Share of the drives' acceleration, squared, that follows the torque in no way.
 
     A torque that is not logged is an error of the driving torque, and where a speed loop fights it
@@ -300,8 +300,8 @@ def _share_of_no_torque(rows: ShaftRows, found: DragFit) -> float:
     Reference: Fuller, Measurement Error Models, 1987, 1.1 (attenuation).
     """
     drives = rows.kind == DRIVE
-    without = linear_fit(np.delete(found.design[drives], 0, axis=1), found.target[drives])
-    costs = [float(np.sum(r**2)) for r in (found.residuals[drives], without.residuals)]
+    without = linear_fit(np.delete(drag.design[drives], 0, axis=1), drag.target[drives])
+    costs = [float(np.sum(r**2)) for r in (drag.residuals[drives], without.residuals)]
     return min(costs[0] / costs[1], 1.0) if costs[1] > 0.0 else 1.0
 
 
@@ -351,7 +351,7 @@ def _orders(known: Constants, campaign: Campaign) -> tuple[tuple[int, ...], tupl
 def _estimates(
     rows: ShaftRows,
     torque: Torque,
-    found: DragFit,
+    drag: DragFit,
     doubts: Doubts,
     left_out: Sequence[str],
     sampled: Budget,
@@ -359,26 +359,26 @@ def _estimates(
     """J, T_c and B with their budgets; that of B with what a `sampled` current makes."""
 
     def values(shift: Mapping[str, float]) -> Array:
-        return found.constants(found.refit(driving_torque(rows, torque, shift)))
+        return drag.constants(drag.refit(driving_torque(rows, torque, shift)))
 
     gains = instrument_uncertainties(rows.captures, ("current", "torque"))
     gains |= magnet_uncertainties(c for c in rows.captures if c.meta.test == "drive")
     type_b = contributions(values, gains)
     per_kt, per_rel, per_alpha = _slopes(values, torque)
     logged = _load_logged(rows)
-    constants = doubts.middle(logged) * found.constants(found.coefficients)
-    scatter = found.scatter()
+    constants = doubts.middle(logged) * drag.constants(drag.coefficients)
+    scatter = drag.scatter()
     paths = sorted(c.path for c in rows.captures)
-    words = (*_words(rows, torque, found), *_load_words(rows, doubts.share, left_out))
+    words = (*_words(rows, torque, drag), *_load_words(rows, doubts.share, left_out))
     note = "; ".join([*doubts.words(logged), *words])
     at = {"omega_mech_rad_s": rows.fastest_rad_s, "temp_magnet_degc": 25.0}
     estimates = []
     for i, name in enumerate(GIVES):
-        if found.reasons[i]:
-            estimates.append(METHOD.missing(name, found.reasons[i]))
+        if drag.reasons[i]:
+            estimates.append(METHOD.missing(name, drag.reasons[i]))
             continue
-        parts = [METHOD.scatter(f"{k}", float(u), found.dof) for k, u in enumerate(scatter[i])]
-        parts.append(Contribution("assumed:drag_form", float(found.u_form[i]), "B"))
+        parts = [METHOD.scatter(f"{k}", float(u), drag.dof) for k, u in enumerate(scatter[i])]
+        parts.append(Contribution("assumed:drag_form", float(drag.u_form[i]), "B"))
         parts += doubts.parts(i, float(constants[i]), logged)
         parts += sampled if name == "b_visc_nm_s_rad" else ()
         parts += _of_a_speed(rows, float(constants[i]))
@@ -423,8 +423,8 @@ def _slopes(
     )
 
 
-def _words(rows: ShaftRows, torque: Torque, found: DragFit) -> list[str]:
-    words = [torque.words, drag_words(found)]
+def _words(rows: ShaftRows, torque: Torque, drag: DragFit) -> list[str]:
+    words = [torque.words, drag_words(drag)]
     words.append("what iron loss there is under the magnet's flux counts as drag")
     words.append(f"{rows.count} windows, {rows.dropped} near standstill left out")
     if _of_a_speed(rows, 1.0):
@@ -450,15 +450,15 @@ def _load_words(rows: ShaftRows, strange: float, left_out: Sequence[str]) -> lis
     ]
 
 
-def _evidence(rows: ShaftRows, measured: Array, found: DragFit) -> tuple[Evidence, ...]:
+def _evidence(rows: ShaftRows, measured: Array, drag: DragFit) -> tuple[Evidence, ...]:
     words = ["coast" if c.meta.test == "spin_down" else "drive" for c in rows.captures]
     titles = [f"Acceleration in the {word}" for word in words]
-    columns = rows.capture, rows.time_s, measured, measured - found.residuals
+    columns = rows.capture, rows.time_s, measured, measured - drag.residuals
     caption = "window means, no derivative taken"
     plots = METHOD.traces(rows.captures, titles, "acceleration_rad_s2", columns, caption)
     curve = METHOD.plot(
         "Drag against speed", ("omega_mech_rad_s", "torque_coulomb_nm"), "scatter",
-        (Series("drag", *found.curve(rows)),),
+        (Series("drag", *drag.curve(rows)),),
         "driving torque less J times acceleration; line: Coulomb and viscous",
     )  # fmt: skip
     return (*plots, curve)

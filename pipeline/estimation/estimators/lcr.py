@@ -101,15 +101,14 @@ def fit_lcr(campaign: Campaign, known: Constants, options: Mapping[str, float]) 
     captures = campaign.of("lcr")
     table = _table(captures)
     if np.isfinite(table.theta_rad).sum() >= 6:
-        found = _over_angle(table, options)
+        axes = _over_angle(table, options)
     else:
-        found = _at_unknown_angle(table)
-    if found is None:
+        axes = _at_unknown_angle(table)
+    if axes is None:
         return METHOD.nothing(GIVES, EXPERIMENT)
     used = tuple(captures[k] for k in sorted({int(k) for k in table.capture}))
     estimates = {
-        name: _estimate(name, read, found.note, used, options)
-        for name, read in found.values.items()
+        name: _estimate(name, read, axes.note, used, options) for name, read in axes.values.items()
     }
     resistance = _resistance(used, options)
     if resistance is not None:
@@ -119,7 +118,7 @@ def fit_lcr(campaign: Campaign, known: Constants, options: Mapping[str, float]) 
         "lcr_angle_offset_deg": "needs the table over known rotor angles and a salient rotor",
     }
     results = tuple(estimates.get(n) or METHOD.missing(n, absent.get(n, EXPERIMENT)) for n in GIVES)
-    return Fit(results, _evidence(table, found))
+    return Fit(results, _evidence(table, axes))
 
 
 def _table(captures: Sequence[Capture]) -> Table:
@@ -219,13 +218,13 @@ def _at_unknown_angle(table: Table) -> Found | None:
     values = {}
     unparted = _swing_of_noise(np.array(second) - np.array(first)) and not any(has_angle)
     means = 0.5 * (np.array(first) + np.array(second))
-    for name, found in (("ld_h", first), ("lq_h", second)):
-        count = len(found)
-        scatter = float(np.std(found, ddof=1)) / math.sqrt(count) if count > 1 else 0.0
-        values[name] = (float(np.mean(found)), scatter, float(max(count - 1, 1)))
+    for name, reading in (("ld_h", first), ("lq_h", second)):
+        count = len(reading)
+        scatter = float(np.std(reading, ddof=1)) / math.sqrt(count) if count > 1 else 0.0
+        values[name] = (float(np.mean(reading)), scatter, float(max(count - 1, 1)))
         if unparted:
             spread = float(np.std(means, ddof=1)) / math.sqrt(count)
-            half = abs(float(np.mean(found) - np.mean(means)))
+            half = abs(float(np.mean(reading) - np.mean(means)))
             values[name] = (float(np.mean(means)), math.hypot(spread, half), float(count - 1))
     note = ""
     if unparted:
@@ -304,8 +303,8 @@ def _resistance(used: Sequence[Capture], options: Mapping[str, float]) -> Estima
     return _estimate("r_lcr_ohm", (mean, u, float(values.size - 1)), note, used, options)
 
 
-def _evidence(table: Table, found: Found) -> tuple[Evidence, ...]:
-    if found.model is None:
+def _evidence(table: Table, result: Found) -> tuple[Evidence, ...]:
+    if result.model is None:
         return ()
     series = []
     for pair in PAIRS:
@@ -313,7 +312,7 @@ def _evidence(table: Table, found: Found) -> tuple[Evidence, ...]:
         if not mine.any():
             continue
         theta = table.theta_rad[mine]
-        fitted = inductance(theta, table.axis_rad[mine]) @ found.model
+        fitted = inductance(theta, table.axis_rad[mine]) @ result.model
         series.append(over_x(pair, np.degrees(theta), table.l_h[mine], fitted))
     title = "Inductance between the terminals against rotor angle"
     axes, caption = ("theta_elec_deg", "inductance_ll_h"), "Mean is Ld + Lq, swing Ld - Lq."

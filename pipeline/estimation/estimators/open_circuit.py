@@ -109,14 +109,16 @@ def fit_open_circuit(campaign: Campaign, known: Constants, options: Mapping[str,
         return METHOD.nothing(GIVES, "; ".join([*notes, EXPERIMENT]))
     used = tuple(c for c in captures if any(g.capture is c for g in groups))
     notes.append(unstated_note(used, ("voltage", "temperature")))
-    found = _flux_estimates(_of_known_temperature(groups), notes, options)
+    estimates = _flux_estimates(_of_known_temperature(groups), notes, options)
     pairs, order = count_pole_pairs(METHOD, groups)
-    found["pole_pairs"] = pairs
-    found["phase_order"] = order
-    found |= _couplings(found["psi_pm_wb"], pairs)
-    found |= _harmonics(groups, used)
-    found["angle_offset_elec_rad"] = angle_offset(METHOD, groups, pairs, order)
-    return Fit(tuple(found[name] for name in GIVES), tuple(_evidence(groups, found["psi_pm_wb"])))
+    estimates["pole_pairs"] = pairs
+    estimates["phase_order"] = order
+    estimates |= _couplings(estimates["psi_pm_wb"], pairs)
+    estimates |= _harmonics(groups, used)
+    estimates["angle_offset_elec_rad"] = angle_offset(METHOD, groups, pairs, order)
+    return Fit(
+        tuple(estimates[name] for name in GIVES), tuple(_evidence(groups, estimates["psi_pm_wb"]))
+    )
 
 
 def _groups(
@@ -246,17 +248,17 @@ def _instrument_shares(
 
 
 def _couplings(psi: Estimate, pairs: Estimate) -> dict[str, Estimate]:
-    found: dict[str, Estimate] = {}
+    estimates: dict[str, Estimate] = {}
     for name in KE_NAMES:
         if not pairs.known:
-            found[name] = METHOD.missing(name, f"needs pole_pairs: {pairs.note}")
+            estimates[name] = METHOD.missing(name, f"needs pole_pairs: {pairs.note}")
             continue
         k = psi.number * pairs.number
         value = coupling_as(name, k)
         slope = COUPLINGS[name].power * value / psi.number
         parts = propagate([(slope, psi.budget)])
-        found[name] = METHOD.measured(name, value, parts, psi.captures, psi.at, psi.note)
-    return found
+        estimates[name] = METHOD.measured(name, value, parts, psi.captures, psi.at, psi.note)
+    return estimates
 
 
 def _harmonics(groups: Sequence[Group], used: Sequence[Capture]) -> dict[str, Estimate]:
@@ -264,13 +266,13 @@ def _harmonics(groups: Sequence[Group], used: Sequence[Capture]) -> dict[str, Es
 
     Speeds that differ by more than their noise widen it, and beyond chance it has their freedom.
     """
-    found = {}
+    estimates = {}
     for order in ORDERS:
         name = f"bemf_harmonic_{order}"
         own = [g for g in groups if order in g.flux.harmonics]
         if not own:
             note = f"repeat the open_circuit at a rate above {3 * order} samples a cycle"
-            found[name] = METHOD.missing(name, note)
+            estimates[name] = METHOD.missing(name, note)
             continue
         ratios = np.array([g.flux.harmonics[order] for g in own])
         weights = np.array([g.flux.u_harmonic**-2 for g in own])
@@ -281,10 +283,10 @@ def _harmonics(groups: Sequence[Group], used: Sequence[Capture]) -> dict[str, Es
         u = math.sqrt(max(1.0, excess) / float(weights.sum()))
         dof = float(free) if _beyond_chance(excess, free) else math.inf
         note = "" if abs(mean) > 3.0 * u else "within noise of zero"
-        found[name] = METHOD.measured(
+        estimates[name] = METHOD.measured(
             name, abs(mean), [METHOD.scatter(name, u, dof)], used, notes=note
         )
-    return found
+    return estimates
 
 
 def _evidence(groups: Sequence[Group], psi: Estimate) -> list[Evidence]:

@@ -297,17 +297,17 @@ def _allowances(
     `matrix` [names, columns] holds the published values' shares of the pairs. V0 is that of one
     inverter and one set of leads, so what it adds to the pairs adds up in what is made of them.
     """
-    found: dict[str, list[Contribution]] = {name: [] for name in names}
+    parts: dict[str, list[Contribution]] = {name: [] for name in names}
     if len(columns.pairs) < 3:
         r_scale = float(np.mean([abs(p.v_v / p.i_a) for p in points]))
         for name, share in (("r_phase_ohm", 0.5), ("r_ll_ohm", 1.0)):
             u = share * r_scale * options["u_rel_imbalance"]
-            found[name].append(Contribution("assumed:resistance_imbalance", u, "B"))
+            parts[name].append(Contribution("assumed:resistance_imbalance", u, "B"))
     drops = np.array([_unknown_drop_ohm(points, columns, pair, options) for pair in columns.pairs])
     for name, shares in zip(names, matrix[:, : drops.size], strict=True):
         if u := float(shares @ drops):
-            found[name].append(Contribution("assumed:voltage_offset_v", u, "B"))
-    return found
+            parts[name].append(Contribution("assumed:voltage_offset_v", u, "B"))
+    return parts
 
 
 def _unknown_drop_ohm(

@@ -169,11 +169,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     return _fit(captures, options)
 
 
-def _brief(found: Fit) -> str:
+def _brief(solution: Fit) -> str:
     """Both constants of one set-up, in words."""
-    if not all(e.known for e in found.estimates):
+    if not all(e.known for e in solution.estimates):
         return "nothing by itself"
-    words = (f"{e.name} {e.number:.5g} ± {e.u:.2g} {e.unit}" for e in found.estimates)
+    words = (f"{e.name} {e.number:.5g} ± {e.u:.2g} {e.unit}" for e in solution.estimates)
     return ", ".join(words)
 
 
@@ -186,21 +186,23 @@ def _fit(captures: Sequence[Capture], options: Mapping[str, float]) -> Fit:
         )
     fastest = max(c.speed_rad_s for c in coasts)
     motion = Motion((), (), fastest)
-    found = _solve(motion, coasts, None)
+    solution = _solve(motion, coasts, None)
     for _ in range(2):
-        free = found.residuals.size - found.parameters.size
-        if found.residuals @ found.residuals < policy().coast_down.explained ** 2 * free:
+        free = solution.residuals.size - solution.parameters.size
+        if solution.residuals @ solution.residuals < policy().coast_down.explained ** 2 * free:
             break
-        wider = _wider(motion, coasts, found, options["level"])
+        wider = _wider(motion, coasts, solution, options["level"])
         if wider == motion:
             break
-        found = _solve(wider, coasts, _transferred(motion, wider, found.parameters, len(coasts)))
+        solution = _solve(
+            wider, coasts, _transferred(motion, wider, solution.parameters, len(coasts))
+        )
         motion = wider
-    if not np.isfinite([found.u(0), found.u(1)]).all():
+    if not np.isfinite([solution.u(0), solution.u(1)]).all():
         return METHOD.nothing(
             GIVES, f"the coasts do not part dry from viscous friction; {EXPERIMENT}"
         )
-    return Fit(_estimates(motion, coasts, found), _evidence(motion, coasts, found))
+    return Fit(_estimates(motion, coasts, solution), _evidence(motion, coasts, solution))
 
 
 def _coasts(capture: Capture) -> list[Coast]:

@@ -165,8 +165,10 @@ def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | N
         double = _winding_fit(np.column_stack([*balanced[:, :2].T, across, outward]), winding)
         body = linear_fit(np.column_stack([ones, -across, -trapezoid(t, second - ambient)]), second)
         start, direct = _start(double, body)
-        if start is not None and (found := _two_nodes(record, losses_w, ambient, start, direct)):
-            return found
+        if start is not None and (
+            two_nodes := _two_nodes(record, losses_w, ambient, start, direct)
+        ):
+            return two_nodes
     noise = max(white_noise_sigma(winding), 1e-4 * float(np.ptp(winding)))
     if float(np.std(single.residuals)) > policy().heat_record.unexplained * noise:
         cold = abs(float(winding[0]) - ambient) < 3.0 * record.capture.meta.instrument_u(
@@ -407,7 +409,7 @@ def _estimates(
         "temp_high_degc": round(float(record.temp_winding_degc.max()), 2),
     }
     note = f"steady state by {balance.words}; the motor as mounted on this bench"
-    found = []
+    estimates = []
     signs = {GIVEN: 1.0, CAPACITY: -1.0}
     for name, value, row, offset in zip(
         GIVES, balance.values, balance.scatter, offsets, strict=False
@@ -416,10 +418,10 @@ def _estimates(
         parts += propagate([(signs.get(name, 0.0) * float(value), loss)])
         parts.append(Contribution(thermometer, float(offset), "B"))
         parts = [part for part in parts if part.u]
-        found.append(METHOD.measured(name, float(value), parts, (record.capture,), at, note))
-    if len(found) < len(GIVES):
-        found.append(METHOD.missing(BODY_TAU, f"one node explains the run; {EXPERIMENT}"))
-    return tuple(found)
+        estimates.append(METHOD.measured(name, float(value), parts, (record.capture,), at, note))
+    if len(estimates) < len(GIVES):
+        estimates.append(METHOD.missing(BODY_TAU, f"one node explains the run; {EXPERIMENT}"))
+    return tuple(estimates)
 
 
 def _by_offset(

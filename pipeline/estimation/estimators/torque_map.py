@@ -187,10 +187,14 @@ def _regress(points: Sequence[Point], alpha_1_k: float, chosen: Sequence[str]) -
     base, candidates = torque(points, alpha_1_k)
     design = np.column_stack([*base.values(), *(candidates[name] for name in chosen)])
     sigma = _sigma(points)
-    found = linear_fit(design, _column(points, "torque_nm"), sigma)
-    scale = max(found.chi2_dof, 0.0) if found.dof > 0 else np.inf
+    solution = linear_fit(design, _column(points, "torque_nm"), sigma)
+    scale = max(solution.chi2_dof, 0.0) if solution.dof > 0 else np.inf
     return Regression(
-        (*base, *chosen), found.coefficients, found.covariance * scale, found.residuals, found.dof
+        (*base, *chosen),
+        solution.coefficients,
+        solution.covariance * scale,
+        solution.residuals,
+        solution.dof,
     )
 
 
@@ -226,22 +230,22 @@ def _estimates(
         return METHOD.measured(name, value, [METHOD.scatter(name, u, dof), *parts], paths, at, note)
 
     u = np.sqrt(np.diag(model.covariance))
-    found = [estimate(GIVES[0], slope_k.kt_nm_a, slope_k.u_nm_a, slope_k.dof, type_b[0])]
+    estimates = [estimate(GIVES[0], slope_k.kt_nm_a, slope_k.u_nm_a, slope_k.dof, type_b[0])]
     if "id iq" in model.names:
         u_rel = float(u[model.index("id iq")])
-        found.append(estimate(GIVES[1], _reluctance(model), u_rel, model.dof, type_b[1]))
+        estimates.append(estimate(GIVES[1], _reluctance(model), u_rel, model.dof, type_b[1]))
     else:
         why = f"d current did not vary enough to show reluctance torque; {EXPERIMENT}"
-        found.append(METHOD.missing(GIVES[1], why))
+        estimates.append(METHOD.missing(GIVES[1], why))
     drag, covariance, dof, why = _drag(points, model)
     type_b[3] += sampling_drag(used, slope_k.kt_nm_a, known)
     if why:
-        return (*found, *(METHOD.missing(name, why) for name in DRAG))
+        return (*estimates, *(METHOD.missing(name, why) for name in DRAG))
     for index, name in enumerate(DRAG):
         u_drag = float(np.sqrt(covariance[index, index]))
         parts = [*type_b[2 + index], *_untested_form(points, model, index)]
-        found.append(estimate(name, float(drag[index]), u_drag, dof, parts))
-    return tuple(found)
+        estimates.append(estimate(name, float(drag[index]), u_drag, dof, parts))
+    return tuple(estimates)
 
 
 def _values(
@@ -355,10 +359,10 @@ def _slope(
     if not any(name in BENDING for name in chosen):
         return Slope(model.kt_nm_a, u, model.dof, 0.0)
     turned = any(name in chosen for name in ("id", "id sense", "iq^2 - id^2"))
-    found = slope_without_d(points, alpha, turned, "|iq| sense" in chosen)
-    if found is None:
+    without_d = slope_without_d(points, alpha, turned, "|iq| sense" in chosen)
+    if without_d is None:
         return Slope(model.kt_nm_a, u, model.dof, _form_doubt(points, alpha, chosen))
-    return found.times(model.kt_nm_a / model.of("iq"))
+    return without_d.times(model.kt_nm_a / model.of("iq"))
 
 
 def _note(

@@ -107,15 +107,15 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     chosen = needed_columns(
         base, candidates, rows.torque_nm, np.ones(rows.iq_a.size), options["level"]
     )
-    found = _solve(rows, alpha, chosen)
-    kt = float(found.coefficients[1])
-    if not found.full_rank or found.dof < 1 or kt == 0.0:
+    solution = _solve(rows, alpha, chosen)
+    kt = float(solution.coefficients[1])
+    if not solution.full_rank or solution.dof < 1 or kt == 0.0:
         return METHOD.nothing(GIVES, EXPERIMENT)
     warmer = _solve(rows, alpha + STEP_1_K, chosen).coefficients[1]
     parts = [
         *_instruments(rows, captures, alpha, chosen),
         *propagate([((float(warmer) - kt) / STEP_1_K, alpha_budget)]),
-        METHOD.scatter("kt", found.u(1), found.dof),
+        METHOD.scatter("kt", solution.u(1), solution.dof),
         Contribution(SOURCE, ripple_share(rows.theta_rad, pairs, known) * abs(kt), "B"),
     ]
     sags = "; sags with current" if {"iq^3", "iq^5"} & set(chosen) else ""
@@ -123,7 +123,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     notes.append(unlogged_note(captures))
     at = {"iq_a": float(np.max(np.abs(rows.iq_a)))}
     estimate = METHOD.measured(GIVES[0], kt, parts, captures, at, notes)
-    return Fit((estimate,), _evidence(captures, rows, rows.torque_nm - found.residuals))
+    return Fit((estimate,), _evidence(captures, rows, rows.torque_nm - solution.residuals))
 
 
 @dataclass(frozen=True, slots=True)

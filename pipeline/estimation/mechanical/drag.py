@@ -233,13 +233,13 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
     if free:
         design, names = curve, curve_names
         sigma = _balanced(rows, design, y)
-    found = linear_fit(design, y, sigma)
-    covariance, dof = _covariance(rows, design, found, sigma)
-    u_form, reasons = _form(found.coefficients, free, rows)
+    fit = linear_fit(design, y, sigma)
+    covariance, dof = _covariance(rows, design, fit, sigma)
+    u_form, reasons = _form(fit.coefficients, free, rows)
     if not free:
-        u_form = _shape_doubt(base, candidates, chosen, found.coefficients, y, sigma)
+        u_form = _shape_doubt(base, candidates, chosen, fit.coefficients, y, sigma)
     return DragFit(
-        names, found.coefficients, covariance, found.residuals, dof, free, u_form, reasons,
+        names, fit.coefficients, covariance, fit.residuals, dof, free, u_form, reasons,
         design, sigma, y, rows.fastest_rad_s,
     )  # fmt: skip
 
@@ -418,8 +418,8 @@ def _without_dip(
 ) -> list[str]:
     """The columns without Stribeck's where it came out below Coulomb friction: it is an excess."""
     design = np.column_stack([base, *(candidates[n] for n in chosen)])
-    found = linear_fit(design, y, sigma).coefficients[base.shape[1] :]
-    values = dict(zip(chosen, found, strict=True))
+    coefficients = linear_fit(design, y, sigma).coefficients[base.shape[1] :]
+    values = dict(zip(chosen, coefficients, strict=True))
     return [n for n in chosen if n not in STRIBECK or values[n] > 0.0]
 
 
@@ -451,10 +451,10 @@ def _implausible(
     rows: ShaftRows, design: Array, names: Sequence[str], y: Array, sigma: Array
 ) -> bool:
     """Whether the fitted drag is no friction: a negative Coulomb or viscous part."""
-    found = linear_fit(design, y, sigma)
-    u = np.sqrt(np.diag(_covariance(rows, design, found, sigma)[0]))
+    fit = linear_fit(design, y, sigma)
+    u = np.sqrt(np.diag(_covariance(rows, design, fit, sigma)[0]))
     parts = [names.index("coulomb"), names.index("viscous")]
-    return any(found.coefficients[k] < -policy().evidence.sigmas * u[k] for k in parts)
+    return any(fit.coefficients[k] < -policy().evidence.sigmas * u[k] for k in parts)
 
 
 def _drag_part(design: Array, fit: LinearFit, names: Sequence[str]) -> Array:
@@ -489,15 +489,15 @@ def _form(coefficients: Array, free: bool, rows: ShaftRows) -> tuple[Array, tupl
     return np.array([0.0, spread, 0.0]), ("", "", why)
 
 
-def drag_words(found: DragFit) -> str:
+def drag_words(fit: DragFit) -> str:
     """What the fit holds beside Coulomb and viscous drag, in words.
 
     Parameters
     ----------
-    found
+    fit
         The fit.
 
     """
-    added = [n for n in found.names if n not in ("torque", "coulomb", "viscous", *CURVE)]
-    words = "drag curve left free, its form is not Coulomb and viscous" if found.free else ""
+    added = [n for n in fit.names if n not in ("torque", "coulomb", "viscous", *CURVE)]
+    words = "drag curve left free, its form is not Coulomb and viscous" if fit.free else ""
     return "; ".join(w for w in (words, allowed_for(added)) if w) or "Coulomb and viscous drag hold"

@@ -82,21 +82,21 @@ def ripple_share(angles_rad: Array, pole_pairs: int | None, known: Constants) ->
     alone = pole_pairs is None or not np.all(np.isfinite(angles_rad))
     parts, usual = [], {6: policy().ripple.usual_6, 12: policy().ripple.usual_12}
     for order, names in RIPPLES.items():
-        found = [known.best(name) for name in names]
-        ripple = sum(usual[order] if one is None else one.number for one in found)
+        inductances = [known.best(name) for name in names]
+        ripple = sum(usual[order] if one is None else one.number for one in inductances)
         share = 1.0 if alone else abs(np.mean(np.exp(1j * order * (pole_pairs or 1) * angles_rad)))
         parts.append(float(ripple * share) / np.sqrt(2.0))
     return float(np.hypot(*parts))
 
 
-def standstill_words(points: Sequence[Point], found: Sequence[Point]) -> str:
+def standstill_words(points: Sequence[Point], used: Sequence[Point]) -> str:
     """What becomes of operating points at standstill, in words.
 
     Parameters
     ----------
     points
         The points that a fit uses.
-    found
+    used
         All points that there are.
 
     Returns
@@ -105,7 +105,7 @@ def standstill_words(points: Sequence[Point], found: Sequence[Point]) -> str:
         Empty where no point stands still.
 
     """
-    count = sum(p.standing for p in found)
+    count = sum(p.standing for p in used)
     if not count:
         return ""
     if not any(p.standing for p in points):

@@ -61,7 +61,7 @@ def shaft_partitions(rows: ShaftRows, information: Array) -> list[Partition]:
 
 
 def drag_disagreements(
-    rows: ShaftRows, found: DragFit, level: float
+    rows: ShaftRows, fit: DragFit, level: float
 ) -> tuple[Disagreement | None, Disagreement | None, Disagreement | None]:
     """What regimes scatter in the inertia, and in Coulomb and viscous drag over it, each or None.
 
@@ -71,17 +71,17 @@ def drag_disagreements(
     ----------
     rows
         Windows of drives and coast-downs.
-    found
+    fit
         Their fit.
     level
         Chance of any partition to be named where the law is whole [1].
 
     """
-    regression = Regression(found.design, found.target, found.sigma, rows.cluster)
-    names = ("torque",) if found.free else ("torque", "coulomb", "viscous")
+    regression = Regression(fit.design, fit.target, fit.sigma, rows.cluster)
+    names = ("torque",) if fit.free else ("torque", "coulomb", "viscous")
     split = partial(shaft_partitions, rows)
     disagreements = [
-        disagreement(regression, found.names.index(name), split, level) for name in names
+        disagreement(regression, fit.names.index(name), split, level) for name in names
     ]
     inertia, coulomb, viscous, *_ = (*disagreements, None, None)
     return inertia, coulomb, viscous

@@ -263,7 +263,7 @@ def _rows(
     """Columns of one capture's windows, and how many of these were dropped."""
     weak = part.weak
     clock = np.floor((weak.centres_s - weak.centres_s[0]) / policy().evidence.cluster_s)
-    found = {
+    columns = {
         "capture": np.full(weak.count, float(index)),
         "kind": np.full(weak.count, float(part.kind)),
         "cluster": clock + 1e6 * index,
@@ -280,9 +280,9 @@ def _rows(
         **_ripples(part, cogging_orders, ripple_orders),
     }
     for name, function in speed_functions.items():
-        found[name] = weak.integral(function(part.speed / fastest))
+        columns[name] = weak.integral(function(part.speed / fastest))
     slow = _undetermined(part, fastest)
-    return {name: column[~slow] for name, column in found.items()}, int(slow.sum())
+    return {name: column[~slow] for name, column in columns.items()}, int(slow.sum())
 
 
 def _nuisances(part: _Part) -> dict[str, Array]:
@@ -326,13 +326,13 @@ def _ripples(
     part: _Part, cogging_orders: Sequence[int], ripple_orders: Sequence[int]
 ) -> dict[str, Array]:
     """Torque against angle of these orders a turn, the latter in proportion to q current."""
-    found = {}
+    ripples = {}
     for order in cogging_orders:
         ripple = np.exp(1j * order * part.theta)
-        found[f"order {order} cos"] = part.weak.integral(ripple.real)
-        found[f"order {order} sin"] = part.weak.integral(ripple.imag)
+        ripples[f"order {order} cos"] = part.weak.integral(ripple.real)
+        ripples[f"order {order} sin"] = part.weak.integral(ripple.imag)
     for order in ripple_orders:
         ripple = part.current * np.exp(1j * order * part.theta)
-        found[f"order {order} q current cos"] = part.weak.integral(ripple.real)
-        found[f"order {order} q current sin"] = part.weak.integral(ripple.imag)
-    return found
+        ripples[f"order {order} q current cos"] = part.weak.integral(ripple.real)
+        ripples[f"order {order} q current sin"] = part.weak.integral(ripple.imag)
+    return ripples

@@ -25,9 +25,9 @@ def torque_constant(known: Constants) -> Estimate | None:
         [N·m/A].
 
     """
-    found = known.best("kt_peak_nm_a") or known.best("kt_from_ke_nm_a")
-    if found is not None:
-        return found
+    kt = known.best("kt_peak_nm_a") or known.best("kt_from_ke_nm_a")
+    if kt is not None:
+        return kt
     ke = known.best("ke_phase_peak_v_s_rad")
     if ke is None:
         return None

@@ -113,17 +113,17 @@ def _ladder(
     best: Slope | None = None
     for power in range(1, highest + 1, 2):
         wider = columns + [share**k for k in range(3, power + 1, 2)]
-        found = linear_fit(np.column_stack(wider), torque, np.sqrt(counts.mean() / counts))
-        if found.dof < 3:
+        fit = linear_fit(np.column_stack(wider), torque, np.sqrt(counts.mean() / counts))
+        if fit.dof < 3:
             break
-        covariance = found.covariance * found.chi2_dof
-        value, u = float(found.coefficients[at]), float(np.sqrt(covariance[at, at]))
+        covariance = fit.covariance * fit.chi2_dof
+        value, u = float(fit.coefficients[at]), float(np.sqrt(covariance[at, at]))
         if best is None:
-            best = Slope(value, u, found.dof, 0.0)
+            best = Slope(value, u, fit.dof, 0.0)
             continue
         step = abs(value - best.kt_nm_a)
-        added = float(found.coefficients[-1]) ** 2 / max(float(covariance[-1, -1]), 1e-300)
-        if fdtrc(1.0, found.dof, added) > policy().torque_slope.level:
+        added = float(fit.coefficients[-1]) ** 2 / max(float(covariance[-1, -1]), 1e-300)
+        if fdtrc(1.0, fit.dof, added) > policy().torque_slope.level:
             return replace(best, form_nm_a=step)
-        best = Slope(value, u, found.dof, step / 2.0)
+        best = Slope(value, u, fit.dof, step / 2.0)
     return best

@@ -183,8 +183,10 @@ def _rotor_frame(
 def _motional(capture: Capture, data: dict[str, Array], known: Constants) -> tuple[Array, bool]:
     """omega_e (psi_d i_q - psi_q i_d) [n], and whether it is large enough to matter."""
     omega = np.nan_to_num(data["omega_mech_rad_s"])
-    found = {name: known.best(name) for name in TURNING}
-    numbers = {name: estimate.number for name, estimate in found.items() if estimate is not None}
+    constants = {name: known.best(name) for name in TURNING}
+    numbers = {
+        name: estimate.number for name, estimate in constants.items() if estimate is not None
+    }
     if len(numbers) < len(TURNING):
         if abs(float(np.mean(omega))) < 0.02:
             return np.zeros(omega.size), False

@@ -27,8 +27,8 @@ def magnet_coefficient(known: Constants) -> tuple[float, Budget]:
         [1/K].
 
     """
-    found = known.best("temp_coeff_magnet_1_k")
-    if found is None:
+    alpha = known.best("temp_coeff_magnet_1_k")
+    if alpha is None:
         usual = policy().magnet
         return usual.coefficient_1_k, type_b(SOURCE, usual.u_coefficient_1_k)
-    return found.number, found.budget
+    return alpha.number, alpha.budget

@@ -95,11 +95,11 @@ def _widened(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
     methods = [estimate, *others]
     if estimate.u == 0.0 or not others:
         return estimate
-    found = _between(methods)
-    if found.p_value >= policy().agreement.level or found.sd == 0.0:
+    spread = _between(methods)
+    if spread.p_value >= policy().agreement.level or spread.sd == 0.0:
         return estimate
     each = ", ".join(f"{e.method} {e.number:.5g} ± {e.u:.2g}" for e in methods)
     words = f"methods disagree beyond chance ({each} {estimate.unit})"
-    part = Contribution(f"{METHODS}{estimate.name}", found.sd, "A", found.dof)
+    part = Contribution(f"{METHODS}{estimate.name}", spread.sd, "A", spread.dof)
     note = "; ".join(w for w in (words, estimate.note) if w)
     return replace(estimate, budget=(*estimate.budget, part), note=note)

@@ -265,14 +265,14 @@ def _of_partition(
     return Disagreement(shown, values, between(values, own, dof))
 
 
-def scatter(regression: Regression, found: LinearFit, overlap: float) -> tuple[Array, Array]:
+def scatter(regression: Regression, fit: LinearFit, overlap: float) -> tuple[Array, Array]:
     """Standard deviations of the coefficients, and their degrees of freedom.
 
     Parameters
     ----------
     regression
         Rows with their noise and clusters.
-    found
+    fit
         Their fit [k coefficients].
     overlap
         Share that neighbouring windows have in common [1].
@@ -293,14 +293,14 @@ def scatter(regression: Regression, found: LinearFit, overlap: float) -> tuple[A
     clusters).
 
     """
-    tau = autocorrelation_time(found.residuals / regression.sigma, policy().evidence.memory_rows)
+    tau = autocorrelation_time(fit.residuals / regression.sigma, policy().evidence.memory_rows)
     tau = max(tau, 1.0 / (1.0 - overlap))
-    plain = np.sqrt(np.diag(found.covariance) * found.chi2_dof * tau)
+    plain = np.sqrt(np.diag(fit.covariance) * fit.chi2_dof * tau)
     _, cluster = np.unique(regression.cluster, return_inverse=True)
     shares = [np.bincount(cluster, information(regression, k)) for k in range(plain.size)]
     groups = np.maximum([1.0 / float(share @ share) for share in shares], 2.0)
     covariance, _ = cluster_covariance(
-        regression.design, found.residuals, regression.sigma, regression.cluster
+        regression.design, fit.residuals, regression.sigma, regression.cluster
     )
     robust = np.sqrt(np.diag(covariance) * groups / (groups - 1.0))
-    return np.maximum(plain, robust), np.minimum(max(found.dof / tau, 1.0), groups - 1.0)
+    return np.maximum(plain, robust), np.minimum(max(fit.dof / tau, 1.0), groups - 1.0)

@@ -105,11 +105,11 @@ def _load(path: Path) -> dict[str, tuple[str, bytes, bytes]]:
     if hashlib.sha256(body).hexdigest().encode() != digest:
         return {}
     head, _, rest = body.partition(b"\n")
-    found, at = {}, 0
+    fits, at = {}, 0
     for name, key, text, data in json.loads(head):
-        found[name] = (key, rest[at : at + text], rest[at + text : at + text + data])
+        fits[name] = (key, rest[at : at + text], rest[at + text : at + text + data])
         at += text + data
-    return found
+    return fits
 
 
 def _encoded(fit: Fit) -> tuple[bytes, bytes]:

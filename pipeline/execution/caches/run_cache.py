@@ -271,17 +271,17 @@ class RunCache:
 
 
 def _answer_note(key: str, answer: Answer) -> dict[str, Any]:
-    found = answer.entry
+    entry = answer.entry
     return {
         "key": key,
         "findings": [finding.document() for finding in answer.findings],
         "entry": None
-        if found is None
+        if entry is None
         else {
-            "form": found.form,
-            "source": None if found.source is None else found.source.name,
-            "metadata": [list(pair) for pair in found.metadata],
-            "recovered": found.recovered,
+            "form": entry.form,
+            "source": None if entry.source is None else entry.source.name,
+            "metadata": [list(pair) for pair in entry.metadata],
+            "recovered": entry.recovered,
         },
     }
 
@@ -290,10 +290,10 @@ def _answer(
     path: str, sha256: str, note: Mapping[str, Any], sources: Mapping[str, SourceMap]
 ) -> Answer:
     findings = tuple(record_of(Finding, document) for document in note["findings"])
-    found = note["entry"]
-    if found is None:
+    stated = note["entry"]
+    if stated is None:
         return Answer(path, sha256, None, findings)
-    source = None if found["source"] is None else sources[found["source"]]
-    metadata = tuple((key, value) for key, value in found["metadata"])
-    entry = Entry(path, sha256, found["form"], source, metadata, found["recovered"])
+    source = None if stated["source"] is None else sources[stated["source"]]
+    metadata = tuple((key, value) for key, value in stated["metadata"])
+    entry = Entry(path, sha256, stated["form"], source, metadata, stated["recovered"])
     return Answer(path, sha256, entry, findings)

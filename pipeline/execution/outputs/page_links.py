@@ -74,12 +74,12 @@ def links_of(
 
     """
     stem = file_stem(motor_id) if motor_id else ""
-    found = []
+    links = []
     for text, target in _OF_PAGE[page]:
         name = target.format(stem)
         if name in coming or (output / name).is_file():
-            found.append(Link(text, f"../{quote(name, safe='/~')}"))
-    return tuple(found)
+            links.append(Link(text, f"../{quote(name, safe='/~')}"))
+    return tuple(links)
 
 
 def relink(output: Path, motor_id: str, but: Collection[str] = ()) -> dict[str, str]:

@@ -240,10 +240,10 @@ def _inside(output: Path, name: str) -> Path:
 def _manifest(output: Path) -> dict[str, Any]:
     """The list of an earlier run; empty where there is none that can be read."""
     try:
-        found = json.loads((output / MANIFEST).read_bytes())
+        manifest = json.loads((output / MANIFEST).read_bytes())
     except (OSError, ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return manifest if isinstance(manifest, dict) else {}
 
 
 def _listed(output: Path) -> set[str]:

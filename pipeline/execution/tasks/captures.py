@@ -62,11 +62,11 @@ def usable_captures(task: ReadTask, watch: Stopwatch | None = None) -> Usable:
             with watch.stage("read"), reading(entry.path, size, task.limits):
                 capture = read_capture(folder, entry)
             with watch.stage("validate"), refusing("its validation"):
-                capture, found = validate(capture, task.gates)
+                capture, doubts = validate(capture, task.gates)
         except CaptureError as error:
             findings.append(Finding.refusal(entry.path, error))
         else:
             captures.append(capture)
-            findings.extend(found)
+            findings.extend(doubts)
     single, doubles = once(sorted(captures, key=lambda capture: capture.path))
     return single, (*findings, *doubles)

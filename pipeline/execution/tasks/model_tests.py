@@ -107,14 +107,14 @@ def judged_model(
     try:
         start = start_constants(campaign, constants)
         if memory is None:
-            found, document = model_verdict(campaign, model, start, search=diagnose != "false")
-            return Tested(found, (), document if diagnose == "true" else None)
+            verdict, document = model_verdict(campaign, model, start, search=diagnose != "false")
+            return Tested(verdict, (), document if diagnose == "true" else None)
         key = memory.key(model, start)
         with memory.one_at_a_time():
             if diagnose != "true" and (known := memory.recall(key)) is not None:
                 return Tested(known)
-            found, document = model_verdict(campaign, model, start, search=diagnose != "false")
-            memory.keep(key, found)
+            verdict, document = model_verdict(campaign, model, start, search=diagnose != "false")
+            memory.keep(key, verdict)
     except (*BROKEN, MemoryError) as error:
         message = f"the residual test broke on these captures: {type(error).__name__}: {error}"
         remedy = "the constants stand; report the captures with this line"
@@ -122,4 +122,4 @@ def judged_model(
         return Tested(
             ModelVerdict("not_tested", model.name, model.effects, note=message), (broken,)
         )
-    return Tested(found, (), document if diagnose == "true" else None)
+    return Tested(verdict, (), document if diagnose == "true" else None)

@@ -97,8 +97,8 @@ def survey_with(
         for at in range(0, len(questions), size)
     ]
     answers: list[Answer] = []
-    for found in workers.map_tasks(survey_files, tasks):
-        if isinstance(found, MachineError):
-            raise found
-        answers += found
+    for surveyed in workers.map_tasks(survey_files, tasks):
+        if isinstance(surveyed, MachineError):
+            raise surveyed
+        answers += surveyed
     return answers

@@ -98,10 +98,10 @@ def judge(job: MotorJob, campaign: Campaign, recall: Recall | None, watch: Stopw
     """
     with watch.stage("fit"):
         constants, evidence, failures = fit_all(campaign, job.fit, recall)
-    found = check(job, campaign, constants, watch)
+    checks = check(job, campaign, constants, watch)
     broken = (Finding(job.motor_id, "warning", *failure) for failure in failures)
-    findings = (*agree(campaign), *broken, *found.findings)
-    return replace(found, evidence=evidence, findings=findings)
+    findings = (*agree(campaign), *broken, *checks.findings)
+    return replace(checks, evidence=evidence, findings=findings)
 
 
 def check(job: MotorJob, campaign: Campaign, constants: Constants, watch: Stopwatch) -> Judged:

@@ -141,7 +141,7 @@ def _bristles(shaft: _Shaft) -> bool:
 def _motor(source: Source, shaft: _Shaft, options: Options) -> dict[str, str]:
     """Attributes of the actuator."""
     constant = source.value("pole_pairs") * source.value("psi_pm_wb")
-    found = {
+    entries = {
         "name": "motor",
         "joint": "shaft",
         "resistance": _resistance(source),
@@ -153,16 +153,16 @@ def _motor(source: Source, shaft: _Shaft, options: Options) -> dict[str, str]:
     if all(one is not None for one in heat):
         rth, cth, alpha = (one.number for one in heat if one is not None)
         ambient = number_option(options, "ambient_degc") or REFERENCE_DEGC
-        found["thermal"] = f"{rth!r} {cth!r} 0 {alpha!r} {REFERENCE_DEGC!r} {ambient!r}"
+        entries["thermal"] = f"{rth!r} {cth!r} 0 {alpha!r} {REFERENCE_DEGC!r} {ambient!r}"
     if shaft.waves:
-        found["cogging"] = _cogging(shaft.waves[0])
+        entries["cogging"] = _cogging(shaft.waves[0])
     dry = source.optional("torque_coulomb_nm")
     if dry is not None and _bristles(shaft):
         bump = shaft.bump or Bump(0.0, 1.0, 0.0)
         stiff = dry.number / (shaft.travel_rad or RIGID_RAD)
         most = dry.number + bump.excess_nm
-        found["lugre"] = f"{stiff!r} 0 {dry.number!r} {most!r} {bump.speed_rad_s!r}"
-    return found
+        entries["lugre"] = f"{stiff!r} 0 {dry.number!r} {most!r} {bump.speed_rad_s!r}"
+    return entries
 
 
 def _further(wave: Wave, source: Source) -> dict[str, str]:

@@ -35,10 +35,10 @@ def render(source: Source, options: Options) -> str:
 
 def read(text: str) -> Values:
     """The constants of such a call; raises ValueError where there is none."""
-    found = CALL.search(text)
-    if found is None:
+    call = CALL.search(text)
+    if call is None:
         raise ValueError("no BLDCMotor(...) in the text")
-    pairs, r, kv, lq, ld = (float(word) for word in found.groups())
+    pairs, r, kv, lq, ld = (float(word) for word in call.groups())
     return {
         "pole_pairs": pairs,
         "r_phase_ohm": phase_from_line(r),

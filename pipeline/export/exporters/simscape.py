@@ -112,10 +112,10 @@ def _summed(tables: Sequence[EffectTable], variable: str, grid: np.ndarray) -> l
 
 def _delay(source: Source) -> list[str]:
     """Lateness of the voltage, for a transport delay between controller and inverter."""
-    found = source.sizes().get("sample_delay", {}).get("delay_s")
-    if found is None or found[0] is None:
+    delay_s = source.sizes().get("sample_delay", {}).get("delay_s")
+    if delay_s is None or delay_s[0] is None:
         return []
-    return [f"motor.voltage_delay_s = {found[0]!r}; % Transport Delay: Time delay"]
+    return [f"motor.voltage_delay_s = {delay_s[0]!r}; % Transport Delay: Time delay"]
 
 
 def read(text: str) -> Values:

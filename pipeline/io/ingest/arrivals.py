@@ -38,7 +38,7 @@ def snapshot(folder: Path) -> Snapshot:
     """
     if not folder.is_dir():
         raise MachineError(f"the watched folder {folder} is gone", "bring it back; start again")
-    found: set[tuple[str, int, int, int]] = set()
+    files: set[tuple[str, int, int, int]] = set()
     for where, folders, names in os.walk(folder):
         folders[:] = [name for name in folders if not name.startswith(".")]
         for name in names:
@@ -49,8 +49,8 @@ def snapshot(folder: Path) -> Snapshot:
                 at = os.lstat(path)
             except FileNotFoundError:
                 continue
-            found.add((path, at.st_size, at.st_mtime_ns, at.st_ino))
-    return frozenset(found)
+            files.add((path, at.st_size, at.st_mtime_ns, at.st_ino))
+    return frozenset(files)
 
 
 @dataclass(slots=True)

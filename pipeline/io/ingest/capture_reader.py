@@ -174,10 +174,10 @@ def _read_foreign(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap 
 def _read_csv(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | None, bool]:
     source = entry.source
     dialect = CONTRACT_DIALECT if source is None else source.layout
-    found = read_csv(data, dialect, lambda name: wanted(source, name), entry.path)
+    table = read_csv(data, dialect, lambda name: wanted(source, name), entry.path)
     if source is not None:
         time = source.time
-        start = time.start_s if found.time_start is None else found.time_start
-        step = time.increment_s if found.time_increment is None else found.time_increment
+        start = time.start_s if table.time_start is None else table.time_start
+        step = time.increment_s if table.time_increment is None else table.time_increment
         source = replace(source, time=replace(time, start_s=start, increment_s=step))
-    return [found.table], source, found.verified
+    return [table.table], source, table.verified

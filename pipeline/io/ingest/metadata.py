@@ -99,15 +99,15 @@ def sidecar(data: bytes) -> dict[str, str]:
         It is no plain YAML (`bad_yaml`), or no mapping of single values (`bad_metadata`).
 
     """
-    found = load_plain(data, "the sidecar")
-    if not isinstance(found, dict):
+    stated = load_plain(data, "the sidecar")
+    if not isinstance(stated, dict):
         raise CaptureError("bad_metadata", "the sidecar is no list of keys", "write `key: value`")
-    nested = [key for key, value in found.items() if not isinstance(value, str)]
+    nested = [key for key, value in stated.items() if not isinstance(value, str)]
     if nested:
         raise CaptureError(
             "bad_metadata", f"the sidecar's {nested[0]!r} is no single value", "write `key: value`"
         )
-    return found
+    return stated
 
 
 def manifest(data: bytes, folder: str) -> dict[str, dict[str, str]]:
@@ -145,16 +145,16 @@ def manifest(data: bytes, folder: str) -> dict[str, dict[str, str]]:
     keys = [key.strip() for key in rows[0]]
     if len(set(keys)) != len(keys):
         raise _bad_manifest("has a column twice")
-    found: dict[str, dict[str, str]] = {}
+    by_file: dict[str, dict[str, str]] = {}
     for number, row in enumerate(rows[1:]):
         if len(row) != len(keys):
             raise _bad_manifest(f"has {len(row)} fields in row {number}", (number, number))
         path = (PurePosixPath(folder) / row[0].strip()).as_posix()
-        if path in found:
+        if path in by_file:
             raise _bad_manifest(f"names {row[0]!r} twice", (number, number))
         cells = zip(keys[1:], row[1:], strict=True)
-        found[path] = {key: cell.strip() for key, cell in cells if cell.strip()}
-    return found
+        by_file[path] = {key: cell.strip() for key, cell in cells if cell.strip()}
+    return by_file
 
 
 def _bad_manifest(what: str, rows: tuple[int, int] | None = None) -> CaptureError:
@@ -276,13 +276,13 @@ def _typed(key: str, value: str) -> str | int | float:
     low, high = term.low, term.high
     kind = "a whole number" if term.integer else "a number"
     remedy = f"write {kind} from {low:g} to {high:g} [{term.unit}]"
-    found = parse.number(value)
-    if found is None:
+    number = parse.number(value)
+    if number is None:
         raise _bad_value(key, value, remedy)
-    inside = (low is None or found >= low) and (high is None or found <= high)
-    if not inside or (term.integer and found != int(found)):
+    inside = (low is None or number >= low) and (high is None or number <= high)
+    if not inside or (term.integer and number != int(number)):
         raise _bad_value(key, value, remedy)
-    return int(found) if term.integer else found
+    return int(number) if term.integer else number
 
 
 def _bad_value(key: str, value: str, remedy: str) -> CaptureError:

@@ -362,11 +362,11 @@ def _manifests(
                 home = PurePosixPath(path).parent.as_posix()
                 data = read_whole(folder / path, MAX_MANIFEST_BYTES + 1)
                 with refusing():
-                    found = manifest(data, "" if home == "." else home)
+                    rows = manifest(data, "" if home == "." else home)
             except CaptureError as fault:
                 findings.append(Finding.refusal(path, fault))
                 continue
-            for file, values in found.items():
+            for file, values in rows.items():
                 stated[file] = values | stated.get(file, {})
     return stated
 

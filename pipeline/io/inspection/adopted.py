@@ -45,7 +45,7 @@ def _shapes(data: bytes, answered: Mapping[str, str]) -> list[dict[str, Any]]:
     """The variants of a map, or the map alone, each whole and with the answers in it."""
     plain = load_plain(data, "the source map")
     variants = plain.pop("variants", [{}])
-    found = []
+    shapes = []
     for variant in variants:
         shape = laid_over(plain, variant)
         metadata = dict(answered)
@@ -53,5 +53,5 @@ def _shapes(data: bytes, answered: Mapping[str, str]) -> list[dict[str, Any]]:
             shape["time"] = {**(shape.get("time") or {}), "increment_s": increment}
         if metadata:
             shape["metadata"] = {**(shape.get("metadata") or {}), **metadata}
-        found.append(shape)
-    return found
+        shapes.append(shape)
+    return shapes

@@ -60,8 +60,8 @@ class InspectReport:
     @property
     def columns(self) -> frozenset[str]:
         """Columns that the file holds under their own name, or probably."""
-        found = (seen.column for stream in self.streams for seen in stream.fields)
-        return frozenset(one for one in found if one is not None)
+        names = (seen.column for stream in self.streams for seen in stream.fields)
+        return frozenset(one for one in names if one is not None)
 
 
 @dataclass(slots=True)
@@ -164,9 +164,9 @@ def _reader_of(path: Path, data: bytes, sources: Mapping[str, SourceMap]) -> Rea
     A form without a suffix of its own, a table in JSON, is known by its map alone.
     """
     suffix = PurePosixPath(path.name).suffix.lower()
-    found = next((one for one in readers().values() if suffix in one.suffixes), None)
-    if found is not None or data.startswith(MAGIC):
-        return found
+    reader = next((one for one in readers().values() if suffix in one.suffixes), None)
+    if reader is not None or data.startswith(MAGIC):
+        return reader
     head = _head(data)
     named = (one.reader for one in sources.values() if one.recognises(path.name, head, ()))
     return next((readers()[name] for name in named if name in readers()), None)
@@ -237,11 +237,11 @@ def _text(look_at: _Look) -> InspectReport:
         head = _head(data)
         start = data[begin : begin + MAX_HEAD_BYTES]
         encoding = encoding_of(start)
-        found = sniff(start.decode(encoding, "replace"))
-        if found is None:
+        form = sniff(start.decode(encoding, "replace"))
+        if form is None:
             faults.append("no table of numbers is found in it")
         else:
-            dialect, header = replace(found[0], encoding=encoding), found[1]
+            dialect, header = replace(form[0], encoding=encoding), form[1]
             parsed = read_csv(data, dialect, numeric_columns(data[begin:], dialect))
             stated = "sha256_rows covers the rows, and holds"
             look_at.checksums = stated if parsed.verified else "none"
@@ -312,8 +312,8 @@ def _metadata_faults(metadata: Mapping[str, str]) -> list[str]:
 def _matched(
     name: str, head: str | None, topics: list[str], sources: Mapping[str, SourceMap]
 ) -> str | None:
-    found = [source.name for source in sources.values() if source.recognises(name, head, topics)]
-    return ", ".join(found) or None
+    names = [source.name for source in sources.values() if source.recognises(name, head, topics)]
+    return ", ".join(names) or None
 
 
 def _stream(table: RawTable, encoding: str, answers: Mapping[str, str]) -> StreamSeen:

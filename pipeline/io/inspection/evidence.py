@@ -156,7 +156,7 @@ def _integrals(numbers: Mapping[str, Array], clock: str) -> tuple[Relation, ...]
     """Which field is the integral of which; a straight line is no evidence."""
     time = numbers[clock]
     halves = np.diff(time) / 2.0
-    found = []
+    pairs = []
     flat = {n: _without_line(v, time) for n, v in numbers.items() if n != clock and np.ptp(v)}
     sums = {
         name: np.concatenate([[0.0], np.cumsum(halves * (values[1:] + values[:-1]))])
@@ -168,22 +168,22 @@ def _integrals(numbers: Mapping[str, Array], clock: str) -> tuple[Relation, ...]
         for name, values in flat.items():
             if name != other and _correlation(values, one) > _ALIKE:
                 factor = float(values @ one / (one @ one))
-                found.append(Relation(name, other, factor, integral=True))
-    return tuple(found)
+                pairs.append(Relation(name, other, factor, integral=True))
+    return tuple(pairs)
 
 
 def _multiples(numbers: Mapping[str, Array]) -> tuple[Relation, ...]:
     """Which field is a multiple of which, through zero."""
     names = [name for name, values in numbers.items() if np.ptp(values)]
-    found = []
+    pairs = []
     for place, name in enumerate(names):
         for other in names[:place]:
             one, two = numbers[name], numbers[other]
             factor = float(one @ two / (two @ two))
             left = one - factor * two
             if np.ptp(one) and float(left @ left) < (1.0 - _SAME) * float(np.var(one)) * one.size:
-                found.append(Relation(name, other, factor, integral=False))
-    return tuple(found)
+                pairs.append(Relation(name, other, factor, integral=False))
+    return tuple(pairs)
 
 
 def _correlation(one: Array, two: Array) -> float:

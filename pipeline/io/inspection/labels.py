@@ -64,24 +64,24 @@ def read_label(name: str, unit_row: str | None = None) -> Label:
     stem, text = _without_unit(_CHANNEL.sub("", name.strip()), unit_row)
     stem = last_part(stem.rstrip("."))
     dimensions = {unit for unit in FOREIGN_UNITS if text and known_unit(unit, text) is not None}
-    found = tuple(c for c in _columns(stem) if not dimensions or COLUMNS[c].unit in dimensions)
+    columns = tuple(c for c in _columns(stem) if not dimensions or COLUMNS[c].unit in dimensions)
     if not text:
         head, _, tail = stem.replace(" ", "_").rpartition("_")
         if head and normal_unit(tail) == COUNTS:
             return Label(_columns(head), None, tail)
         ended = tuple(c for c in _columns(head) if known_unit(COLUMNS[c].unit, tail) is not None)
         if ended and tail not in _LETTERS:
-            found, text = ended, tail
-        elif not found and tail not in _LETTERS:
-            found, text = _by_its_end(head, tail)
-    if not found and dimensions:
-        found = _of_dimension(stem, dimensions)
-    unit = known_unit(COLUMNS[found[0]].unit, text) if found and text else None
+            columns, text = ended, tail
+        elif not columns and tail not in _LETTERS:
+            columns, text = _by_its_end(head, tail)
+    if not columns and dimensions:
+        columns = _of_dimension(stem, dimensions)
+    unit = known_unit(COLUMNS[columns[0]].unit, text) if columns and text else None
     implied = None
-    if found and not text:
+    if columns and not text:
         names = _key(stem), *words_of(stem)[-1:]
         implied = next((_IMPLIED[name] for name in names if name in _IMPLIED), None)
-    return Label(found, unit or implied, text)
+    return Label(columns, unit or implied, text)
 
 
 def _by_its_end(head: str, tail: str) -> tuple[tuple[str, ...], str | None]:
@@ -90,10 +90,10 @@ def _by_its_end(head: str, tail: str) -> tuple[tuple[str, ...], str | None]:
     A single letter is a unit only where the rest says of what.
     """
     dimensions = {unit for unit in FOREIGN_UNITS if known_unit(unit, tail) is not None}
-    found = _of_dimension(head, dimensions) if dimensions else ()
+    columns = _of_dimension(head, dimensions) if dimensions else ()
     if len(tail) == 1 and not _marks(words_of(head)):
         return (), None
-    return found, tail if found else None
+    return columns, tail if columns else None
 
 
 def known_unit(target: str, text: str) -> str | None:
@@ -194,8 +194,8 @@ def _by_words(stem: str) -> tuple[str, ...]:
     quantities = [name for name, stems in _quantities().items() if matches(words, stems)]
     if not quantities and words:
         quantities = list(_of_symbol(words[0]))
-    found = [column for name in quantities for column in _of(name, marks)]
-    return tuple(dict.fromkeys(found))
+    columns = [column for name in quantities for column in _of(name, marks)]
+    return tuple(dict.fromkeys(columns))
 
 
 def _of_symbol(word: str) -> tuple[str, ...]:

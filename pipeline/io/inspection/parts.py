@@ -74,14 +74,14 @@ def parts_of(file: str, columns: Mapping[str, Array]) -> tuple[PartSeen, ...]:
     if not np.isin(kind, ("coast", "hold")).any():
         return ()
     ends = np.flatnonzero(kind[1:] != kind[:-1])
-    found = []
+    parts = []
     for first, last in zip([0, *(ends + 1)], [*ends, kind.size - 1], strict=True):
         a, b, one = int(first), int(last), str(kind[first])
         test, why = _TESTS[one], _why(one, time[a : b + 1], speed[a : b + 1], none)
         if test is not None and b - a < LEAST_ROWS:
             test, why = None, "too short for a test"
-        found.append(PartSeen(file, a, b, test, why))
-    return tuple(found) if 1 < len(found) <= MOST_PARTS else ()
+        parts.append(PartSeen(file, a, b, test, why))
+    return tuple(parts) if 1 < len(parts) <= MOST_PARTS else ()
 
 
 def _speed_of(columns: Mapping[str, Array]) -> Array | None:
@@ -138,8 +138,8 @@ def _zero_of(current: Array) -> float:
 def _smoothed(values: Array) -> Array:
     """Means over five rows, which single readings of a coarse speed need."""
     padded = np.pad(values, 2, mode="edge")
-    found: Array = np.convolve(padded, np.full(5, 0.2), mode="valid")
-    return found
+    smooth: Array = np.convolve(padded, np.full(5, 0.2), mode="valid")
+    return smooth
 
 
 def _drift(speed: Array) -> Array:
@@ -147,8 +147,8 @@ def _drift(speed: Array) -> Array:
     width = LEAST_ROWS
     padded = np.pad(speed, (width // 2, width - width // 2 - 1), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, width)
-    found: Array = windows.max(axis=1) - windows.min(axis=1)
-    return found
+    ranges: Array = windows.max(axis=1) - windows.min(axis=1)
+    return ranges
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -102,10 +102,12 @@ def propose(table: RawTable, answers: Mapping[str, str]) -> tuple[FieldSeen, ...
     numeric = {name: values for name, values in rows.items() if values.dtype.kind in "fiub"}
     labels = {name: _label(table, name) for name in numeric}
     times = [name for name, label in labels.items() if label.columns[:1] == ("t_s",)]
-    found = gather(numeric, times[0] if times else None)
-    columns = _columns(labels, found, answers, logged=table.log_ns is not None and not table.blocks)
-    seen = [_seen(name, numeric, labels, columns, found, answers) for name in numeric]
-    return tuple(_with_units(seen, labels, found, answers))
+    evidence = gather(numeric, times[0] if times else None)
+    columns = _columns(
+        labels, evidence, answers, logged=table.log_ns is not None and not table.blocks
+    )
+    seen = [_seen(name, numeric, labels, columns, evidence, answers) for name in numeric]
+    return tuple(_with_units(seen, labels, evidence, answers))
 
 
 def _label(table: RawTable, name: str) -> Label:

@@ -97,8 +97,8 @@ def _separated(lines: list[str]) -> tuple[int, int, int, int] | None:
             # a line of a preamble is a name and a number, where rows begin with a number
             usual = 2 * sum(led[n] for n in rows) > len(rows)
             first = next(n for n in rows if led[n] or not usual)
-            found = (worth, -place, first, width)
-            best = max(best, found) if best else found
+            separated = (worth, -place, first, width)
+            best = max(best, separated) if best else separated
     return best
 
 
@@ -191,9 +191,9 @@ def _instant_of(lines: Sequence[str], dialect: CsvDialect) -> str | None:
         cells = [row[place] for row in rows if len(row) > place and row[place]]
         if cells and all(map(_INSTANT.search, cells)):
             fitting = (form for form in _INSTANTS if _are_instants(cells, form, dialect))
-            found = next(fitting, None)
-            if found is not None:
-                return found
+            instant = next(fitting, None)
+            if instant is not None:
+                return instant
     return None
 
 

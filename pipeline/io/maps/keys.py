@@ -276,10 +276,10 @@ def _leaf(key: Key) -> dict[str, Any]:
 
 def metadata_properties() -> dict[str, Any]:
     """Keys of metadata that the contract knows, with their words, for completion."""
-    found: dict[str, Any] = {
+    properties: dict[str, Any] = {
         name: {**_SCALAR, "description": term.words}
         for name, term in METADATA.items()
         if name != "contract"
     }
-    found["test"] = {"enum": list(TESTS), "description": METADATA["test"].words}
-    return found
+    properties["test"] = {"enum": list(TESTS), "description": METADATA["test"].words}
+    return properties

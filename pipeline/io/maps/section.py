@@ -187,10 +187,10 @@ class Section:
         value = self.text(key)
         if value is None:
             return default
-        found = parse.number(value)
-        if found is None:
+        parsed = parse.number(value)
+        if parsed is None:
             raise self.fault(key, f"{value[:60]!r} is no number", "write a number")
-        return found
+        return parsed
 
     def flag(self, key: str, default: bool) -> bool:
         """The word true or false.

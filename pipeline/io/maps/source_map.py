@@ -233,23 +233,23 @@ class SourceMap:
             Path of the file; what is stated for its name takes precedence.
 
         """
-        found = dict(self.metadata) | self._from_name(path)
+        metadata = dict(self.metadata) | self._from_name(path)
         name = PurePosixPath(path).name
         for pattern, values in reversed(self.per_file):
             if fnmatchcase(name, pattern):
-                found |= dict(values)
-        return {"contract": "1"} | found
+                metadata |= dict(values)
+        return {"contract": "1"} | metadata
 
     def _from_name(self, path: str) -> dict[str, str]:
         """What the patterns of `file_names` find in a path, the first that finds a key winning."""
-        found: dict[str, str] = {}
+        metadata: dict[str, str] = {}
         values = {key: dict(words) for key, words in self.values}
         for pattern in self.file_names:
             match = re.search(pattern, path)
             for key, word in (match.groupdict() if match else {}).items():
                 if word and column_of(key) is None:
-                    found.setdefault(key, values.get(key, {}).get(word, word))
-        return found
+                    metadata.setdefault(key, values.get(key, {}).get(word, word))
+        return metadata
 
     def columns_from_name(self, path: str) -> dict[str, float]:
         """Columns that are one number in the whole file, which its name states.
@@ -266,7 +266,7 @@ class SourceMap:
             `omega_mech_rad_s__rpm` around the figures.
 
         """
-        found: dict[str, float] = {}
+        columns: dict[str, float] = {}
         for pattern in self.file_names:
             match = re.search(pattern, path)
             for key, word in (match.groupdict() if match else {}).items():
@@ -274,8 +274,8 @@ class SourceMap:
                 if meant is not None and value is not None:
                     column, unit, sign = meant
                     scale = scale_to(unit, COLUMNS[column].unit)
-                    found.setdefault(column, sign * value * scale.factor + scale.shift)
-        return found
+                    columns.setdefault(column, sign * value * scale.factor + scale.shift)
+        return columns
 
 
 def column_of(group: str) -> tuple[str, str, float] | None:
@@ -386,13 +386,13 @@ def parse_source_file(data: bytes, name: str) -> dict[str, SourceMap]:
         return {name: _parsed(plain, name)}
     if not isinstance(variants, list) or not variants:
         raise UsageError(f"source map {name}: variants: is no list", "write `- recognise: ...`")
-    found = {}
+    maps = {}
     for place, variant in enumerate(variants, 1):
         label = f"{name}/{place}"
         if not isinstance(variant, dict):
             raise UsageError(f"source map {label}: is no map of keys", "write `key: value` lines")
-        found[label] = _parsed(laid_over(plain, variant), label)
-    return found
+        maps[label] = _parsed(laid_over(plain, variant), label)
+    return maps
 
 
 def laid_over(base: Mapping[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
@@ -438,7 +438,7 @@ def _plain(data: bytes, name: str) -> Any:
 def _parsed(plain: Any, name: str) -> SourceMap:
     top = Section(name, "", plain)
     recognise = top.section("recognise")
-    found = SourceMap(
+    source = SourceMap(
         name,
         files=recognise.texts("files"),
         header=recognise.pattern("header"),
@@ -458,7 +458,7 @@ def _parsed(plain: Any, name: str) -> SourceMap:
     top.text("about")
     recognise.close()
     top.close()
-    return found
+    return source
 
 
 def _layout(section: Section) -> CsvDialect:
@@ -538,14 +538,14 @@ def _fields(section: Section) -> tuple[FieldMap, ...]:
 
 
 def _time(section: Section) -> TimeMap:
-    found = TimeMap(
+    time = TimeMap(
         section.choice("from", get_args(TimeFrom), "field"),
         _positive(section, "wraps_at"),
         section.number("start_s", 0.0) or 0.0,
         _positive(section, "increment_s"),
     )
     section.close()
-    return found
+    return time
 
 
 def _positive(section: Section, key: str) -> float | None:
@@ -608,8 +608,8 @@ def find_maps(maps: Mapping[str, SourceMap], name: str) -> dict[str, SourceMap]:
         There is none; the message names those that there are.
 
     """
-    found = {key: one for key, one in maps.items() if key == name or key.startswith(f"{name}/")}
-    if not found:
+    chosen = {key: one for key, one in maps.items() if key == name or key.startswith(f"{name}/")}
+    if not chosen:
         known = dict.fromkeys(key.partition("/")[0] for key in maps)
         raise UsageError(f"there is no source map {name!r}", f"use one of {', '.join(known)}")
-    return found
+    return chosen

@@ -245,11 +245,11 @@ def scale_to(unit: str, target: str) -> Scale:
     if normal_unit(unit) == COUNTS:
         return Scale(1.0)
     known = FOREIGN_UNITS.get(target, {target: Scale(1.0)})
-    found = known.get(normal_unit(unit))
-    if found is None:
+    scale = known.get(normal_unit(unit))
+    if scale is None:
         raise CaptureError(
             "unknown_unit",
             f"the unit {unit!r} is not one this pipeline converts to {target}",
             f"use one of: {', '.join(sorted(known))}",
         )
-    return found
+    return scale

@@ -145,10 +145,10 @@ class _Pass:
 
     def collected(self) -> dict[str, Leaf]:
         """The leaves, pieces of arrays put in message order."""
-        found = dict(self.whole)
+        leaves = dict(self.whole)
         for name, pieces in self.arrays.items():
             if not pieces:
-                found[name] = Leaf(np.empty(0), np.zeros(self.origin.size, np.int64))
+                leaves[name] = Leaf(np.empty(0), np.zeros(self.origin.size, np.int64))
                 continue
             owner = np.concatenate([piece[0] for piece in pieces])
             values = np.concatenate([piece[1] for piece in pieces])
@@ -156,8 +156,8 @@ class _Pass:
                 order = np.argsort(owner, kind="stable")
                 owner, values = owner[order], values[order]
             counts = np.bincount(owner, minlength=self.origin.size).astype(np.int64)
-            found[name] = Leaf(values, counts, values.ndim == 2)
-        return found
+            leaves[name] = Leaf(values, counts, values.ndim == 2)
+        return leaves
 
     def field(self, part: Field, prefix: str, rows: Integers | None) -> None:
         """Take one field of the messages `rows` (None: all) and move their positions past it."""

@@ -78,12 +78,12 @@ class Definitions:
             The channel or its schema is not defined.
 
         """
-        found = self.channels.get(number)
-        if found is None:
+        channel = self.channels.get(number)
+        if channel is None:
             raise corrupt(f"messages of channel {number}, which is nowhere defined")
-        if found.schema_id and found.schema_id not in self.schemas:
-            raise corrupt(f"the channel {found.topic!r} names a schema that is not there")
-        return found
+        if channel.schema_id and channel.schema_id not in self.schemas:
+            raise corrupt(f"the channel {channel.topic!r} names a schema that is not there")
+        return channel
 
 
 @dataclass
@@ -113,7 +113,7 @@ class Layout:
     @property
     def messages_seen(self) -> int:
         """Messages the scan knows of so far, packed ones by their index."""
-        indexed = sum(index.count for found in self.message_indexes.values() for index in found)
+        indexed = sum(index.count for indexes in self.message_indexes.values() for index in indexes)
         return indexed + int(self.loose_start.size)
 
     def metadata_named(self, name: str) -> dict[str, str]:

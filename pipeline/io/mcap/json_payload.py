@@ -76,12 +76,12 @@ class JsonDecoder:
 
 def _object(payload: bytes, row: int) -> dict[str, Any]:
     try:
-        found = json_value(payload, unique_keys=True)
+        value = json_value(payload, unique_keys=True)
     except ParseError as fault:
         raise _bad(str(fault), row) from None
-    if not isinstance(found, dict):
+    if not isinstance(value, dict):
         raise _bad("is no object", row)
-    return found
+    return value
 
 
 def _all_at_once(
@@ -105,8 +105,8 @@ def _all_at_once(
         return None
     if table.height != len(payloads):
         return None
-    found, nulls = _leaves(table, wanted)
-    return found if nulls == joined.count(b"null") else None
+    leaves, nulls = _leaves(table, wanted)
+    return leaves if nulls == joined.count(b"null") else None
 
 
 def _quotes(value: Any) -> int | None:
@@ -156,11 +156,11 @@ def _leaves(table: Any, wanted: Wanted) -> tuple[dict[str, Leaf], int]:
             counts = lengths[:, 0].astype(np.int64)
             flat = table.select(pl.all().explode(empty_as_null=False, keep_nulls=False))
             columns = [series for series in flat.get_columns() if wanted(series.name)]
-            found = {series.name: Leaf(series.to_numpy(), counts) for series in columns}
-            return found, sum(series.null_count() for series in flat.get_columns())
-    found = {}
+            leaves = {series.name: Leaf(series.to_numpy(), counts) for series in columns}
+            return leaves, sum(series.null_count() for series in flat.get_columns())
+    leaves = {}
     columns = table.get_columns()
-    return found, sum(_collect(series, series.name, wanted, found) for series in columns)
+    return leaves, sum(_collect(series, series.name, wanted, leaves) for series in columns)
 
 
 def _collect(series: Any, name: str, wanted: Wanted, leaves: dict[str, Leaf]) -> int:

@@ -70,8 +70,8 @@ class ProtobufDecoder:
             By dotted name; omitted zeros are 0, absent optional fields NaN.
 
         """
-        if batch.stride and (found := self._evenly(batch, wanted)) is not None:
-            return found
+        if batch.stride and (leaves := self._evenly(batch, wanted)) is not None:
+            return leaves
         pass_ = _Pass(batch.buffer, wanted)
         owner = np.arange(batch.start.size, dtype=np.int64)
         pass_.message(self.plan, "", batch.start, batch.start + batch.length, owner, owner.size)

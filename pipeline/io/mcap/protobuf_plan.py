@@ -61,13 +61,13 @@ class Message:
             Before each name.
 
         """
-        found: list[str] = []
+        paths: list[str] = []
         for part in self.fields.values():
             if isinstance(part, Message):
-                found += part.names(f"{prefix}{part.name}.")
+                paths += part.names(f"{prefix}{part.name}.")
             else:
-                found.append(prefix + part.name)
-        return found
+                paths.append(prefix + part.name)
+        return paths
 
 
 def plan_of(schema: Schema) -> Message:
@@ -132,8 +132,10 @@ class _Planner:
         self.types = types
         self.count = 0
 
-    def message(self, name: str, repeated: bool, found: tuple[Any, Any], depth: int) -> Message:
-        descriptor, file = found
+    def message(
+        self, name: str, repeated: bool, field_lists: tuple[Any, Any], depth: int
+    ) -> Message:
+        descriptor, file = field_lists
         fields: dict[int, Scalar | Message] = {}
         if depth <= MAX_DEPTH:
             for part in descriptor.field:
@@ -150,12 +152,12 @@ class _Planner:
             raise _bad(self.schema, "has a name that is not UTF-8")
         repeated = part.label == _REPEATED
         if part.type == _MESSAGE_TYPE:
-            found = self.types.get(part.type_name)
-            if found is None:
+            declared = self.types.get(part.type_name)
+            if declared is None:
                 raise _bad(self.schema, f"uses {part.type_name!r} without defining it")
-            if _recursive(part.type_name, found[0], self.types):
+            if _recursive(part.type_name, declared[0], self.types):
                 return None
-            return self.message(part.name, repeated, found, depth + 1)
+            return self.message(part.name, repeated, declared, depth + 1)
         if part.type not in _SCALARS:
             return None
         wire, dtype = _SCALARS[part.type]

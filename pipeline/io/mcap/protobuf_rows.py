@@ -114,7 +114,7 @@ def shaped_rows(
         messages [n] have another shape.
 
     """
-    found: dict[int, list[tuple[Integers, Integers]]] = {}
+    by_shape: dict[int, list[tuple[Integers, Integers]]] = {}
     left = np.ones(start.size, bool)
     shapes = 0
     sizes, counts = np.unique(length, return_counts=True)
@@ -132,10 +132,10 @@ def shaped_rows(
                 same &= raw[begin + offset] == byte
             rows = members[same]
             for number, offset in shape.values:
-                found.setdefault(number, []).append((rows, start[rows] + offset))
+                by_shape.setdefault(number, []).append((rows, start[rows] + offset))
             left[rows] = False
             members = members[~same]
-    return found, left
+    return by_shape, left
 
 
 def even_shape(batch: Batch, plan: Message) -> Shape | None:

@@ -140,12 +140,12 @@ def schema(fields: Fields) -> Schema:
         The id is 0, or the schema is too large.
 
     """
-    found = Schema(fields.u16(), fields.text(), fields.text(), fields.blob())
-    if found.id == 0:
+    schema_read = Schema(fields.u16(), fields.text(), fields.text(), fields.blob())
+    if schema_read.id == 0:
         raise corrupt("a schema has the id 0")
-    if len(found.data) > MAX_SCHEMA_BYTES:
-        raise too_large(f"the schema {found.name!r} has {len(found.data)} bytes")
-    return found
+    if len(schema_read.data) > MAX_SCHEMA_BYTES:
+        raise too_large(f"the schema {schema_read.name!r} has {len(schema_read.data)} bytes")
+    return schema_read
 
 
 def channel(fields: Fields) -> Channel:

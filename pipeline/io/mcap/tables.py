@@ -233,7 +233,7 @@ def pick_joint(batch: Batch, leaves: dict[str, Leaf], joint: str | None) -> dict
     ROS 2, sensor_msgs/msg/JointState.
 
     """
-    found = {name: leaf for name, leaf in leaves.items() if leaf.counts is None}
+    scalars = {name: leaf for name, leaf in leaves.items() if leaf.counts is None}
     names = leaves.get("name")
     if names is None or names.counts is None:
         raise _bad("a joint state has no list of names")
@@ -249,8 +249,8 @@ def pick_joint(batch: Batch, leaves: dict[str, Leaf], joint: str | None) -> dict
         values = np.full(counts.size, np.nan)
         there = leaf.counts > 0
         values[there] = leaf.values.reshape(-1)[(first + at)[there]]
-        found[quantity] = Leaf(values)
-    return found
+        scalars[quantity] = Leaf(values)
+    return scalars
 
 
 def _bad(message: str) -> CaptureError:

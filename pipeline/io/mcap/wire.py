@@ -138,16 +138,16 @@ class Fields:
 
     def text_map(self) -> dict[str, str]:
         """A map of text to text; a repeated key is corrupt."""
-        found: dict[str, str] = {}
+        texts: dict[str, str] = {}
         inner = self.inner()
         while inner.position < inner.end:
             key, value = inner.text(), inner.text()
-            if key in found:
+            if key in texts:
                 raise corrupt(f"{self.what} holds the key {key!r} twice")
-            if len(found) >= MAX_MAP_ENTRIES:
+            if len(texts) >= MAX_MAP_ENTRIES:
                 raise too_large(f"{self.what} holds more than {MAX_MAP_ENTRIES} keys")
-            found[key] = value
-        return found
+            texts[key] = value
+        return texts
 
     def counts(self) -> Iterator[tuple[int, int]]:
         """Pairs of a 16-bit key and a 64-bit number, with a 32-bit byte length before them."""

@@ -56,12 +56,12 @@ def read(data: bytes) -> tuple[RawTable, ...]:
         raise CaptureError(
             "not_mat", f"it is no MATLAB file: {fault}", "save it with `save -v7`"
         ) from fault
-    found: dict[int, dict[str, np.ndarray]] = {}
+    arrays: dict[int, dict[str, np.ndarray]] = {}
     for name, value in sorted(content.items()):
         if not name.startswith("__"):
             for path, vector in _vectors(name, value, DEEPEST):
-                found.setdefault(vector.size, {})[path] = vector
-    return tuple(RawTable(f"mat of {size}", fields) for size, fields in sorted(found.items()))
+                arrays.setdefault(vector.size, {})[path] = vector
+    return tuple(RawTable(f"mat of {size}", fields) for size, fields in sorted(arrays.items()))
 
 
 def _vectors(path: str, value: Any, depth: int) -> Iterator[tuple[str, np.ndarray]]:

@@ -41,7 +41,7 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     asammdf = library("asammdf", "mdf")
     if not data.startswith(MARK):
         raise CaptureError("not_mdf", "it does not begin as an MDF file", REMEDY)
-    found = []
+    groups = []
     try:
         with asammdf.MDF(io.BytesIO(data)) as file:
             for number, group in enumerate(file.virtual_groups):
@@ -61,14 +61,14 @@ def read(data: bytes) -> tuple[RawTable, ...]:
                         units.setdefault(signal.name, signal.unit or "")
                 if fields:
                     stated = tuple((name, unit) for name, unit in units.items() if unit)
-                    found.append(
+                    groups.append(
                         RawTable(f"group {number}", fields, units=(("time", "s"), *stated))
                     )
     except CaptureError:
         raise
     except Exception as fault:
         raise CaptureError("not_mdf", f"it is no MDF file: {fault}", REMEDY) from fault
-    return tuple(found)
+    return tuple(groups)
 
 
 READER = Reader("mdf4", read, suffixes=(".mf4", ".mdf"))

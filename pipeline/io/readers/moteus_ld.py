@@ -53,12 +53,12 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     for level, runs in _document(data)["raw"].items():
         for run in runs if isinstance(runs, list) else [None]:
             row = run if isinstance(run, dict) else {}
-            found = number(level), _number(row.get("omega")), _number(row.get("y"))
-            if None in found:
+            values = number(level), _number(row.get("omega")), _number(row.get("y"))
+            if None in values:
                 place = (len(rows), len(rows))
                 words = f"a row of `raw` at {level[:60]!r} has no numbers as level, omega and y"
                 raise CaptureError("missing_column", words, _REMEDY, place)
-            rows.append(tuple(one for one in found if one is not None))
+            rows.append(tuple(one for one in values if one is not None))
     table = np.array(sorted(rows), dtype=float).reshape(-1, 3)
     fields = {"d_A": table[:, 0], "omega": table[:, 1], "y": table[:, 2]}
     return (RawTable("raw", fields),)

@@ -68,14 +68,14 @@ def read(data: bytes) -> tuple[RawTable, ...]:
 
 
 def _fields(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    found: dict[str, np.ndarray] = {}
+    fields: dict[str, np.ndarray] = {}
     for name, values in arrays.items():
         if np.iscomplexobj(values):
-            found[f"{name}.real"] = values.real.ravel()
-            found[f"{name}.imag"] = values.imag.ravel()
+            fields[f"{name}.real"] = values.real.ravel()
+            fields[f"{name}.imag"] = values.imag.ravel()
         elif np.issubdtype(values.dtype, np.number):
-            found[name] = values.ravel()
-    return found
+            fields[name] = values.ravel()
+    return fields
 
 
 READER = Reader("npz", read, suffixes=(".npz",))

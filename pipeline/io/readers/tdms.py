@@ -45,7 +45,7 @@ def read(data: bytes) -> tuple[RawTable, ...]:
 
     """
     nptdms = library("nptdms", "tdms")
-    found: dict[tuple[str, int, float], dict[str, np.ndarray]] = {}
+    channels: dict[tuple[str, int, float], dict[str, np.ndarray]] = {}
     units: dict[str, str] = {}
     try:
         with _warnings_of("nptdms") as warnings:
@@ -58,7 +58,7 @@ def read(data: bytes) -> tuple[RawTable, ...]:
                 if not np.issubdtype(values.dtype, np.number) or not values.size:
                     continue
                 step = float(channel.properties.get("wf_increment", 0.0))
-                fields = found.setdefault((group.name, values.size, step), {})
+                fields = channels.setdefault((group.name, values.size, step), {})
                 name = f"{group.name}/{channel.name}"
                 fields[name] = values
                 units[name] = str(channel.properties.get("unit_string", ""))
@@ -69,7 +69,7 @@ def read(data: bytes) -> tuple[RawTable, ...]:
         raise CaptureError("not_tdms", f"it is no TDMS file: {fault}", "write it anew") from fault
     return tuple(
         RawTable(group, fields, units=tuple((n, units[n]) for n in fields if units[n]))
-        for (group, _, _), fields in sorted(found.items())
+        for (group, _, _), fields in sorted(channels.items())
     )
 
 
@@ -79,11 +79,11 @@ def _warnings_of(name: str) -> Iterator[list[str]]:
 
     npTDMS reads such a file as far as it goes.
     """
-    found: list[str] = []
+    warnings: list[str] = []
 
     class Keeper(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            found.append(record.getMessage())
+            warnings.append(record.getMessage())
 
     logger, keeper = logging.getLogger(name), Keeper(logging.WARNING)
     children = [one for one in logging.root.manager.loggerDict if one.startswith(f"{name}.")]
@@ -92,7 +92,7 @@ def _warnings_of(name: str) -> Iterator[list[str]]:
     for one in loggers:
         one.propagate, one.handlers = False, [keeper]
     try:
-        yield found
+        yield warnings
     finally:
         for one, (propagate, handlers) in zip(loggers, before, strict=True):
             one.propagate, one.handlers = propagate, handlers

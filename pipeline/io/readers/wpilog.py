@@ -61,12 +61,12 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     """
     try:
         entries = _entries(data)
-        found = [table for entry in entries if (table := _table(entry)) is not None]
+        tables = [table for entry in entries if (table := _table(entry)) is not None]
     except (struct.error, IndexError, ParseError) as fault:
         raise CaptureError(
             "not_wpilog", f"its records do not add up: {fault}", "copy the log again"
         ) from fault
-    return tuple(found)
+    return tuple(tables)
 
 
 def _entries(data: bytes) -> list[_Entry]:

@@ -188,18 +188,18 @@ def _turn(signal: str, error: Array, at: dict[str, Array], angle: str) -> ErrorM
 def _map(signal: str, error: Array, cell: NDArray[np.int64], x: Bins, y: Bins | None) -> ErrorMap:
     shape = (x.count,) if y is None else (y.count, x.count)
     visit = visits_of(cell, np.zeros(cell.size, dtype=np.int64))
-    found = cell_means(error, np.ones(error.size), cell, visit, int(np.prod(shape)))
-    means = np.where(found.count < FEWEST_SAMPLES, np.nan, found.mean)
+    cells = cell_means(error, np.ones(error.size), cell, visit, int(np.prod(shape)))
+    means = np.where(cells.count < FEWEST_SAMPLES, np.nan, cells.mean)
     return ErrorMap(
         signal,
         unit_of(signal),
         x,
         y,
-        found.count.reshape(shape),
+        cells.count.reshape(shape),
         means.reshape(shape),
-        found.p_value.reshape(shape),
-        found.explained,
-        found.p_all,
+        cells.p_value.reshape(shape),
+        cells.explained,
+        cells.p_all,
     )
 
 

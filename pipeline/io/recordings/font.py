@@ -61,4 +61,4 @@ def drawable(text: str) -> str:
         Any text.
 
     """
-    return _OTHER.sub(lambda found: f"‹{ord(found.group()):X}›", text)
+    return _OTHER.sub(lambda other: f"‹{ord(other.group()):X}›", text)

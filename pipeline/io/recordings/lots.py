@@ -170,8 +170,8 @@ def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
     The viewer makes a column as wide as its heading, so these are as long as what stands below.
     """
     shown = compared(result)
-    found = {motor.motor_id: motor for one in shown for motor in one.motors}
-    ordered = sorted(found.values(), key=lambda motor: (motor.side, motor.motor_id))
+    motors = {motor.motor_id: motor for one in shown for motor in one.motors}
+    ordered = sorted(motors.values(), key=lambda motor: (motor.side, motor.motor_id))
     place = pl.Series(PLACE, np.arange(len(ordered), dtype=np.int64))
     if not ordered:
         return

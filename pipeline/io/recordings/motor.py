@@ -140,8 +140,8 @@ def overview(campaign: Campaign, evidence: Sequence[Evidence]) -> Iterator[Strip
         wrong.
 
     """
-    found = [(c.path, first_of_each(own_evidence(c, evidence))) for c in campaign.captures]
-    drawn = [(number, *one) for number, one in enumerate(one for one in found if one[1])]
+    fits = [(c.path, first_of_each(own_evidence(c, evidence))) for c in campaign.captures]
+    drawn = [(number, *one) for number, one in enumerate(one for one in fits if one[1])]
     reach: dict[str, float] = {}
     for _, _, own in drawn:
         for one in own:

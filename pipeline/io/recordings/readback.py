@@ -59,8 +59,8 @@ def entities(path: Path) -> tuple[str, ...]:
     """
     from rerun.chunk import RrdReader
 
-    found = {str(chunk.entity_path) for chunk in RrdReader(str(path)).stream()}
-    return tuple(sorted(name for name in found if not name.startswith("/__properties")))
+    paths = {str(chunk.entity_path) for chunk in RrdReader(str(path)).stream()}
+    return tuple(sorted(name for name in paths if not name.startswith("/__properties")))
 
 
 @dataclass(frozen=True, slots=True)

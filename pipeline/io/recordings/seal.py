@@ -82,12 +82,12 @@ def verify(path: Path) -> None:
     with path.open("rb") as stream:
         magic = stream.read(len(MAGIC))
         stream.seek(0)
-        found = hashlib.file_digest(stream, "sha256").hexdigest()
+        sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
     if magic != MAGIC:
         raise RecordingError("this is no Rerun recording", REMEDY)
     seal = seal_of(path)
     if not seal.is_file():
         raise RecordingError(f"its seal {seal.name} is missing", REMEDY)
     stated = seal.read_text(encoding="ascii", errors="replace").split(maxsplit=1)
-    if not stated or stated[0] != found:
+    if not stated or stated[0] != sha256:
         raise RecordingError("truncated or changed: its digest is not the sealed one", REMEDY)

@@ -176,8 +176,8 @@ class PageHandler(BaseHTTPRequestHandler):
         connection = HTTPConnection(HERE, self.server.inner, timeout=WAIT_S)
         connection.request("GET", path)
         answer = connection.getresponse()
-        found = {name.lower(): value for name, value in answer.getheaders()}
-        self._head(answer.status, {name: found[name] for name in _PASSED_ON if name in found})
+        headers = {name.lower(): value for name, value in answer.getheaders()}
+        self._head(answer.status, {name: headers[name] for name in _PASSED_ON if name in headers})
         if body:
             shutil.copyfileobj(answer, self.wfile)
         connection.close()

@@ -284,8 +284,8 @@ class Registry:
     def revocations(self) -> Mapping[str, tuple[Revocation, ...]]:
         """The versions that are revoked now, by motor; none where there is no registry yet."""
         motors = histories(self._table.events() or ())
-        found = {m: tuple(r for v in own if (r := v.revocation)) for m, own in motors.items()}
-        return {motor_id: revoked for motor_id, revoked in found.items() if revoked}
+        by_motor = {m: tuple(r for v in own if (r := v.revocation)) for m, own in motors.items()}
+        return {motor_id: revoked for motor_id, revoked in by_motor.items() if revoked}
 
     def last_commit(self) -> int | None:
         """The number of the table's last commit; None where it is not to be seen on a disk."""
@@ -366,7 +366,7 @@ class Registry:
         try:
             events = self.events()
             published = [event for event in events if event.kind == "publish"]
-            found = [*gaps, *faults(events), *self._content_faults(published)]
+            faults_found = [*gaps, *faults(events), *self._content_faults(published)]
         except UsageError:
             raise
         except PipelineError as error:
@@ -374,7 +374,7 @@ class Registry:
         lost, notes = self._file_faults(published)
         unique = len({event.key for event in published})
         decisions = len(events) - len(published)
-        return Verification(unique, decisions, (*found, *lost), tuple(notes))
+        return Verification(unique, decisions, (*faults_found, *lost), tuple(notes))
 
     def _content_faults(self, published: Sequence[Event]) -> Iterable[str]:
         rows = {event.sequence: event for event in published}
@@ -389,22 +389,22 @@ class Registry:
         yield from (f"row {number}: its datasheet is missing" for number in sorted(left))
 
     def _file_faults(self, published: Sequence[Event]) -> tuple[list[str], list[str]]:
-        found, notes = [], []
+        sentences, notes = [], []
         for event in {e.key: e for e in reversed(published)}.values():
             place, sha256 = place_of(event.key), event.content_sha256 or ""
             content = self._exports.read(event.key)
             if content is None and self._exports.finish(event.key, sha256):
                 notes.append(f"{place}: finished what an interrupted writer had left pending")
             elif content is None:
-                found.append(f"{place}: the file is missing; publishing the version writes it")
+                sentences.append(f"{place}: the file is missing; publishing the version writes it")
             elif _digest(content) != sha256:
-                found.append(f"{place}: the file is not what was published")
+                sentences.append(f"{place}: the file is not what was published")
         if left := self._exports.pending():
             notes.append(f"{left} pending files of writers that were interrupted or still write")
         rows = {place_of(event.key) for event in published}
         lost = (name for name in self._exports.names() if name not in rows)
-        found += [f"{name}: the file has no row; the table lost it" for name in lost]
-        return sorted(found), sorted(notes)
+        sentences += [f"{name}: the file has no row; the table lost it" for name in lost]
+        return sorted(sentences), sorted(notes)
 
     def _missing(self) -> UsageError:
         return UsageError(f"no registry at {self.place}", "name the one of a run by registry=")

@@ -136,8 +136,12 @@ class EventTable:
                 wanted = sequences[start : start + batch]
                 numbers = ", ".join(str(int(number)) for number in wanted)
                 rows = _rows(table, ("sequence", "content"), f"sequence IN ({numbers})")
-                found: dict[int, str] = dict(rows.iter_rows())
-                yield from ((number, found[number]) for number in wanted if number in found)
+                contents_by_row: dict[int, str] = dict(rows.iter_rows())
+                yield from (
+                    (number, contents_by_row[number])
+                    for number in wanted
+                    if number in contents_by_row
+                )
 
     def append(self, decide: Decide) -> tuple[list[Event], list[Event]]:
         """Adds the rows that a function makes of the events so far.

@@ -78,9 +78,9 @@ class Code:
             Of syntax trees without docstrings and comments, independent of where a file lies.
 
         """
-        found = [self._digest(module) for module in modules]
+        digests = [self._digest(module) for module in modules]
         self._keep()
-        return _sha256(found)
+        return _sha256(digests)
 
     def closure(self, *modules: str) -> frozenset[str]:
         """Modules, and all of the package that they import, directly or not.
@@ -91,14 +91,14 @@ class Code:
             Dotted names.
 
         """
-        left, found = list(modules), set[str]()
+        left, modules_used = list(modules), set[str]()
         while left:
             module = left.pop()
-            if module not in found:
-                found.add(module)
+            if module not in modules_used:
+                modules_used.add(module)
                 left += [target for _, _, target in self._targets(module)]
                 left += [*self._found_by(module), *self._above(module)]
-        return frozenset(found)
+        return frozenset(modules_used)
 
     def libraries(self, *modules: str) -> tuple[str, ...]:
         """Top names of what is imported, directly or not, of packages other than Python's own.
@@ -109,8 +109,8 @@ class Code:
             Dotted names.
 
         """
-        found = (self._source(module)[1].libraries for module in self.closure(*modules))
-        return tuple(sorted({name for names in found for name in names}))
+        libraries = (self._source(module)[1].libraries for module in self.closure(*modules))
+        return tuple(sorted({name for names in libraries for name in names}))
 
     def _digest(self, module: str) -> str:
         known = self._digests.get(module)
@@ -122,7 +122,7 @@ class Code:
         taken = {
             (bound, name, self._digest(target)) for bound, name, target in self._targets(module)
         }
-        plug_ins = {self._digest(found) for found in self._found_by(module)}
+        plug_ins = {self._digest(plug_in) for plug_in in self._found_by(module)}
         above = {self._digest(package) for package in self._above(module)}
         digest = _sha256(
             [
@@ -142,18 +142,18 @@ class Code:
 
         The package itself holds public names and the release, which no result hangs on.
         """
-        found = []
+        targets = []
         for one in self._source(module)[1].imports:
             if one.bound == BY_TEXT:
-                found.append((BY_TEXT, "", one.home))
+                targets.append((BY_TEXT, "", one.home))
                 continue
             home = self._home(module, one)
             inner = f"{home}.{one.name}"
             if one.name and self._path(inner) is not None:
-                found.append((one.bound, "", inner))
+                targets.append((one.bound, "", inner))
             elif home != self.root.name:
-                found.append((one.bound, one.name, home))
-        return [(b, n, target) for b, n, target in found if self._path(target) is not None]
+                targets.append((one.bound, one.name, home))
+        return [(b, n, target) for b, n, target in targets if self._path(target) is not None]
 
     def _home(self, module: str, one: Import) -> str:
         if not one.level:
@@ -214,9 +214,9 @@ class Code:
         if noted is not None:
             digest, imports, libraries = noted
             return Syntax(digest, tuple(Import(*i) for i in imports), tuple(libraries))
-        found = syntax_of(content, self.root.name)
-        self._new[sha256] = astuple(found)
-        return found
+        syntax = syntax_of(content, self.root.name)
+        self._new[sha256] = astuple(syntax)
+        return syntax
 
     def _keep(self) -> None:
         """Keeps what sources say for the next start; without a place it is found out again."""
@@ -338,11 +338,11 @@ def _own(*modules: str) -> list[str]:
 def _versions(names: Iterable[str]) -> list[str]:
     """`name version` of distributions, and of those that are named after them (`polars-...`)."""
     there = installed()
-    found = []
+    versions = []
     for name in sorted({_plain(name) for name in names}):
         own = [n for n in there if n == name or n.startswith(f"{name}-")]
-        found += [f"{n} {there[n]}" for n in sorted(own)] if name in there else [f"{name} -"]
-    return found
+        versions += [f"{n} {there[n]}" for n in sorted(own)] if name in there else [f"{name} -"]
+    return versions
 
 
 def installed() -> dict[str, str]:
@@ -350,14 +350,14 @@ def installed() -> dict[str, str]:
 
     Read from the names of their folders, in a hundredth of the time that their metadata takes.
     """
-    found: dict[str, str] = {}
+    versions: dict[str, str] = {}
     for place in reversed(sys.path):
         with suppress(OSError):
             for folder in os.scandir(place or "."):
                 if folder.name.endswith(".dist-info"):
                     name, _, version = folder.name.removesuffix(".dist-info").partition("-")
-                    found[_plain(name)] = version
-    return found
+                    versions[_plain(name)] = version
+    return versions
 
 
 def _plain(name: str) -> str:

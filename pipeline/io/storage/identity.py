@@ -73,8 +73,8 @@ class Identities:
         if notes is not None:
             name = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:32]
             self._path = notes / f"{name}.json"
-            found = read_checksummed(self._path)
-            files = found.get("files", {}) if isinstance(found, dict) else {}
+            content = read_checksummed(self._path)
+            files = content.get("files", {}) if isinstance(content, dict) else {}
             self._known = {file: (_identity(noted[0]), noted[1]) for file, noted in files.items()}
         self._changed = False
 

@@ -152,10 +152,10 @@ def _only(document: Mapping[str, Any], known: tuple[str, ...], where: str) -> No
 
 
 def _map(document: Mapping[str, Any], key: str, where: str) -> dict[str, Any]:
-    found = document.get(key) or {}
-    if not isinstance(found, dict):
+    value = document.get(key) or {}
+    if not isinstance(value, dict):
         raise UsageError(f"{where}: {key} holds no keys", "write `key: value` lines below it")
-    return found
+    return value
 
 
 def _number(document: Mapping[str, Any], key: str, where: str) -> float:

@@ -91,12 +91,12 @@ def _plain(node: Any, what: str) -> Plain:
         return "" if node.tag.endswith(":null") else node.value
     if isinstance(node, yaml.SequenceNode):
         return [_plain(item, what) for item in node.value]
-    found: dict[str, Plain] = {}
+    values: dict[str, Plain] = {}
     for key, value in node.value:
         name = _plain(key, what)
         if not isinstance(name, str):
             raise _bad(what, "has a key that is no text")
-        if name in found:
+        if name in values:
             raise _bad(what, f"has the key {name!r} twice")
-        found[name] = _plain(value, what)
-    return found
+        values[name] = _plain(value, what)
+    return values

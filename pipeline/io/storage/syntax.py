@@ -63,10 +63,10 @@ def syntax_of(content: bytes, package: str) -> Syntax:
     own: list[Import] = []
     tops: set[str] = set()
     for node in _walk(tree):
-        for found in _imports(node):
-            top = found.home.split(".")[0]
-            if found.level or top == package:
-                own.append(found)
+        for imported in _imports(node):
+            top = imported.home.split(".")[0]
+            if imported.level or top == package:
+                own.append(imported)
             else:
                 tops.add(top)
         if (text := _place(node, package)) is not None:

@@ -102,7 +102,7 @@ def split_comments(data: bytes) -> tuple[dict[str, str], int]:
     ({'motor_id': 'M1'}, 15)
 
     """
-    found: dict[str, str] = {}
+    metadata: dict[str, str] = {}
     at = 3 if data.startswith(b"\xef\xbb\xbf") else 0
     while data.startswith(b"#", at) and at < MAX_HEAD_BYTES:
         stop = data.find(b"\n", at)
@@ -112,12 +112,12 @@ def split_comments(data: bytes) -> tuple[dict[str, str], int]:
         except ParseError as fault:
             raise _refuse("encoding", f"a metadata line {fault}", "save it as UTF-8") from None
         match = _COMMENT.match(line)
-        if match and match[1] and found.setdefault(match[1], match[2]) != match[2]:
+        if match and match[1] and metadata.setdefault(match[1], match[2]) != match[2]:
             raise _refuse(
                 "bad_metadata", f"the key {match[1]!r} has two values", "keep one of the two lines"
             )
         at = stop
-    return found, at
+    return metadata, at
 
 
 def read_csv(
@@ -385,16 +385,16 @@ def _parse(
         frame = _frame(rows, schema, dialect)
     except pl.exceptions.PolarsError:
         raise _locate(rows, schema, keep, dialect) from None
-    found: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     clocks: list[str] = []
     for at, name in keep.items():
         values = frame[f"c{at}"]
         if values.dtype == pl.String:
-            found[name] = seconds_of(values, name, dialect.instant or "")
+            columns[name] = seconds_of(values, name, dialect.instant or "")
             clocks.append(name)
             continue
-        found[name] = values.to_numpy() if values.null_count() == 0 else _with_nan(values)
-        infinite = np.flatnonzero(np.isinf(found[name]))
+        columns[name] = values.to_numpy() if values.null_count() == 0 else _with_nan(values)
+        infinite = np.flatnonzero(np.isinf(columns[name]))
         if infinite.size:
             raise _refuse(
                 "infinite",
@@ -402,7 +402,7 @@ def _parse(
                 "leave the field empty where nothing was measured",
                 (int(infinite[0]), int(infinite[-1])),
             )
-    return found, clocks
+    return columns, clocks
 
 
 def _frame(rows: bytes, schema: dict[str, Any], dialect: CsvDialect) -> Any:
@@ -452,11 +452,11 @@ def _number_in(text: str, pattern: str | None, what: str) -> float | None:
     if pattern is None:
         return None
     match = re.search(pattern, text, re.MULTILINE)
-    found = number(match[1] or "") if match and match.re.groups else None
-    if found is None:
+    value = number(match[1] or "") if match and match.re.groups else None
+    if value is None:
         raise _refuse(
             "no_header",
             f"the time {what} is not where the source map says",
             "check `time` in the source map against the file's first lines",
         )
-    return found
+    return value

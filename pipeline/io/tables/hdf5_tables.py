@@ -47,7 +47,7 @@ def tables(data: bytes, form: str) -> tuple[RawTable, ...]:
 
     """
     h5py = library("h5py", "hdf5")
-    found: dict[tuple[str, int], dict[str, np.ndarray]] = {}
+    tables_by_group: dict[tuple[str, int], dict[str, np.ndarray]] = {}
     units: dict[str, str] = {}
     try:
         with h5py.File(io.BytesIO(data), "r") as file:
@@ -57,7 +57,7 @@ def tables(data: bytes, form: str) -> tuple[RawTable, ...]:
             for path, one in datasets.items():
                 for name, values in _vectors(path, one).items():
                     group = path.rpartition("/")[0]
-                    found.setdefault((group, values.size), {})[name] = values
+                    tables_by_group.setdefault((group, values.size), {})[name] = values
                     units[name] = _unit(one)
     except (OSError, ValueError, KeyError, RuntimeError, TypeError) as fault:
         raise CaptureError(
@@ -65,7 +65,7 @@ def tables(data: bytes, form: str) -> tuple[RawTable, ...]:
         ) from fault
     return tuple(
         RawTable(group or form, fields, units=tuple((n, units[n]) for n in fields if units[n]))
-        for (group, _), fields in sorted(found.items())
+        for (group, _), fields in sorted(tables_by_group.items())
     )
 
 
@@ -80,14 +80,14 @@ def _unit(one: Any) -> str:
 
 def _datasets(h5py: Any, file: Any) -> dict[str, Any]:
     """Datasets by path; `visititems` follows no soft or external link."""
-    found: dict[str, Any] = {}
+    datasets: dict[str, Any] = {}
 
     def keep(path: str, one: Any) -> None:
         if isinstance(one, h5py.Dataset) and not path.startswith("#refs#"):
-            found[path] = one
+            datasets[path] = one
 
     file.visititems(keep)
-    return found
+    return datasets
 
 
 def _vectors(path: str, one: Any) -> dict[str, np.ndarray]:

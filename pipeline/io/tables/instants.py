@@ -58,7 +58,7 @@ def seconds_of(texts: Any, name: str, form: str) -> NDArray[np.float64]:
             (row, int(wrong[-1])),
         )
     seconds = (times - times.drop_nulls().first()).dt.total_nanoseconds() / _NANOSECONDS_A_SECOND
-    found: NDArray[np.float64] = seconds.fill_null(float("nan")).to_numpy()
+    numbers: NDArray[np.float64] = seconds.fill_null(float("nan")).to_numpy()
     if "%d" in form:
-        return found
-    return np.unwrap(found, period=_DAY_S) if np.isfinite(found).all() else found
+        return numbers
+    return np.unwrap(numbers, period=_DAY_S) if np.isfinite(numbers).all() else numbers

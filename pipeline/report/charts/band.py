@@ -74,11 +74,11 @@ def outlined(x_px: Array, y_px: Array) -> str:
 
 def _runs(x_px: Array, y_px: Array) -> Iterator[tuple[Array, Array, Array]]:
     """The band's columns from gap to gap."""
-    found = extremes(x_px, y_px)
-    if found is None:
+    ends = extremes(x_px, y_px)
+    if ends is None:
         return
-    cuts = np.flatnonzero(np.diff(found[0]) > GAP_COLUMNS * COLUMN_PX) + 1
-    parts = (np.split(one, cuts) for one in found)
+    cuts = np.flatnonzero(np.diff(ends[0]) > GAP_COLUMNS * COLUMN_PX) + 1
+    parts = (np.split(one, cuts) for one in ends)
     yield from zip(*parts, strict=True)
 
 

@@ -63,7 +63,7 @@ def render_comparison(
 
 def _maps(result: Comparison) -> list[Figure]:
     """Each signal's error over speed and current, and over the angle of a turn."""
-    found = []
+    pictures = []
     for signal in dict.fromkeys(one.signal for one in result.maps):
         own = [one for one in result.maps if one.signal == signal]
         flat = next((one for one in own if _axes(one) == (SPEED, CURRENT)), None)
@@ -71,8 +71,8 @@ def _maps(result: Comparison) -> list[Figure]:
         svg = "" if flat is None else heatmap(flat, flat.reach)
         svg += "" if turn is None else angle_bars(turn, turn.reach)
         if svg:
-            found.append(Figure(quantity_words(signal), "mean error", "", svg))
-    return found
+            pictures.append(Figure(quantity_words(signal), "mean error", "", svg))
+    return pictures
 
 
 def _axes(error_map: ErrorMap) -> tuple[str, ...]:

@@ -165,12 +165,13 @@ def _power(constant: ConstantResult) -> str:
 
 
 def _capability(constant: ConstantResult) -> str:
-    found = constant.capability
-    if found.cpk is None or found.cpk_low is None or found.cpk_high is None:
+    capability = constant.capability
+    if capability.cpk is None or capability.cpk_low is None or capability.cpk_high is None:
         return ""
-    cp = "" if found.cp is None else f"Cp {found.cp:.2f}, "
-    level = f"{100 * found.level:.0f} %"
-    return f"{cp}Cpk {found.cpk:.2f} ({found.cpk_low:.2f} to {found.cpk_high:.2f} at {level})"
+    cp = "" if capability.cp is None else f"Cp {capability.cp:.2f}, "
+    level = f"{100 * capability.level:.0f} %"
+    interval = f"({capability.cpk_low:.2f} to {capability.cpk_high:.2f} at {level})"
+    return f"{cp}Cpk {capability.cpk:.2f} {interval}"
 
 
 def _gauge(gauge: Gauge | None, unit: str) -> str:

@@ -122,8 +122,8 @@ def _tables(view: FleetView) -> list[str]:
     ]
     few = len(view.rows) <= FEW
     lines = [line for row in view.rows for line in (_row(row), _spreads(row))[: 2 if few else 1]]
-    found = blocks([head, units, *lines], right=range(3, len(head)))
-    return found if few else found[:1]
+    tables = blocks([head, units, *lines], right=range(3, len(head)))
+    return tables if few else tables[:1]
 
 
 def _heading(column: Column) -> str:

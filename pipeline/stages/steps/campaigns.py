@@ -72,10 +72,10 @@ def campaigns(
         pool = open_pool("local", Cluster())
         with WorkerPool(pool, core_count(), Path(progress) / "work") as workers:
             ask = partial(survey_with, workers, Path(folder), sources, bounds, recover=False)
-            found = _of_files(survey(Path(folder), sources, ask), only)
-            tasks = _tasks(folder, found, motor, bounds)
+            of_files = _of_files(survey(Path(folder), sources, ask), only)
+            tasks = _tasks(folder, of_files, motor, bounds)
             read = workers.map_tasks(usable_captures, tasks)
-    findings = list(found.findings)
+    findings = list(of_files.findings)
     made = []
     for task, end in zip(tasks, read, strict=True):
         if isinstance(end, MachineError):
@@ -84,7 +84,7 @@ def campaigns(
         findings += doubts
         if captures:
             made.append(Campaign(task.motor_id, captures))
-    return Gathered(tuple(made), tuple(findings), found.note)
+    return Gathered(tuple(made), tuple(findings), of_files.note)
 
 
 def _of_files(survey: Survey, only: Collection[str] | None) -> Survey:

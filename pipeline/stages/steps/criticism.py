@@ -85,14 +85,14 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str)
             # a daemon, so that an interrupt need not wait for it
             aside = Thread(target=import_module, args=(needs,), daemon=True)
             aside.start()
-            found = campaigns(
+            read = campaigns(
                 settings.input, settings.source, settings.motor, limits, settings.config_dir
             )
             aside.join()
         effects = tuple(settings.model.effects)
         spec = ModelSpec(settings.model.name, effects, settings.effects_path, changes)
         results = []
-        stated = [replace(one, stated=settings.constants) for one in found.campaigns]
+        stated = [replace(one, stated=settings.constants) for one in read.campaigns]
         for number, campaign in enumerate(stated, 1):
             line.say(f"{printable(campaign.motor_id)}, motor {number} of {len(stated)}")
             with worker.campaign():
@@ -101,7 +101,7 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str)
                 results.append(judge(task))
     undecided = not results or any(result.undecided for result in results)
     outcome = outcome_of(
-        settings.input, found, [result.text for result in results], undecided=undecided
+        settings.input, read, [result.text for result in results], undecided=undecided
     )
     return replace(
         outcome,

@@ -124,10 +124,10 @@ def _selected(shelf: _Shelf, versions: Sequence[Version], query: Query) -> list[
 
 def _newest(sheets: Iterable[Sheet]) -> dict[str, Sheet]:
     """The newest version of each motor."""
-    found: dict[str, Sheet] = {}
+    newest: dict[str, Sheet] = {}
     for one in sorted(sheets, key=lambda one: (one.version.motor_id, one.version.revision)):
-        found[one.sheet.motor_id] = one
-    return found
+        newest[one.sheet.motor_id] = one
+    return newest
 
 
 def _same_captures(base: Mapping[str, Sheet], candidate: Mapping[str, Sheet]) -> list[str]:
