@@ -83,19 +83,17 @@ def result(
         With its verdict and the reason.
 
     """
-    assessment = made.assessment
-    candidate = [v for v in assessment.values if v.side == "candidate"]
-    lots = {
-        lot: list(v) for side in (assessment.base, assessment.candidate) for lot, v in side.items()
-    }
-    mean = float(np.mean(assessment.candidate_means)) if assessment.candidate else 0.0
-    flat = [value for values in assessment.candidate.values() for value in values]
+    of_lots = made.assessment
+    candidate = [v for v in of_lots.values if v.side == "candidate"]
+    lots = {lot: list(v) for side in (of_lots.base, of_lots.candidate) for lot, v in side.items()}
+    mean = float(np.mean(of_lots.candidate_means)) if of_lots.candidate else 0.0
+    flat = [value for values in of_lots.candidate.values() for value in values]
     spread = float(np.std(flat, ddof=1)) if len(flat) > 1 else None
-    conform = conformity(made.held, candidate, assessment.corrected, mean, spread)
-    test = _test(assessment, family, limits)
-    same = _equivalence(assessment, made.held.margin, limits.alpha)
+    conform = conformity(made.held, candidate, of_lots.corrected, mean, spread)
+    test = _test(of_lots, family, limits)
+    same = _equivalence(of_lots, made.held.margin, limits.alpha)
     answers = Answers(conform, test, same, family.motor_p_holm, limits.alpha)
-    decided = judge(made.limits, made.unit, assessment, answers)
+    decided = judge(made.limits, made.unit, of_lots, answers)
     tolerance = made.held.tolerance
     return ConstantResult(
         name=made.limits.name,
@@ -105,14 +103,14 @@ def result(
         why=decided.why,
         decides=made.limits.decides,
         temperature_degc=25.0,
-        motors=_motors(assessment, made.held),
-        lots=_lots(assessment, limits, started),
+        motors=_motors(of_lots, made.held),
+        lots=_lots(of_lots, limits, started),
         bounds=made.held.bounds,
         conformity=conform,
         test=test,
         equivalence=same,
-        effect=_effect(assessment, limits.k),
-        power=_power(assessment, limits, family.size),
+        effect=_effect(of_lots, limits.k),
+        power=_power(of_lots, limits, family.size),
         capability=capability(flat, tolerance.lower, tolerance.upper)
         if tolerance is not None
         else NO_CAPABILITY,
@@ -299,21 +297,21 @@ def gauge_of(repeats: Sequence[Value]) -> Gauge | None:
 
 
 def _stations(made: Material) -> tuple[StationBias, ...]:
-    assessment = made.assessment
-    seen = {station: value for value in assessment.values if (station := label(value))}
+    of_lots = made.assessment
+    seen = {station: value for value in of_lots.values if (station := label(value))}
     golden: dict[str, set[str]] = {}
     for value in made.golden:
         golden.setdefault(label(value), set()).add(value.motor_id)
     rows = []
     for name in sorted(seen):
-        bias = assessment.correction.bias.get(name)
+        bias = of_lots.correction.bias.get(name)
         motors = len(golden.get(name, ()))
         by = "golden" if bias is not None and motors else "lots" if bias is not None else ""
         if not by:
-            sides = {v.side for v in assessment.values if label(v) == name}
+            sides = {v.side for v in of_lots.values if label(v) == name}
             both = sides >= {"baseline", "candidate"} and seen[name].station is not None
             by = "same_station" if both else "unreferenced"
-        u = assessment.correction.u_of(name) if bias is not None else None
+        u = of_lots.correction.u_of(name) if bias is not None else None
         shown = seen[name].station or "(not stated)"
         rows.append(StationBias(shown, bias, u, by, motors))  # type: ignore[arg-type]
     return tuple(rows)
