@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.segment import clock
 from pipeline.criticism.discovery.changed_constants import End, by_words, may_change, unit_of
 from pipeline.criticism.effect import Array
+from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import pseudo_inverse
@@ -180,7 +181,10 @@ def _found(
         times = np.unique(rows.time_s[seen])
         if times.size < 2 * least:
             continue
-        cut, after = _scanned(system, rows, seen, place, times, least)
+        scanned = _scanned(system, rows, seen, place, times, least)
+        if scanned is None:
+            continue
+        cut, after = scanned
         steps = _Steps(system, rows.time_s, in_capture, np.isin(rows.capture, after), column, times)
         end = steps.end(cut)
         penalty = 2.0 * math.log(system.size) + 2.0 * math.log(times.size * len(places))
@@ -193,15 +197,20 @@ def _found(
         at_s = float(times[first] - reach), float(times[last + 1] + reach)
         value = system.fit.values[name] + float(end.step[place])
         difference, unit = float(end.step[-1]), unit_of(system, name)
+        low, high = limits_of(system.fit.model).get(name, (-math.inf, math.inf))
+        if not low <= min(value, value + difference) <= max(value, value + difference) <= high:
+            continue
         yield ChangeWithin(name, unit, value, difference, end.u, capture, at_s, tuple(after), gain)
 
 
 def _scanned(
     system: LinearSystem, rows: _Rows, seen: NDArray[np.bool_], place: int, times: Array, least: int
-) -> tuple[int, list[str]]:
+) -> tuple[int, list[str]] | None:
     """Number of the last time before the best change, and the captures that have the later value.
 
-    Every other capture that has the constant in it has a value of its own meanwhile.
+    Every other capture that has the constant in it has a value of its own meanwhile. None where no
+    time has enough windows that show the constant on either side: a breakaway in the one window in
+    which a shaft accelerates is an event, and no other inertia from then on.
     """
     column = system.matrix[:, place]
     capture = rows.capture[seen][0]
@@ -225,13 +234,21 @@ def _scanned(
         np.add.at(summed, bins, parts)
         return np.cumsum(summed[::-1], axis=0)[::-1][1:]
 
+    known_by = weight[seen] * changing**2
+    later, later_square = after(known_by), after(known_by**2)
+    few = np.minimum(
+        _windows(later, later_square),
+        _windows(known_by.sum() - later, (known_by**2).sum() - later_square),
+    )
     cross = after(weighted[seen] * changing[:, None])
     slopes = after(weight[seen] * changing * system.residual[seen]) - cross @ inverse @ slope
     free = after(weight[seen] * changing**2) - np.einsum("ti,ij,tj->t", cross, inverse, cross)
     gain = np.where(free > 0.0, slopes**2 / np.maximum(free, 1e-300), 0.0)
     inside = np.arange(gain.size)
-    gain[(inside < least - 1) | (inside >= times.size - least)] = -1.0
+    gain[(few < least) | (inside < least - 1) | (inside >= times.size - least)] = -1.0
     cut = int(np.argmax(gain))
+    if gain[cut] < 0.0:
+        return None
     difference = -slopes[cut] / max(float(free[cut]), 1e-300)
     step = -inverse @ (slope + cross[cut] * difference)
     differences = step[step.size - len(held) :]
@@ -240,3 +257,8 @@ def _scanned(
         for n, one in zip(held, differences.tolist(), strict=True)
         if abs(one - difference) < abs(one)
     ]
+
+
+def _windows(known_by: Array, known_by_square: Array) -> Array:
+    """Effective number of windows [T] that share what is known: (Σ k)²/Σ k² (Kish, 1965)."""
+    return known_by**2 / np.maximum(known_by_square, 1e-300)

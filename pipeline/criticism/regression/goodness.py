@@ -397,9 +397,8 @@ def _over(
         if n == 0 or q <= max(1.0 + policy.over, _highest_by_chance(n, policy.chance)):
             continue
         in_group = system.group == place
-        unit = float(((system.unit * noise_ratio)[in_group] ** 2).mean())
-        more = float(((residual[in_group] * system.unit[in_group]) ** 2).mean()) - unit
-        size = math.sqrt(max(more, 0.0))
+        precision = (system.unit * noise_ratio)[in_group] ** -2.0
+        size = math.sqrt((q - 1.0) / float(precision.mean()))
         matters = size > material_size(system.segments[number], channel, system.fit, large)
         yield place, float(q), size, matters
 

@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.discovery.changed_within import changed_within
+from pipeline.criticism.discovery.changed_within import _Rows, _scanned, changed_within
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.linearise import Column
 from tests.unit.criticism.machines import BASE, log, machine
 
 P, TS, N = 7, 5e-5, 8000
@@ -71,3 +74,38 @@ def test_a_constant_that_stays_a_slow_drift_and_a_change_between_are_none_of_it(
     assert found(logs((0.0, 0.0, 0.0))) is None
     assert found(logs((np.linspace(0.0, -0.06, N), 0.0, 0.0))) is None
     assert found(logs((-0.05, 0.0, 0.0))) is None
+
+
+def scanned(shown, missed):
+    """The change in the first of two captures of twenty windows; `shown` [20] is how much of the
+    inertia its windows show, `missed` [20] by what the fit misses them.
+    """
+    n = 40
+    system = LinearSystem(
+        columns=(Column("j_kgm2", 1e-3),),
+        residual=np.concatenate([missed, np.zeros(20)]),
+        matrix=np.concatenate([shown, np.ones(20)])[:, None],
+        group=np.repeat([0, 1], 20),
+        window=np.tile(np.arange(20), 2),
+        unit=np.ones(n),
+        noise_ratio=np.ones(n),
+        row_weight=np.ones(n),
+        labels=((0, "torque_shaft_nm", 0), (1, "torque_shaft_nm", 0)),
+        prior_precision=np.zeros(1),
+        prior_gradient=np.zeros(1),
+        fit=Fit((log(), log()), Model(machine(), ()), dict(BASE), (), BASE),
+        model_column_count=1,
+        made_at={},
+    )
+    times = np.arange(20.0)
+    rows = _Rows(np.repeat(["one", "other"], 20), np.tile(times, 2), np.zeros(n))
+    return _scanned(system, rows, np.arange(n) < 20, 0, times, 4)
+
+
+def test_what_one_window_shows_is_an_event_and_no_other_value_from_then_on():
+    """A shaft that accelerates once, while it breaks away, shows its inertia in that window."""
+    once = np.where(np.arange(20) == 5, 1.0, 0.01)
+    assert scanned(once, 50.0 * (np.arange(20) == 5)) is None
+    found_change = scanned(np.ones(20), 50.0 * (np.arange(20) >= 5))
+    assert found_change is not None
+    assert found_change[0] == 4

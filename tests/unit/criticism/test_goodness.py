@@ -192,6 +192,23 @@ def test_what_is_over_the_floor_is_told_even_where_it_is_too_small_to_matter(sha
     assert over_floor(replace(off, residual=np.where(mine, 1.2, 0.0))) == ()
 
 
+def test_a_window_that_no_floor_is_sure_of_hides_no_other_one():
+    """One window is 90 floors off, and the floor of another is a hundred times theirs: what is over
+    counts as in a mean that is weighted as its significance is.
+    """
+    running, floor = log(), 1e-3
+    plain = linear_system(fitted((running,)))
+    place = plain.labels.index((0, "torque_shaft_nm", 0))
+    rows = np.flatnonzero(plain.group == place)
+    unit = plain.unit.copy()
+    unit[rows] = floor
+    ratio, residual = plain.noise_ratio.copy(), np.zeros(plain.size)
+    ratio[rows], ratio[rows[0]], residual[rows[1]] = 1.0, 100.0, 90.0
+    system = replace(plain, unit=unit, noise_ratio=ratio, residual=residual)
+    (told,) = (one for one in over_floor(system) if one.signal == "torque_shaft_nm")
+    assert told.size == pytest.approx(90.0 * floor / np.sqrt(rows.size), rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("count", "q", "told"), [(4, 8.9, False), (4, 9.4, True), (400, 1.9, False), (400, 2.1, True)]
 )
