@@ -41,7 +41,7 @@ ARITHMETIC = {
     "regression/identifiability.py": {"_EDGE"},  # rounding
     "regression/linearise.py": {"_CHUNK", "_NOTHING", "_FINE"},  # the cache; rounding; differences
     "regression/mains_hum.py": {"LINES_HZ", "_BESIDE", "_LOBE", "_FINER"},  # mains; Hann's window
-    "regression/normal_equations.py": {"_TIE"},  # rounding
+    "regression/normal_equations.py": {"_TIE", "_SAFE"},  # rounding
     "regression/parallel.py": {"_THREADS"},  # how work is run
     "validation/free_run.py": {"_SEED"},
     # cells of a picture, when its waves are laid over each other; a turn
