@@ -138,7 +138,7 @@ def test_a_long_capture_is_drawn_from_its_pack(tmp_path: Path, viewer: Viewer) -
     capture = Capture("m/l.mcap", "0" * 64, "verified", CaptureMeta("m", "drive"), (frame,))
     (tmp_path / "long.rrd").write_bytes(recording_bytes(capture, ()))
     viewer.show(tmp_path / "long.rrd")
-    for name in ("speed mech [rad/s]", "i_q [A]"):
+    for name in ("shaft speed [rad/s]", "i_q [A]"):
         picture = pixels(viewer.picture(name))
         assert count(picture, PALETTE[0], 30) > 1000
     viewer.tab(1)
