@@ -218,10 +218,10 @@ def _scanned(
     columns = [np.where(rows.capture == name, column, 0.0) for name in held]
     known = np.column_stack([system.matrix[:, system.model_columns], *columns])
     weight = system.weights(system.reduced_chi2(system.residual))
-    precision = np.concatenate(
-        [system.prior_precision[system.model_columns], np.zeros(len(columns))]
+    precision, gradient = (
+        np.pad(of[system.model_columns], (0, len(columns)))
+        for of in (system.prior_precision, system.prior_gradient)
     )
-    gradient = np.concatenate([system.prior_gradient[system.model_columns], np.zeros(len(columns))])
     weighted = known * weight[:, None]
     inverse = pseudo_inverse(weighted.T @ known + np.diag(precision))
     slope = weighted.T @ system.residual + gradient
@@ -242,7 +242,7 @@ def _scanned(
     )
     cross = after(weighted[seen] * changing[:, None])
     slopes = after(weight[seen] * changing * system.residual[seen]) - cross @ inverse @ slope
-    free = after(weight[seen] * changing**2) - np.einsum("ti,ij,tj->t", cross, inverse, cross)
+    free = later - np.einsum("ti,ij,tj->t", cross, inverse, cross)
     gain = np.where(free > 0.0, slopes**2 / np.maximum(free, 1e-300), 0.0)
     inside = np.arange(gain.size)
     gain[(few < least) | (inside < least - 1) | (inside >= times.size - least)] = -1.0
