@@ -251,10 +251,9 @@ def _scanned(
         return None
     difference = -slopes[cut] / max(float(free[cut]), 1e-300)
     step = -inverse @ (slope + cross[cut] * difference)
-    differences = step[step.size - len(held) :]
     return cut, [
         n
-        for n, one in zip(held, differences.tolist(), strict=True)
+        for n, one in zip(held, step[step.size - len(held) :].tolist(), strict=True)
         if abs(one - difference) < abs(one)
     ]
 
