@@ -235,11 +235,12 @@ def _scanned(
         return np.cumsum(summed[::-1], axis=0)[::-1][1:]
 
     known_by = weight[seen] * changing**2
-    later, later_square = after(known_by), after(known_by**2)
-    few = np.minimum(
-        _windows(later, later_square),
-        _windows(known_by.sum() - later, (known_by**2).sum() - later_square),
+    later = after(known_by)
+    earlier, squares = (
+        np.cumsum(np.bincount(bins, of, times.size), dtype=np.float64)[:-1]
+        for of in (known_by, known_by**2)
     )
+    few = np.minimum(_windows(later, after(known_by**2)), _windows(earlier, squares))
     cross = after(weighted[seen] * changing[:, None])
     slopes = after(weight[seen] * changing * system.residual[seen]) - cross @ inverse @ slope
     free = later - np.einsum("ti,ij,tj->t", cross, inverse, cross)
