@@ -26,6 +26,8 @@ class Bench:
         self.input.mkdir()
         (folder / "limits.yaml").write_text("required: [r_phase_ohm]\n")
         monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "home"))
+        # a file as young as this one is not believed to be noted whole: nobody changes it here
+        monkeypatch.setattr("pipeline.io.storage.identity._instant_ns", lambda _: 0)
         self.record("ab.csv", 0.6)
         self.worked: list[str] = []
         whole = WorkerPool.map_tasks
