@@ -323,7 +323,7 @@ def _mechanical_cells(model: Model) -> int:
     wave then meets the cells at other phases, and all together show its shape.
     """
     highest = math.ceil(max(slow_orders(model.machine), default=1))
-    return min(max(4 * highest, 72), model.policy.validation.most_angle_cells) + 1
+    return min(max(4 * highest, 72) + 1, model.policy.validation.most_angle_cells)
 
 
 def _by_angle(
