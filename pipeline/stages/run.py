@@ -141,7 +141,7 @@ def _run(
     settings: RunSettings,
     registry: Registry | None,
     workers: WorkerPool,
-    surveyed: Callable[[], None] = lambda: None,
+    surveyed: Callable[[], object] = lambda: None,
 ) -> Outcome:
     """One run; `surveyed` is called when every file was looked at, before anything is written."""
     watch = Stopwatch()

@@ -55,22 +55,14 @@ def snapshot(folder: Path) -> Snapshot:
 
 @dataclass(slots=True)
 class Arrivals:
-    """Notices when a folder has changed since it was last taken up, and is at rest again.
+    """Notices when a folder has changed since it was last taken up, and how long it has rested."""
 
-    Parameters
-    ----------
-    settle_s
-        How long nothing may change before the folder counts as at rest [s].
-
-    """
-
-    settle_s: float
     taken: Snapshot | None = None
     _seen: Snapshot | None = None
     _since_s: float = field(default=0.0)
 
-    def due(self, now: Snapshot, time_s: float) -> bool:
-        """Whether the folder differs from what was taken up and has not changed for `settle_s`.
+    def rested_s(self, now: Snapshot, time_s: float) -> float:
+        """How long nothing has changed in a folder that differs from what was taken up [s].
 
         Parameters
         ----------
@@ -79,20 +71,12 @@ class Arrivals:
         time_s
             This moment, of a clock that never goes back [s].
 
+        Returns
+        -------
+        float
+            Minus infinity where nothing has come.
+
         """
         if now != self._seen:
             self._seen, self._since_s = now, time_s
-        return now != self.taken and time_s - self._since_s >= self.settle_s
-
-    def rest_s(self, time_s: float) -> float:
-        """How long what has come must still rest [s]; infinite where nothing has come.
-
-        Parameters
-        ----------
-        time_s
-            This moment, of the clock of `due` [s].
-
-        """
-        if self._seen == self.taken:
-            return math.inf
-        return self._since_s + self.settle_s - time_s
+        return -math.inf if now == self.taken else time_s - self._since_s

@@ -27,11 +27,11 @@ LOOK_EVERY_S = 0.1
 """Between two looks at the folder; ten times the time of a look where that is more."""
 RETRY_S = 30.0
 """Until a pass is tried again that failed for the machine's sake, such as a full disk."""
-Pass = Callable[[Callable[[], None]], Outcome]
+Pass = Callable[[Callable[[], object]], Outcome]
 
 
 class FolderChangedError(Exception):
-    """Files came or changed while the folder was surveyed: the pass begins again when it rests."""
+    """Files came or changed before the folder had rested: the pass begins again when it rests."""
 
 
 @dataclass
@@ -39,20 +39,18 @@ class Watch:
     """A folder that is watched; `perform` is one run of it, within the open `workers`.
 
     `perform` calls what it is given once it has looked at every file, before anything is written.
+    It begins to look as soon as nothing changes any more, and what it is given waits until the
+    folder has rested for `settle_s`.
     """
 
     settings: RunSettings
     perform: Pass
     workers: ExitStack
-    arrivals: Arrivals = field(init=False)
+    arrivals: Arrivals = field(default_factory=Arrivals)
     _inside: bool = False
     _ended: bool = False
     _shown: dict[str, str] = field(default_factory=dict)
     _errors: frozenset[str] = frozenset()
-
-    def __post_init__(self) -> None:
-        """Nothing is taken up yet."""
-        self.arrivals = Arrivals(self.settings.settle_s)
 
     def begin(self) -> Outcome:
         """The first line; what follows are the passes, until Ctrl-C or a termination signal."""
@@ -66,7 +64,7 @@ class Watch:
         try:
             if self._ended:
                 raise KeyboardInterrupt
-            outcome = self._pass(self._wait())
+            outcome = self._pass()
         except BaseException:
             self._ended = True
             self.workers.close()
@@ -81,25 +79,30 @@ class Watch:
         if self._inside and not ended:
             raise KeyboardInterrupt
 
-    def _wait(self) -> Snapshot:
+    def _at_rest(self, least_s: float, begun_with: Snapshot | None = None) -> Snapshot:
+        """The files, once some have come and none has changed for `least_s`.
+
+        Raises FolderChangedError where they are not those that a pass has begun with.
+        """
         folder = Path(self.settings.input)
-        with waiting(f"watching {self.settings.input}"):
-            while True:
-                begun_s = time.monotonic()
-                now = snapshot(folder)
-                ended_s = time.monotonic()
-                if self.arrivals.due(now, ended_s):
-                    return now
-                pause_s = max(LOOK_EVERY_S, 10.0 * (ended_s - begun_s))
-                time.sleep(max(0.0, min(pause_s, self.arrivals.rest_s(ended_s))))
-
-    def _pass(self, now: Snapshot) -> Outcome:
-        def surveyed() -> None:
-            if snapshot(Path(self.settings.input)) != now:
+        while True:
+            begun_s = time.monotonic()
+            now = snapshot(folder)
+            ended_s = time.monotonic()
+            if begun_with is not None and now != begun_with:
                 raise FolderChangedError
+            rested_s = self.arrivals.rested_s(now, ended_s)
+            if rested_s >= least_s:
+                return now
+            pause_s = max(LOOK_EVERY_S, 10.0 * (ended_s - begun_s))
+            time.sleep(min(pause_s, least_s - rested_s))
 
+    def _pass(self) -> Outcome:
+        settle_s = self.settings.settle_s
+        with waiting(f"watching {self.settings.input}"):
+            now = self._at_rest(min(LOOK_EVERY_S, settle_s))
         try:
-            outcome = self.perform(surveyed)
+            outcome = self.perform(lambda: self._at_rest(settle_s, now))
         except FolderChangedError:
             return Outcome()
         except MachineError as error:

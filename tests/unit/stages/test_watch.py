@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -22,26 +23,14 @@ from pipeline.stages.steps import motor, watch
 from pipeline.stages.steps.watch import Watch
 
 
-def test_a_folder_is_due_once_it_rests_and_not_again() -> None:
-    arrivals, first = Arrivals(2.0), frozenset({("a.csv", 1, 1, 1)})
+def test_a_folder_rests_from_its_last_change_on() -> None:
+    arrivals, first = Arrivals(), frozenset({("a.csv", 1, 1, 1)})
     grown = frozenset({("a.csv", 2, 2, 1)})
-    assert [arrivals.due(first, t) for t in (0.0, 1.9, 2.0)] == [False, False, True]
-    assert not arrivals.due(grown, 2.25), "it grows"
-    assert not arrivals.due(grown, 4.0)
-    assert arrivals.due(grown, 4.25)
+    assert [arrivals.rested_s(first, t) for t in (10.0, 11.5, 12.0)] == [0.0, 1.5, 2.0]
+    assert [arrivals.rested_s(grown, t) for t in (12.25, 14.0)] == [0.0, 1.75], "it grew"
     arrivals.taken = grown
-    assert not arrivals.due(grown, 100.0)
-    assert not arrivals.due(first, 100.0), "it changed just now"
-    assert arrivals.due(first, 102.0)
-
-
-def test_a_folder_is_looked_at_again_when_its_rest_is_over() -> None:
-    """Not a look later, which would be lost time for a station that waits."""
-    arrivals, first = Arrivals(2.0), frozenset({("a.csv", 1, 1, 1)})
-    assert not arrivals.due(first, 10.0)
-    assert arrivals.rest_s(10.5) == 1.5
-    arrivals.taken = first
-    assert arrivals.rest_s(11.0) == math.inf
+    assert arrivals.rested_s(grown, 100.0) == -math.inf, "it is taken up"
+    assert [arrivals.rested_s(first, t) for t in (100.0, 102.0)] == [0.0, 2.0], "it changed"
 
 
 @pytest.mark.parametrize("change", ["bigger", "same size", "replaced", "new", "gone", "sidecar"])
@@ -102,7 +91,7 @@ def test_a_pass_begins_again_where_files_came_while_it_looked(settings: RunSetti
     """Expected: the pass in which a file came writes nothing, and the next one sees both."""
     written: list[int] = []
 
-    def perform(surveyed: Callable[[], None]) -> Outcome:
+    def perform(surveyed: Callable[[], object]) -> Outcome:
         files = sorted(Path(settings.input).iterdir())
         if not written and len(files) == 1:
             (Path(settings.input) / "b.csv").write_text("half a fi")
@@ -122,10 +111,41 @@ def test_a_pass_begins_again_where_files_came_while_it_looked(settings: RunSetti
     assert third.errors == (), "it was told before"
 
 
+def test_a_file_that_comes_while_the_folder_settles_begins_the_pass_again(
+    settings: RunSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A look at the files begins before the folder has settled; nothing is written until it has."""
+    monkeypatch.setattr(watch, "LOOK_EVERY_S", 0.125)
+    settings.settle_s = 1.0
+    time_s, looked_at_s = [0.0], list[float]()
+    written: list[tuple[int, float]] = []
+    late = Path(settings.input) / "b.csv"
+
+    def sleep(pause_s: float) -> None:
+        time_s[0] += pause_s
+        if time_s[0] > 0.5 and not late.exists():
+            late.write_text("half a fi")
+
+    def perform(surveyed: Callable[[], object]) -> Outcome:
+        looked_at_s.append(time_s[0])
+        files = sorted(Path(settings.input).iterdir())
+        surveyed()
+        written.append((len(files), time_s[0]))
+        return Outcome()
+
+    clock = SimpleNamespace(sleep=sleep, monotonic=lambda: time_s[0])
+    monkeypatch.setattr(watch, "time", clock)
+    first = following(Watch(settings, perform, ExitStack()).begin())
+    assert written == [], "a file came"
+    following(first)
+    ((files, at_s),) = written
+    assert (files, looked_at_s, at_s) == (2, [0.125, 0.75], 1.625)
+
+
 def test_a_full_disk_is_told_and_tried_again(settings: RunSettings) -> None:
     passes: list[int] = []
 
-    def perform(surveyed: Callable[[], None]) -> Outcome:
+    def perform(surveyed: Callable[[], object]) -> Outcome:
         surveyed()
         passes.append(1)
         if len(passes) == 1:
@@ -143,7 +163,7 @@ def test_the_end_closes_the_workers(settings: RunSettings) -> None:
     workers = ExitStack()
     workers.callback(lambda: closed.append(True))
 
-    def perform(surveyed: Callable[[], None]) -> Outcome:
+    def perform(surveyed: Callable[[], object]) -> Outcome:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -155,7 +175,7 @@ def test_a_signal_between_two_passes_ends_the_next(settings: RunSettings) -> Non
     """While a line is printed nothing is torn: the watch ends where it would have gone on."""
     passes: list[int] = []
 
-    def perform(surveyed: Callable[[], None]) -> Outcome:
+    def perform(surveyed: Callable[[], object]) -> Outcome:
         passes.append(1)
         if len(passes) == 2:
             watching._signalled()
