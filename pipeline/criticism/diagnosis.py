@@ -42,6 +42,7 @@ from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of, frame_notes
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
 from pipeline.criticism.selection.stepwise import LadderStep, loss_without
+from pipeline.criticism.selection.transducer_place import place_notes
 from pipeline.criticism.validation.signature import signature
 from pipeline.physics.notation import number_text
 from pipeline.records.capture import Campaign
@@ -194,6 +195,7 @@ def _notes(
         *against_stated(last, ladder.held[-1]),
         *hum_notes(ladder.base.hum),
         *frame_notes(last.segments),
+        *place_notes(last.segments),
         *end.notes,
         *_warmth(end),
         *_together(together, ladder.steps[-1].added),

@@ -211,6 +211,9 @@ class ShaftState:
     held
         Whether a dynamometer holds the far end; else the recorded torque is the load of the far
         end.
+    stator
+        Whether a transducer reads the stator's reaction torque, which nothing behind the rotor is
+        in.
     alone
         Whether nothing records the torque that the shaft passes on, so that its load is a drag.
     finer
@@ -225,6 +228,7 @@ class ShaftState:
     """
 
     held: bool = False
+    stator: bool = False
     alone: bool = False
     finer: int = 1
     run: NDArray[np.int64] | None = None

@@ -72,6 +72,7 @@ class Control(NamedTuple):
     dyno_nms: float
     dyno_nm: float
     in_coupling: bool
+    at_stator: bool
     gain_a: float
     gain_b: float
     gain_c: float
@@ -522,7 +523,8 @@ def shaft_torque(y: Array, want: Array, volt: Pair, warm: Pair, c: Control, p: P
 
     A dynamometer that holds the far end has it in the coupling; one whose speed gives way shows the
     reaction torque of its stator, which the inertia of its rotor is in. With `in_coupling` the
-    transducer is between the two parts whatever the far end does.
+    transducer is between the two parts whatever the far end does; with `at_stator` it holds the
+    motor's stator, and the inertia of no rotor is in it.
 
     Parameters
     ----------
@@ -543,6 +545,8 @@ def shaft_torque(y: Array, want: Array, volt: Pair, warm: Pair, c: Control, p: P
     """
     mechanics = (y[2], y[3], y[4], y[5])
     field = windings((y[0], y[1]), mechanics, volt, warm, p)
+    if c.at_stator:
+        return net_torque(mechanics, y[6], field, warm, p), field[2]
     if c.in_coupling and p.two_mass:
         return coupling(y[2] - y[4], y[3] - y[5], p), field[2]
     if not c.held_speed or c.dyno_nms > 0.0:

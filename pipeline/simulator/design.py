@@ -184,7 +184,8 @@ class Bench:
     cubic, and `torque_hysteresis_rel` more on the way down than up. `dyno_hz` is the bandwidth of
     the dynamometer's speed loop, whose transducer then shows the reaction torque of its stator; 0
     holds the shaft's far end at its speed, with the transducer in the coupling. With
-    `torque_in_coupling` the transducer of every log stands between the two masses.
+    `torque_in_coupling` the transducer of every log stands between the two masses, with
+    `torque_at_stator` it holds the motor's stator.
     """
 
     station: str = "sim-1"
@@ -223,6 +224,7 @@ class Bench:
     torque_hysteresis_rel: float = 0.0
     dyno_hz: float = 0.0
     torque_in_coupling: bool = False
+    torque_at_stator: bool = False
     instruments: Instruments | None = None
 
     def drawn(self, rng: np.random.Generator) -> Instruments:

@@ -126,6 +126,7 @@ def control(
         "held_speed": True,
         **dict.fromkeys(("kp_speed", "ki_speed", "dyno_nms", "dyno_nm"), 0.0),
         "in_coupling": session.bench.torque_in_coupling,
+        "at_stator": session.bench.torque_at_stator,
         "ambient": m.ambient_degc,
         "temp_winding": warm[0],
         "temp_magnet": warm[1],

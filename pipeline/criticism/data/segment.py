@@ -65,6 +65,9 @@ class Instrument:
     frame
         How long before the middle of its hold the rotor frame of a logged voltage vector is taken
         [holds]: 0 or 0.5.
+    stator
+        Whether its transducer holds the motor's stator and so reads the reaction torque, which no
+        inertia of the rotor is in; else it is in the shaft.
 
     """
 
@@ -73,6 +76,7 @@ class Instrument:
     meter: str = "gain_voltage"
     ammeter: str = "gain_current"
     frame: float = 0.0
+    stator: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,7 +132,8 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
     Returns
     -------
     array [n·m, N·m]
-        −f J twist″ = −(torque_s2 T″ − angle_s2 J0 θ⁗); 0 of a shaft that no inverter drives.
+        −f J twist″ = −(torque_s2 T″ − angle_s2 J0 θ⁗); 0 of a shaft that no inverter drives,
+        and at the stator.
 
     Notes
     -----
@@ -140,7 +141,7 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
     has, and that at the right inertia.
 
     """
-    if not x.inverter:
+    if not x.inverter or x.shaft.stator:
         return np.zeros(x.theta_rad.size)
     torque, theta = _sampled(x)
     bend = np.diff(theta, 2) / x.ts_s**2
@@ -257,14 +258,15 @@ def far_drag(x: Operating, share: float, between: float, twist_rad: Callable[[],
     Returns
     -------
     array [n·m, N·m]
-        −share J θ″ or −share J twist″; 0 of a shaft that no inverter drives.
+        −share J θ″ or −share J twist″; 0 of a shaft that no inverter drives,
+        and at the stator.
 
     Notes
     -----
     The twist is not smoothed before it is differenced: the weak form's windows do that.
 
     """
-    if not x.inverter:
+    if not x.inverter or x.shaft.stator:
         return np.zeros(np.shape(x.omega_rad_s))
     far = share * x.base["j_kgm2"]
     rigid = not x.shaft.alone and (between > 0.0 or (between == 0.0 and x.shaft.held))

@@ -41,7 +41,7 @@ def discriminate(fit: Fit, effect: Effect) -> Discrimination | None:
 
 
 def full_logs(fit: Fit, model: Model) -> list[FullLog]:
-    """Every log of a fit at full rate.
+    """Every log of a fit at full rate, but those of a transducer that knows nothing of the shaft.
 
     Parameters
     ----------
@@ -51,7 +51,8 @@ def full_logs(fit: Fit, model: Model) -> list[FullLog]:
         The model of the logs: that of the fit, or one with fewer effects.
 
     """
-    return [_whole(s, model, fit) for s in fit.segments if s.unthinned.columns is not None]
+    logs = [s for s in fit.segments if s.unthinned.columns is not None]
+    return [_whole(s, model, fit) for s in logs if not s.instrument.stator]
 
 
 def _whole(segment: Segment, model: Model, fit: Fit) -> FullLog:

@@ -15,6 +15,7 @@ from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.score_test import candidates, score_all, widened
 from pipeline.criticism.selection.stepwise import begin_from
+from pipeline.criticism.selection.transducer_place import at_better_place
 
 _FRAME = (
     "held voltages of {} captures are taken in the rotor frame of the sampling instant, which "
@@ -127,7 +128,8 @@ def fit_of(segments: Sequence[Segment], model: Model) -> BaseFit:
     near = rough_fit(segments, model.without(*shaped))
     hum = hum_of(segments, near.model, near.values)
     humming = with_hum(segments, hum, near.model, near.values)
-    system = in_better_frame(first_fit(replace(near, segments=humming)), near)
+    near = replace(near, segments=humming)
+    system = at_better_place(in_better_frame(first_fit(near), near))
     if not shaped:
         return BaseFit(system, hum)
     while shaped:

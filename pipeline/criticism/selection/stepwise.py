@@ -43,6 +43,7 @@ from pipeline.criticism.selection.score_test import (
     score_all,
     widened,
 )
+from pipeline.criticism.selection.transducer_place import at_better_place
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +121,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         if chosen is None:
             break
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
-        fit = reconsidered(_backward(chosen, base)).fit
+        fit = at_better_place(reconsidered(_backward(chosen, base))).fit
         found = fit.model.effects[base:]
         fit = replace(fit, tolerance=tolerances(fit, found))
         if found and (found[-1].hook in ("sensor", "drop") or found[-1].discriminator is not None):

@@ -159,7 +159,7 @@ def unexplained_acceleration(
 def sensed_torque(
     segment: Segment, x: Operating, torque_nm: Array, model: Model, values: Values
 ) -> Array:
-    """Torque that a transducer between shaft and load shows.
+    """Torque that a transducer between shaft and load shows, or one that holds the stator.
 
     Parameters
     ----------
@@ -178,13 +178,15 @@ def sensed_torque(
 
     Notes
     -----
-    T − J d²θ/dt², with its errors and its gain.
+    T − J d²θ/dt² in the shaft, T at the stator, with its errors and its gain.
 
     """
     finer = x.theta_rad.size // segment.size
     torque = averaged(torque_nm, finer) if finer > 1 else torque_nm
-    acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
-    return as_sensed(torque - values["j_kgm2"] * acceleration, model, values)
+    if not segment.instrument.stator:
+        acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
+        torque = torque - values["j_kgm2"] * acceleration
+    return as_sensed(torque, model, values)
 
 
 def as_sensed(torque_nm: Array, model: Model, values: Values) -> Array:

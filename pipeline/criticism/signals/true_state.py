@@ -199,6 +199,7 @@ def operating(
         ),
         shaft=ShaftState(
             held=segment.test == "torque_map",
+            stator=segment.instrument.stator,
             alone="torque_shaft_nm" not in signals,
             finer=theta.size // segment.size,
             run=_run(signals, theta.size),

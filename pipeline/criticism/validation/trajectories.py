@@ -135,7 +135,8 @@ def batch_of(segment: Segment, model: Model, values: Values) -> Batch | None:
     chosen = np.searchsorted(weak.starts, starts)
     allowed = reading_error(segment, model, values)[:, chosen, 0] / gain
     currents = equation_of(segment).use.currents
-    shaft = not currents or "torque_shaft_nm" in segment.channels
+    load = "torque_shaft_nm" in segment.channels and not segment.instrument.stator
+    shaft = load or not currents
     short = replace(segment, recorded=cut, weak=None)
     return Batch(short, model, values, starts.size, length, pad, shaft, allowed)
 

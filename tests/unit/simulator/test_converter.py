@@ -38,6 +38,7 @@ def loop(motor, period_s=5e-5, **change):
         "dyno_nms": 0.0,
         "dyno_nm": 0.0,
         "in_coupling": False,
+        "at_stator": False,
         **{f"gain_{x}": 1.0 for x in "abc"},
         **{f"offset_{x}": 0.0 for x in "abc"},
         "lsb_current": 0.0,
