@@ -54,7 +54,9 @@ EXPERIMENT = (
 HOLD = "assumed:voltage_hold"
 D_FLUX = "d flux"
 LATE = "acceleration"
-CANDIDATES = ("zero", LATE, "turned", "cross flux")
+NEAR_ZERO = "drop near zero current"
+"""What a compensation of dead time leaves: it takes the sense of a current from a sample."""
+CANDIDATES = ("zero", LATE, "turned", "cross flux", NEAR_ZERO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,6 +218,7 @@ def _integrals(
         "warm_speed_k_rad_s": weak.integral(speed * rotor),
         "inductive": weak.integral(i_q, 1),
         "drop": weak.integral(i_q / np.sqrt(modulus**2 + noise**2 + 1e-300)),
+        NEAR_ZERO: weak.integral(noise * i_q / (modulus**2 + noise**2 + 1e-300)),
         "cross flux": weak.integral(speed * i_q**2),
         LATE: weak.integral(theta, 2),
     }
@@ -406,9 +409,11 @@ def _moved(
 
     On a free shaft q current goes with acceleration, and R with the lateness of the voltage: what
     little parts them is also what any other error of the model follows. So a nuisance counts
-    unless it is what it stands for: a lateness that drives have, Ke tau dw/dt and p tau w v_d.
+    unless it is what it stands for: a lateness that drives have, Ke tau dw/dt and p tau w v_d. A
+    voltage that is measured has none.
     """
-    latest = policy().inverter.latest_periods * rows.period_s
+    commanded = any(c.meta.voltage_kind != "measured" for c in rows.captures)
+    latest = policy().inverter.latest_periods * rows.period_s * commanded
     most = {LATE: abs(float(values[0])) * latest, "turned": pole_pairs * latest}
     moved = np.zeros(len(GIVES))
     for name, size in zip(chosen, values[len(values) - len(chosen) :], strict=True):
