@@ -314,12 +314,14 @@ def _untested_form(
 ) -> tuple[Contribution, ...]:
     """Allowance for drag of another form where no speed is left over to test it.
 
-    A share of the drag at the slowest speed may be Stribeck's, iron's or windage.
+    A share of the drag at the slowest speed may be Stribeck's, iron's or windage. Two speeds in
+    either sense test the zero of the transducer, and no form.
     """
     turning = [p for p in points if not p.standing]
-    if len({p.group for p in turning}) > 3:
-        return ()
     speeds = _column(turning, "omega_mech_rad_s")
+    faster = np.diff(np.log(np.sort(np.abs(speeds)))) > policy().points.same_speed
+    if np.count_nonzero(faster) >= 2:
+        return ()
     drag = _drag(points, model)[0]
     slowest = float(np.min(np.abs(speeds)))
     torque = policy().torque_map.untested_form_share * abs(drag[0] + drag[1] * slowest)

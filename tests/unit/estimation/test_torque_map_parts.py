@@ -161,6 +161,18 @@ def test_drag_needs_three_speeds_and_both_senses() -> None:
     assert wet.u == pytest.approx(dry.u / 40.0)
 
 
+def test_the_form_of_drag_is_tested_by_a_third_speed_and_not_by_the_other_sense() -> None:
+    for speeds, tested in (
+        ((-90.0, -40.0, 40.0, 90.0), False),
+        ((-90.0, -40.2, 40.0, 90.3), False),
+        ((-90.0, -40.0, 40.0, 60.0, 90.0), True),
+        ((-90.0, 40.0, 60.0), True),
+    ):
+        points, offsets = speeds_of(speeds)
+        model = regression([f"speed {g}" for g in range(len(speeds))], offsets)
+        assert (_untested_form(points, model, 0) == ()) is tested, speeds
+
+
 @pytest.mark.parametrize(("sigmas", "fine"), [(3.9, True), (4.1, False)])
 def test_a_negative_drag_beyond_four_u_is_none(sigmas: float, fine: bool) -> None:
     speeds = (-100.0, 40.0, 100.0)
