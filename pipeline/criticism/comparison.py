@@ -77,31 +77,31 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         return _nothing(campaign, model, names, *idle(campaign, machine))
     base = fit_of(cut_segments, stated_model)
     system = linear_system(trimmed(base.system, names).fit)
-    held = leave_out(system)
-    simulated = simulate(system, held)
-    maps = all_maps(system, held.or_fit(system))
-    parameters = reported_parameters(system, held)
-    bare = _bare(model_of(model.bare(), machine), parameters, system, held)
+    held_out = leave_out(system)
+    simulated = simulate(system, held_out)
+    maps = all_maps(system, held_out.or_fit(system))
+    parameters = reported_parameters(system, held_out)
+    requested = _before_effects(model_of(model.bare(), machine), parameters, system, held_out)
     return Comparison(
         campaign.motor_id,
         model.name,
         names,
         parameters,
-        (*_errors(system, held), *run_errors(simulated)),
-        held.total if bare is None else bare.whole,
+        (*_errors(system, held_out), *run_errors(simulated)),
+        held_out.total if requested is None else requested.whole,
         tuple(_where(maps)),
-        (*_notes(campaign, system, held), *hum_notes(base.hum), *held.notes),
+        (*_notes(campaign, system, held_out), *hum_notes(base.hum), *held_out.notes),
         maps,
-        () if bare is None else bare.moved,
-        None if bare is None else bare.total,
-        tuple(traces(system.fit, simulated, None if bare is None else bare.fitted)),
-        reported_combinations(system, held),
-        () if bare is None else bare.errors,
-        () if bare is None else bare.added,
+        () if requested is None else requested.moved,
+        None if requested is None else requested.total,
+        tuple(traces(system.fit, simulated, None if requested is None else requested.fitted)),
+        reported_combinations(system, held_out),
+        () if requested is None else requested.errors,
+        () if requested is None else requested.added,
     )
 
 
-def _notes(campaign: Campaign, system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
+def _notes(campaign: Campaign, system: LinearSystem, held_out: HeldOut) -> tuple[str, ...]:
     """What a reader should know of the captures of a comparison."""
     machine = system.fit.machine
     return (
@@ -109,7 +109,7 @@ def _notes(campaign: Campaign, system: LinearSystem, held: HeldOut) -> tuple[str
         *loaded(campaign, machine),
         *mixed(campaign, machine),
         *at_ambient(system.fit),
-        *against_stated(system, held),
+        *against_stated(system, held_out),
     )
 
 
@@ -121,7 +121,7 @@ def _nothing(
 
 
 @dataclass(frozen=True, slots=True)
-class _Bare:
+class _BeforeEffects:
     """A model less what was added: its held-out error beside that of the `whole` one, over the
     same rows; parameters of both; its errors; the fitted model; what it is without.
     """
@@ -134,9 +134,9 @@ class _Bare:
     added: tuple[str, ...]
 
 
-def _bare(
-    without: Model, after: dict[str, ModelParameter], whole: LinearSystem, whole_held: HeldOut
-) -> _Bare | None:
+def _before_effects(
+    without: Model, after: dict[str, ModelParameter], whole: LinearSystem, full_held_out: HeldOut
+) -> _BeforeEffects | None:
     """The model without the effects that were asked for; None where none were.
 
     Both fits share the noise floor of the fuller one and hold out the same rows, so that their
@@ -145,14 +145,21 @@ def _bare(
     names = {effect.name for effect in without.effects}
     if names == {effect.name for effect in whole.fit.model.effects}:
         return None
-    gone = [e.name for e in whole.fit.model.effects if e.name not in names]
-    base = replace(whole.fit.without(*gone), model=without, tolerance=())
+    removed = [e.name for e in whole.fit.model.effects if e.name not in names]
+    base = replace(whole.fit.without(*removed), model=without, tolerance=())
     system = linear_system(gauss_newton(base).fit)
-    held = leave_out(system)
-    moved = _moves(reported_parameters(system, held), after)
-    less, full = in_common((system, whole), (held, whole_held))
-    errors = tuple(_errors(system, held))
-    return _Bare(less.total, full.total, moved, errors, Before(system, held), tuple(gone))
+    held_out = leave_out(system)
+    moved = _moves(reported_parameters(system, held_out), after)
+    without_errors, all_errors = in_common((system, whole), (held_out, full_held_out))
+    errors = tuple(_errors(system, held_out))
+    return _BeforeEffects(
+        without_errors.total,
+        all_errors.total,
+        moved,
+        errors,
+        Before(system, held_out),
+        tuple(removed),
+    )
 
 
 def _moves(
@@ -160,22 +167,22 @@ def _moves(
 ) -> tuple[Move, ...]:
     """The parameters that are determined both before and after."""
     return tuple(
-        Move(name, one.unit, one.value, one.u, there.value, there.u)
-        for name, one, there in ((name, one, after[name]) for name, one in before.items())
+        Move(name, one.unit, one.value, one.u, later.value, later.u)
+        for name, one, later in ((name, one, after[name]) for name, one in before.items())
         if one.value is not None and one.u is not None
-        if there.value is not None and there.u is not None
+        if later.value is not None and later.u is not None
     )
 
 
-def _errors(system: LinearSystem, held: HeldOut) -> Iterator[SignalError]:
+def _errors(system: LinearSystem, held_out: HeldOut) -> Iterator[SignalError]:
     """Errors of every capture's equations in plain windows."""
     for place, (number, channel, order) in enumerate(system.labels):
         in_group = system.group == place
         if order != 0 or not in_group.any():
             continue
-        out = bool(np.isfinite(held.residual[in_group]).all())
-        residual = held.residual[in_group] if out else system.residual[in_group]
-        unit, expected = system.unit[in_group], (system.noise_ratio * held.widening)[in_group]
+        out = bool(np.isfinite(held_out.residual[in_group]).all())
+        residual = held_out.residual[in_group] if out else system.residual[in_group]
+        unit, expected = system.unit[in_group], (system.noise_ratio * held_out.widening)[in_group]
         segment = system.segments[number]
         signal = reported_signal(segment, channel)
         yield SignalError(

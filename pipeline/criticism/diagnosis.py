@@ -156,22 +156,22 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
     ladder, last = end.ladder, end.ladder.steps[-1].system
     offered = candidates(library, last.fit.model)
     ranking = _ranking(ladder, offered, library)
-    unseen = unexcited(campaign, library, ladder.steps[-1], offered)
-    verdict = _verdict_of(end, unseen)
-    together = reported_combinations(last, ladder.held[-1])
+    not_excited = unexcited(campaign, library, ladder.steps[-1], offered)
+    verdict = _verdict_of(end, not_excited)
+    combinations = reported_combinations(last, ladder.held_out[-1])
     diagnosis = Diagnosis(
         campaign.motor_id,
         model.name,
         verdict,
         ladder.steps[-1].added,
         ranking,
-        _records(ladder.steps, ladder.held),
+        _records(ladder.steps, ladder.held_out),
         end.sketch if verdict == "unknown" else None,
         _as_reported(last, end.remainders),
-        _notes(campaign, machine, end, verdict, together),
-        unseen,
+        _notes(campaign, machine, end, verdict, combinations),
+        not_excited,
         model.effects,
-        together,
+        combinations,
         policy_digest(last.policy),
     )
     return diagnosis, ladder.base
@@ -182,7 +182,7 @@ def _notes(
     machine: Machine,
     end: SearchResult,
     verdict: Verdict,
-    together: Sequence[KnownCombination],
+    combinations: Sequence[KnownCombination],
 ) -> tuple[str, ...]:
     """What a reader of the diagnosis has to know as well: data, frame, hum, combinations."""
     ladder, last = end.ladder, end.ladder.steps[-1].system
@@ -192,51 +192,55 @@ def _notes(
         *loaded(campaign, machine),
         *mixed(campaign, machine),
         *at_ambient(last.fit),
-        *against_stated(last, ladder.held[-1]),
+        *against_stated(last, ladder.held_out[-1]),
         *hum_notes(ladder.base.hum),
         *frame_notes(last.segments),
         *place_notes(last.segments),
         *end.notes,
-        *_warmth(end),
-        *_together(together, ladder.steps[-1].added),
+        *_temperature_note(end),
+        *_combination_notes(combinations, ladder.steps[-1].added),
         *(note for note in ladder.cut.values() if note),
-        *_rests_on_one(ladder),
+        *_one_capture_notes(ladder),
         *((_STATELESS,) if stateless else ()),
         *(unrecorded(campaign, last.segments) if verdict == "unknown" else ()),
-        *ladder.held[0].notes,
+        *ladder.held_out[0].notes,
     )
 
 
-def _records(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> tuple[StepRecord, ...]:
+def _records(steps: Sequence[LadderStep], held_out: Sequence[HeldOut]) -> tuple[StepRecord, ...]:
     """The steps for people, each with the signature of what came with it."""
-    records = [step_record(step, one) for step, one in zip(steps, held, strict=True)]
+    records = [step_record(step, errors) for step, errors in zip(steps, held_out, strict=True)]
     signatures = [
         signature(after.system, sorted({*after.added} - {*before.added}), record.maps)
         for (before, after), record in zip(pairwise(steps), records[1:], strict=True)
     ]
     return tuple(
-        replace(one, signature=shown)
-        for one, shown in zip(records, [None, *signatures], strict=True)
+        replace(record, signature=shown)
+        for record, shown in zip(records, [None, *signatures], strict=True)
     )
 
 
-def _rests_on_one(ladder: Ladder) -> Iterator[str]:
+def _one_capture_notes(ladder: Ladder) -> Iterator[str]:
     """Notes of the effects that one capture alone supports, of those that others could show."""
     for n in range(1, len(ladder.steps)):
         step = ladder.steps[n]
-        capture = rests_on((ladder.steps[n - 1].system, step.system), ladder.held[n - 1 : n + 1])
+        capture = rests_on(
+            (ladder.steps[n - 1].system, step.system), ladder.held_out[n - 1 : n + 1]
+        )
         name = step.fit.model.effects[-1].name
         if capture is not None and name in ladder.steps[-1].added:
             yield _ALONE.format(name, capture)
 
 
-def _together(known: Sequence[KnownCombination], added: Sequence[str]) -> tuple[str, ...]:
+def _combination_notes(
+    combinations: Sequence[KnownCombination], added: Sequence[str]
+) -> tuple[str, ...]:
     """Notes of the sizes of effects that are known over another constant alone."""
     return tuple(
-        f"{one.expression} = {number_text(one.value, one.u, one.unit)}, of which these captures "
-        "tell no more"
-        for one in known
-        if any(name.split(".")[0] in added for name in one.of)
+        f"{known.expression} = {number_text(known.value, known.u, known.unit)}, of which these "
+        "captures tell no more"
+        for known in combinations
+        if any(name.split(".")[0] in added for name in known.of)
     )
 
 
@@ -250,9 +254,14 @@ def _as_reported(system: LinearSystem, remainders: Sequence[Remainder]) -> tuple
         for s in system.segments
         for channel in s.channels
     }
-    small = [one for one in over_floor(system) if one not in remainders]
-    reported = (*remainders, *(replace(one, matters=False) for one in small))
-    return tuple(replace(one, signal=names[one.capture, one.signal]) for one in reported)
+    small = [
+        over_its_floor for over_its_floor in over_floor(system) if over_its_floor not in remainders
+    ]
+    reported = (*remainders, *(replace(remainder, matters=False) for remainder in small))
+    return tuple(
+        replace(remainder, signal=names[remainder.capture, remainder.signal])
+        for remainder in reported
+    )
 
 
 def _enough(cut_segments: Sequence[Segment]) -> bool:
@@ -283,39 +292,39 @@ def _insufficient(
     )
 
 
-def _warmth(end: SearchResult) -> tuple[str, ...]:
+def _temperature_note(end: SearchResult) -> tuple[str, ...]:
     """A note where a constant that differs between captures is as another temperature makes it:
     where none of those with the other value records the temperature that the constant goes with.
     """
-    change, last = end.change, end.ladder.steps[-1].system
-    if not isinstance(change, Change) or end.freed or not change.value:
+    changed, last = end.change, end.ladder.steps[-1].system
+    if not isinstance(changed, Change) or end.freed or not changed.value:
         return ()
     for effect in last.fit.model.effects:
         signals = [name for name in effect.signals if name in UNLOGGED]
         parameters = effect.parameters_of(last.fit.machine)
         goes_with = {"drop": "r_ohm", "flux": "psi_wb"}.get(effect.hook)
-        if len(parameters) != 1 or not signals or goes_with != change.name:
+        if len(parameters) != 1 or not signals or goes_with != changed.name:
             continue
         logged = {s.capture for s in last.segments if signals[0] in s.recorded}
         coefficient = last.fit.values[f"{effect.name}.{parameters[0].name}"]
-        if logged.intersection(change.captures) or not coefficient:
+        if logged.intersection(changed.captures) or not coefficient:
             continue
-        warmer = change.difference / change.value / coefficient
-        if abs(warmer) < 5.0 * last.policy.priors.unlogged_k:
+        difference_k = changed.difference / changed.value / coefficient
+        if abs(difference_k) < 5.0 * last.policy.priors.unlogged_k:
             return (
-                f"that is as {warmer:+.0f} K of {signals[0]} would make it, which none of these "
-                "captures records: log it",
+                f"that is as {difference_k:+.0f} K of {signals[0]} would make it, which none of "
+                "these captures records: log it",
             )
     return ()
 
 
-def _verdict_of(end: SearchResult, unseen: Sequence[Unexcited]) -> Verdict:
-    """What the end of the ladder says of the model; `unseen` are effects that nothing shows."""
+def _verdict_of(end: SearchResult, not_excited: Sequence[Unexcited]) -> Verdict:
+    """The verdict at the end of the ladder; `not_excited` are effects that nothing shows."""
     if end.freed or (end.remainders and not end.ladder.explains(end.remainders)):
         return "unknown"
     if end.ladder.steps[-1].added:
         return "missing"
-    return "insufficient" if unseen else "adequate"
+    return "insufficient" if not_excited else "adequate"
 
 
 def _ranking(
@@ -323,33 +332,35 @@ def _ranking(
 ) -> tuple[RankedEffect, ...]:
     """Found effects in the order found, then the others by their score on the last step."""
     last = ladder.steps[-1]
-    ranked = [_found(ladder, last.fit.effect(name), offered, library) for name in last.added]
-    others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]
+    ranked = [_ranked_added(ladder, last.fit.effect(name), offered, library) for name in last.added]
+    not_added = [
+        _ranked_candidate(s) for s in last.scores if s.candidate.effect.name not in last.added
+    ]
     reasons = {name: _AGAINST if note else _UNSUPPORTED for name, note in ladder.cut.items()}
-    others = [replace(r, shortfall=reasons.get(r.effect, r.shortfall)) for r in others]
-    return tuple(ranked + sorted(others, key=lambda r: (-r.score, r.effect)))
+    not_added = [replace(r, shortfall=reasons.get(r.effect, r.shortfall)) for r in not_added]
+    return tuple(ranked + sorted(not_added, key=lambda r: (-r.score, r.effect)))
 
 
-def _found(
+def _ranked_added(
     ladder: Ladder, effect: Effect, offered: Sequence[Candidate], library: Mapping[str, Effect]
 ) -> RankedEffect:
     """An effect that the ladder found: its evidence, its alternatives and what would part them."""
     steps, wide = ladder.steps, ladder.steps[-1].system
-    over = _passed_over(steps, effect.name, steps[-1].added)
-    confused = alternatives_to(effect.name, wide, offered, over)
+    passed_over = _passed_over(steps, effect.name, steps[-1].added)
+    alternatives = alternatives_to(effect.name, wide, offered, passed_over)
     dof = effect.dof(wide.fit.machine)
     loss = _loss(wide, effect, dof)
-    parameters = _parameters(steps[-1], effect, ladder.held[-1])
+    parameters = _parameters(steps[-1], effect, ladder.held_out[-1])
     return RankedEffect(
         effect.name,
         loss - dof * math.log(wide.size),
-        _drop(steps, ladder.held, effect.name),
+        _share_of_fall(steps, ladder.held_out, effect.name),
         _p_value(loss, dof),
-        confused,
+        alternatives,
         f"{effect.words}; {effect.signature}",
-        experiment_for(effect, confused, library),
+        experiment_for(effect, alternatives, library),
         parameters,
-        separations(effect, wide, offered, remedies(effect, confused, library)),
+        separations(effect, wide, offered, remedies(effect, alternatives, library)),
         headline=headline(effect, parameters),
     )
 
@@ -383,18 +394,18 @@ def _passed_over(
     )
 
 
-def _drop(steps: Sequence[LadderStep], held: Sequence[HeldOut], name: str) -> float:
+def _share_of_fall(steps: Sequence[LadderStep], held_out: Sequence[HeldOut], name: str) -> float:
     """Share of the removable held-out error, from first to last step, that went where an effect
     was added; 0 where the error grew there.
     """
-    totals = [math.log(max(h.total, 1e-300)) for h in held]
-    place = next(n for n, step in enumerate(steps) if name in step.added)
-    if place == 0 or totals[0] <= totals[-1]:
+    totals = [math.log(max(errors.total, 1e-300)) for errors in held_out]
+    number = next(n for n, step in enumerate(steps) if name in step.added)
+    if number == 0 or totals[0] <= totals[-1]:
         return 0.0
-    return max((totals[place - 1] - totals[place]) / (totals[0] - totals[-1]), 0.0)
+    return max((totals[number - 1] - totals[number]) / (totals[0] - totals[-1]), 0.0)
 
 
-def _other(score: Score) -> RankedEffect:
+def _ranked_candidate(score: Score) -> RankedEffect:
     effect = score.candidate.effect
     dof = max(len(score.step), 1)
     return RankedEffect(
@@ -415,8 +426,12 @@ def _p_value(fall: float, dof: int) -> float:
     return float(gammaincc(dof / 2.0, max(fall, 0.0) / 2.0))
 
 
-def _parameters(step: LadderStep, effect: Effect, held: HeldOut) -> dict[str, ReportedParameter]:
-    reported, start = parameters_of(step, held), f"{effect.name}."
+def _parameters(
+    step: LadderStep, effect: Effect, held_out: HeldOut
+) -> dict[str, ReportedParameter]:
+    reported, start = parameters_of(step, held_out), f"{effect.name}."
     return {
-        name.removeprefix(start): one for name, one in reported.items() if name.startswith(start)
+        name.removeprefix(start): parameter
+        for name, parameter in reported.items()
+        if name.startswith(start)
     }

@@ -19,43 +19,43 @@ from pipeline.physics.glossary import unit_of
 from pipeline.records.diagnosis import ReportedParameter, StepError, StepRecord
 
 
-def step_record(step: LadderStep, held: HeldOut) -> StepRecord:
+def step_record(step: LadderStep, held_out: HeldOut) -> StepRecord:
     """One step of the search as a record for people.
 
     Parameters
     ----------
     step
         The step.
-    held
+    held_out
         Its held-out residual; maps over an angle are those of the fit.
 
     """
-    residual = held.or_fit(step.system)
+    residual = held_out.or_fit(step.system)
     policy = step.fit.policy.validation
     errors = window_errors(step.system, residual)
     flat = (speed_current_map(one, policy) for one in errors)
     return StepRecord(
         step.added,
-        held.total,
+        held_out.total,
         signal_errors(step.system, residual),
         {
             one.signal: StepError(_rms(one.error), _rms(one.sigma), unit_of(one.signal))
             for one in errors
         },
-        parameters_of(step, held),
+        parameters_of(step, held_out),
         (*(one for one in flat if one is not None), *angle_maps(step.fit)),
         histograms(errors, policy),
     )
 
 
-def parameters_of(step: LadderStep, held: HeldOut) -> dict[str, ReportedParameter]:
+def parameters_of(step: LadderStep, held_out: HeldOut) -> dict[str, ReportedParameter]:
     """The parameters of every effect on a step.
 
     Parameters
     ----------
     step
         The step.
-    held
+    held_out
         Its held-out residual.
 
     Returns
@@ -64,10 +64,13 @@ def parameters_of(step: LadderStep, held: HeldOut) -> dict[str, ReportedParamete
         By full name; without a value where not determined.
 
     """
-    reported = reported_parameters(step.system, held)
+    reported = reported_parameters(step.system, held_out)
     parameters = step.fit.model.parameters()
-    found = ((name, reported[name]) for name in parameters)
-    return {name: ReportedParameter(one.value, one.u, one.unit) for name, one in found}
+    selected = ((name, reported[name]) for name in parameters)
+    return {
+        name: ReportedParameter(parameter.value, parameter.u, parameter.unit)
+        for name, parameter in selected
+    }
 
 
 def _rms(values: np.ndarray) -> float:

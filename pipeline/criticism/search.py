@@ -69,7 +69,7 @@ class Ladder:
         Where the search began.
     steps
         The steps.
-    held
+    held_out
         Their held-out errors.
     remainders
         What is over the floor at their end.
@@ -81,7 +81,7 @@ class Ladder:
 
     base: BaseFit
     steps: tuple[LadderStep, ...]
-    held: list[HeldOut]
+    held_out: list[HeldOut]
     remainders: tuple[Remainder, ...]
     cut: dict[str, str]
 
@@ -94,7 +94,7 @@ class Ladder:
             What is over the floor and may have another cause.
 
         """
-        return explained(self.steps, self.held, remainders)
+        return explained(self.steps, self.held_out, remainders)
 
     def large(self) -> tuple[Remainder, ...]:
         """What is left and large for the machine as a whole.
@@ -105,7 +105,7 @@ class Ladder:
         """
         system = self.steps[-1].system
         large = remainder(system, large=True)
-        return tuple(one for one in self.remainders if one in large)
+        return tuple(left_over for left_over in self.remainders if left_over in large)
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,16 +188,16 @@ def search_ladder(
         sketch, gain = _sketched(ladder, remainders, name, in_parts=True)
         remainders = remainders if sketch else ladder.large()
         notes += [_WITHIN] if sketch else []
-    change = None if ladder.explains(remainders) else _changed(ladder.steps[-1].system)
+    change = None if ladder.explains(remainders) else _changed_constant(ladder.steps[-1].system)
     if change is not None and (sketch is None or change.gain > gain):
         notes, sketch, remainders = [change.words], None, remainders or ladder.remainders
     else:
-        notes, change = notes + _beside(sketch, remainders), None
-    freed = tuple(_freed(ladder.steps[-1].system))
+        notes, change = notes + _other_side_note(sketch, remainders), None
+    freed = tuple(_freed_share_notes(ladder.steps[-1].system))
     return SearchResult(ladder, remainders, sketch, change, freed, (*freed, *notes))
 
 
-def _freed(system: LinearSystem) -> Iterator[str]:
+def _freed_share_notes(system: LinearSystem) -> Iterator[str]:
     """What the shares that a fit left free say, in a sentence, where they are large enough to
     matter.
     """
@@ -220,7 +220,7 @@ def _freed(system: LinearSystem) -> Iterator[str]:
         )
 
 
-def _changed(system: LinearSystem) -> Change | ChangeWithin | None:
+def _changed_constant(system: LinearSystem) -> Change | ChangeWithin | None:
     """The constant that changed between captures, or within one where that explains more."""
     between, within = changed_constant(system), changed_within(system)
     if between is None or within is None:
@@ -228,9 +228,9 @@ def _changed(system: LinearSystem) -> Change | ChangeWithin | None:
     return within if within.gain > between.gain else between
 
 
-def _beside(sketch: UnknownStructure | None, remainders: Sequence[Remainder]) -> list[str]:
+def _other_side_note(sketch: UnknownStructure | None, remainders: Sequence[Remainder]) -> list[str]:
     """A note where the signal that misses by most is not the sketched one's, winding or shaft."""
-    worst = max(remainders, key=lambda one: one.chi2_per_n, default=None)
+    worst = max(remainders, key=lambda left_over: left_over.chi2_per_n, default=None)
     if sketch is None or worst is None or (worst.signal in SHAFT) == (sketch.signal in SHAFT):
         return []
     floors = math.sqrt(worst.chi2_per_n)
@@ -249,15 +249,15 @@ def _by_orders(
     """
     ladder = search_again()
     unobserved = orders_left(ladder.steps[-1].system)
-    whole = tuple(order for order in unobserved if isinstance(order, int))
-    if whole:
-        ladder = search_again(*whole)
+    integers = tuple(order for order in unobserved if isinstance(order, int))
+    if integers:
+        ladder = search_again(*integers)
     sketch, gain = _sketched(ladder, ladder.remainders, name)
-    if len(unobserved) > len(whole) and not ladder.explains(ladder.remainders):
-        between = search_again(*unobserved)
-        other, more = _sketched(between, between.remainders, name)
-        if other is not None and (sketch is None or more > gain):
-            return between, other, more
+    if len(unobserved) > len(integers) and not ladder.explains(ladder.remainders):
+        with_fractions = search_again(*unobserved)
+        wider_sketch, wider_gain = _sketched(with_fractions, with_fractions.remainders, name)
+        if wider_sketch is not None and (sketch is None or wider_gain > gain):
+            return with_fractions, wider_sketch, wider_gain
     return ladder, sketch, gain
 
 
@@ -285,16 +285,18 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
 
     """
     searched = search(start.system.fit, library)
-    alone = [leave_out(step.system) for step in searched]
-    steps, unconfirmed = _confirmed(searched, alone)
-    kept, remainders = truncated(steps, in_common([r.system for r in steps], alone[: len(steps)]))
-    held = in_common([r.system for r in kept], alone[: len(kept)])
-    cut = {step.added[-1]: contradiction(step) for step in steps[len(kept) :]}
-    return Ladder(start, kept, list(held), remainders, cut | unconfirmed)
+    own_rows = [leave_out(step.system) for step in searched]
+    steps, unconfirmed = _confirmed(searched, own_rows)
+    supported, remainders = truncated(
+        steps, in_common([r.system for r in steps], own_rows[: len(steps)])
+    )
+    held_out = in_common([r.system for r in supported], own_rows[: len(supported)])
+    cut = {step.added[-1]: contradiction(step) for step in steps[len(supported) :]}
+    return Ladder(start, supported, list(held_out), remainders, cut | unconfirmed)
 
 
 def _confirmed(
-    steps: Sequence[LadderStep], alone: Sequence[HeldOut]
+    steps: Sequence[LadderStep], own_rows: Sequence[HeldOut]
 ) -> tuple[tuple[LadderStep, ...], dict[str, str]]:
     """The steps without trailing ones that one capture alone supports, of which others show that
     it is not there; and a note of each that goes.
@@ -302,8 +304,8 @@ def _confirmed(
     count, notes = len(steps), {}
     while count > 1:
         systems = [step.system for step in steps[count - 2 : count]]
-        held = in_common(systems, alone[count - 2 : count])
-        capture = rests_on(systems, held)
+        held_out = in_common(systems, own_rows[count - 2 : count])
+        capture = rests_on(systems, held_out)
         if capture is None:
             break
         name = systems[-1].fit.model.effects[-1].name
@@ -323,10 +325,10 @@ def _sketched(
     if ladder.explains(remainders):
         return None, 0.0
     last = ladder.steps[-1].system
-    worst = sorted(remainders, key=lambda one: -one.chi2_per_n)
-    signals = list(dict.fromkeys(one.signal for one in worst))
-    other = [one for one in signals if (one in SHAFT) != (signals[0] in SHAFT)]
+    worst = sorted(remainders, key=lambda left_over: -left_over.chi2_per_n)
+    signals = list(dict.fromkeys(left_over.signal for left_over in worst))
+    other_side = [signal for signal in signals if (signal in SHAFT) != (signals[0] in SHAFT)]
     sketch, gain = unknown_structure(last, signals, name, in_parts)
-    if sketch is None and other:
-        return unknown_structure(last, other, name, in_parts)
+    if sketch is None and other_side:
+        return unknown_structure(last, other_side, name, in_parts)
     return sketch, gain

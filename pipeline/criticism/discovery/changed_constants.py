@@ -135,14 +135,14 @@ def _cuts(system: LinearSystem, place: int) -> Iterator[tuple[tuple[str, ...], A
     """Captures [the fewer] in which a constant may be another, and their rows [R]."""
     paths = np.array([segment.capture for segment in system.segments])[system.segment]
     column = system.matrix[:, place]
-    held = [name for name in dict.fromkeys(paths.tolist()) if np.any(column[paths == name])]
-    if len(held) < system.policy.discovery.change_captures:
+    captures = [name for name in dict.fromkeys(paths.tolist()) if np.any(column[paths == name])]
+    if len(captures) < system.policy.discovery.change_captures:
         return
-    columns = np.stack([np.where(paths == name, column, 0.0) for name in held[1:]], axis=1)
+    columns = np.stack([np.where(paths == name, column, 0.0) for name in captures[1:]], axis=1)
     differences = End.of(system, columns).step[system.model_column_count :]
     order = np.argsort(np.concatenate([[0.0], differences]), kind="stable")
-    for cut in range(1, len(held)):
-        both = [tuple(held[n] for n in part) for part in (order[:cut], order[cut:])]
+    for cut in range(1, len(captures)):
+        both = [tuple(captures[n] for n in part) for part in (order[:cut], order[cut:])]
         fewer = min(both, key=len)
         yield tuple(sorted(fewer)), np.isin(paths, fewer).astype(float)
 

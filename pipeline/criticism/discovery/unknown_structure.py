@@ -150,10 +150,12 @@ def _ranked(
         if gain <= 0.0:
             continue
         ridge = np.concatenate([np.zeros(model_columns.size), _ridge(wide.columns, live, fit)])
-        held = reference - _held_out(wide, chosen, after, ridge, units)
-        if held > least:
+        held_out = reference - _held_out(wide, chosen, after, ridge, units)
+        if held_out > least:
             ranked.append(
-                RankedInput(port, gain, held, after, _ridge_step(wide, chosen, after, ridge), place)
+                RankedInput(
+                    port, gain, held_out, after, _ridge_step(wide, chosen, after, ridge), place
+                )
             )
     return sorted(ranked, key=lambda f: (-f.held, f.port.effect.name)), wide
 

@@ -10,7 +10,7 @@ _STRAIGHT = 1e-4
 """Bend below which the series serves: its next term is 1e-9, where the closed form loses digits."""
 
 
-def _lost(square: Any, bend: float) -> Any:
+def _saturated(square: Any, bend: float) -> Any:
     """∫ s³/(1 + bend s²) ds over s², a series where the bend is next to nothing."""
     if bend < _STRAIGHT:
         return square * square * (0.25 - bend / 6 * square)
@@ -22,11 +22,11 @@ def _coenergy(x: Operating, q: Values) -> Any:
     d, s = x.id_a / size, x.iq_a / size
     lost = 0.0
     if q["q_fall"]:
-        lost = lost + x.base["lq_h"] * q["q_fall"] * _lost(s * s, q["q_bend"])
+        lost = lost + x.base["lq_h"] * q["q_fall"] * _saturated(s * s, q["q_bend"])
     if q["d_odd"]:
         lost = lost + x.base["ld_h"] * q["d_odd"] / 3 * d * d * d
     if q["d_fall"]:
-        lost = lost + x.base["ld_h"] * q["d_fall"] * _lost(d * d, q["d_bend"])
+        lost = lost + x.base["ld_h"] * q["d_fall"] * _saturated(d * d, q["d_bend"])
     return -(size**2) * lost
 
 

@@ -105,5 +105,5 @@ def _leaves(value: float, change: float, limits: tuple[float, float] | None) -> 
     if limits is None:
         return False
     low, high = limits
-    near = _AT * abs(value)
-    return (change < 0.0 and value <= low + near) or (change > 0.0 and value >= high - near)
+    margin = _AT * abs(value)
+    return (change < 0.0 and value <= low + margin) or (change > 0.0 and value >= high - margin)

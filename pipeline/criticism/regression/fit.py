@@ -96,8 +96,8 @@ class Fit:
             Names of effects.
 
         """
-        gone = tuple(f"{name}." for name in names)
-        values = {name: v for name, v in self.values.items() if not name.startswith(gone)}
+        prefixes = tuple(f"{name}." for name in names)
+        values = {name: v for name, v in self.values.items() if not name.startswith(prefixes)}
         return replace(self, model=self.model.without(*names), values=values)
 
     def at(self, values: Values) -> Fit:
@@ -131,8 +131,8 @@ class Fit:
     @property
     def floors(self) -> tuple[Floor, ...]:
         """What the rows of every segment are held against."""
-        both = zip(self.sigma, self.tolerance or [None] * len(self.sigma), strict=True)
-        return tuple(Floor(sigma, self.near, tolerance) for sigma, tolerance in both)
+        pairs = zip(self.sigma, self.tolerance or [None] * len(self.sigma), strict=True)
+        return tuple(Floor(sigma, self.near, tolerance) for sigma, tolerance in pairs)
 
 
 def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Array, ...]:
@@ -171,9 +171,9 @@ def floors_grown(fit: Fit) -> tuple[Array, ...]:
         Ratios [1]; the same noise is added in both, and 1 where there are no currents.
 
     """
-    what = fit.model, fit.values
-    each = [(*what, sigma, _SEED + n) for n, sigma in enumerate(fit.sigma)]
-    return on_each(_floor_grown, fit.segments, each)
+    arguments = fit.model, fit.values
+    by_segment = [(*arguments, sigma, _SEED + n) for n, sigma in enumerate(fit.sigma)]
+    return on_each(_floor_grown, fit.segments, by_segment)
 
 
 def _floor_grown(segment: Segment, model: Model, values: Values, sigma: Array, seed: int) -> Array:
@@ -199,5 +199,5 @@ def tolerances(fit: Fit, added: Sequence[Effect]) -> tuple[Array, ...]:
         One a segment, in the scale of `sigma`.
 
     """
-    what = fit.model, fit.values, tuple(added)
-    return on_each(form_tolerance, fit.segments, [what] * len(fit.segments))
+    arguments = fit.model, fit.values, tuple(added)
+    return on_each(form_tolerance, fit.segments, [arguments] * len(fit.segments))

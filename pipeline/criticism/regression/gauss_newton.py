@@ -119,7 +119,7 @@ def _damped(system: LinearSystem) -> Best:
     normal_equations = replace(
         system, prior_precision=system.prior_precision + ridge
     ).normal_equations()
-    return lambda live: normal_equations.along(live).best()
+    return lambda live: normal_equations.restricted_to(live).best()
 
 
 def _ridge(fit: Fit, columns: Sequence[Column]) -> Array:
@@ -166,10 +166,10 @@ def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = 
 
     """
     values = {**start_values(model, model.machine), **(known or {})}
-    few = tuple(sparse(s, model.policy.cutting.rough_windows) for s in segments)
-    rough = tuple(rough_floor(segment, model, values) for segment in few)
-    near = gauss_newton(Fit(few, _pinned(model), values, rough, values)).fit
-    return replace(near, model=model, segments=tuple(segments))
+    thinned = tuple(sparse(s, model.policy.cutting.rough_windows) for s in segments)
+    rough = tuple(rough_floor(segment, model, values) for segment in thinned)
+    fitted = gauss_newton(Fit(thinned, _pinned(model), values, rough, values)).fit
+    return replace(fitted, model=model, segments=tuple(segments))
 
 
 def _pinned(model: Model) -> Model:
@@ -183,12 +183,12 @@ def _pinned(model: Model) -> Model:
     return replace(model, machine=replace(model.machine, stated=stated))
 
 
-def first_fit(near: Fit) -> LinearSystem:
+def first_fit(rough: Fit) -> LinearSystem:
     """Fits a model from a rough fit, every equation weighted by its noise floor.
 
     Parameters
     ----------
-    near
+    rough
         The rough fit.
 
     Returns
@@ -198,13 +198,13 @@ def first_fit(near: Fit) -> LinearSystem:
         the winding first, and those of the shaft first.
 
     """
-    floor = floors(near.segments, near.model, near.values)
-    begun = replace(near, model=_pinned(near.model), sigma=floor, near=near.values)
+    floor = floors(rough.segments, rough.model, rough.values)
+    begun = replace(rough, model=_pinned(rough.model), sigma=floor, near=rough.values)
     ends = [gauss_newton(begun)]
-    if len(near.segments) <= near.policy.fit.short_programme:
+    if len(rough.segments) <= rough.policy.fit.short_programme:
         ends += [_one_side_first(begun, side) for side in _SIDES]
     end = min(ends, key=lambda end: end.deviance)
-    return gauss_newton(replace(end.fit, model=near.model)) if near.model.stated() else end
+    return gauss_newton(replace(end.fit, model=rough.model)) if rough.model.stated() else end
 
 
 def rough_anew(fit: Fit) -> Fit:
@@ -231,20 +231,20 @@ def rough_anew(fit: Fit) -> Fit:
     """
     model = fit.model
     shapes = [name for name, (_, p) in model.parameters().items() if not p.amplitude]
-    near = rough_fit(fit.segments, model, {name: fit.values[name] for name in shapes})
-    return replace(near, tolerance=fit.tolerance)
+    refitted = rough_fit(fit.segments, model, {name: fit.values[name] for name in shapes})
+    return replace(refitted, tolerance=fit.tolerance)
 
 
-def _one_side_first(near: Fit, side: tuple[str, ...]) -> LinearSystem:
+def _one_side_first(rough: Fit, side: tuple[str, ...]) -> LinearSystem:
     """A fit that begins with the equations of some signals alone.
 
     In a short programme few captures hold the equations together. Where these contradict each
     other, which of them is given up must not depend on where the fit began.
     """
-    silent = near.policy.fit.silent
-    alone = tuple(
+    silent = rough.policy.fit.silent
+    sigma_of_side = tuple(
         np.where([channel in side for channel, _ in row_index(segment)[3]], sigma, silent * sigma)
-        for segment, sigma in zip(near.segments, near.sigma, strict=True)
+        for segment, sigma in zip(rough.segments, rough.sigma, strict=True)
     )
-    begun = gauss_newton(replace(near, sigma=alone)).fit
-    return gauss_newton(replace(begun, sigma=near.sigma))
+    begun = gauss_newton(replace(rough, sigma=sigma_of_side)).fit
+    return gauss_newton(replace(begun, sigma=rough.sigma))

@@ -84,10 +84,10 @@ class HeldOut:
 
         """
         predicted = np.isfinite(residual)
-        made = cls(residual, 0.0, steps, widening)
-        errors = made.or_fit(system) / (system.noise_ratio * widening)
+        errors_of_rows = cls(residual, 0.0, steps, widening)
+        errors = errors_of_rows.or_fit(system) / (system.noise_ratio * widening)
         errors = errors[predicted] if predicted.any() else errors
-        return replace(made, total=math.sqrt(float((errors**2).mean())))
+        return replace(errors_of_rows, total=math.sqrt(float((errors**2).mean())))
 
     def or_fit(self, system: LinearSystem) -> Array:
         """The held-out residual, that of the fit where a capture is always in it.
@@ -137,21 +137,21 @@ def leave_out(system: LinearSystem) -> HeldOut:
     unit = _units(system)
     weighted = matrix * weight[:, None]
     normal = weighted.T @ matrix + np.diag(system.prior_precision[places])
-    plain = matrix.T @ matrix + np.diag(system.prior_precision[places])
+    unweighted = matrix.T @ matrix + np.diag(system.prior_precision[places])
     slope = weighted.T @ system.residual + system.prior_gradient[places]
     spread = np.diag(np.linalg.pinv(unit_diagonal(normal), hermitian=True))
     residual, widening = np.full(system.size, np.nan), np.ones(system.size)
     steps: dict[int, Array] = {}
     for number in sorted(set(unit.tolist())):
         in_unit = unit == number
-        less = normal - weighted[in_unit].T @ matrix[in_unit]
+        remaining = normal - weighted[in_unit].T @ matrix[in_unit]
         scale = np.sqrt(np.diag(normal))
-        inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        inverse = np.linalg.pinv(remaining / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         grown = np.diag(inverse) / np.maximum(spread, 1e-300)
         if (
             not np.isfinite(grown).all()
             or grown.max() > policy.carried_growth
-            or _lost(less, normal, policy)
+            or _loses_information(remaining, normal, policy)
         ):
             continue
         step = (
@@ -159,21 +159,21 @@ def leave_out(system: LinearSystem) -> HeldOut:
         )
         residual[in_unit] = system.residual[in_unit] + matrix[in_unit] @ step
         rows = matrix[in_unit] / system.noise_ratio[in_unit, None]
-        covariance = pseudo_inverse(plain - matrix[in_unit].T @ matrix[in_unit])
+        covariance = pseudo_inverse(unweighted - matrix[in_unit].T @ matrix[in_unit])
         widening[in_unit] = np.sqrt(1.0 + np.einsum("rk,kl,rl->r", rows, covariance, rows))
         steps[number] = np.zeros(own_size)
         steps[number][places] = step
     return HeldOut.of(system, residual, steps, widening)
 
 
-def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
+def in_common(fits: Sequence[LinearSystem], held_out: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
     """The same rows held out of several fits to the same captures, so that their errors compare.
 
     Parameters
     ----------
     fits
         Systems around the fits, of the same rows.
-    held
+    held_out
         What each of them predicts.
 
     Returns
@@ -188,22 +188,24 @@ def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[He
     that leaves more open: of each row the surest prediction's widening counts in all.
 
     """
-    shared = np.all([np.isfinite(one.residual) for one in held], axis=0)
-    widening = np.minimum.reduce([np.broadcast_to(one.widening, shared.shape) for one in held])
+    shared = np.all([np.isfinite(errors.residual) for errors in held_out], axis=0)
+    widening = np.minimum.reduce(
+        [np.broadcast_to(errors.widening, shared.shape) for errors in held_out]
+    )
     return tuple(
-        HeldOut.of(system, np.where(shared, one.residual, np.nan), one.steps, widening)
-        for system, one in zip(fits, held, strict=True)
+        HeldOut.of(system, np.where(shared, errors.residual, np.nan), errors.steps, widening)
+        for system, errors in zip(fits, held_out, strict=True)
     )
 
 
-def predicted_chi2(system: LinearSystem, held: HeldOut) -> Array:
+def predicted_chi2(system: LinearSystem, held_out: HeldOut) -> Array:
     """χ²/n of every group as predicted without its capture.
 
     Parameters
     ----------
     system
         The fit.
-    held
+    held_out
         Its held-out residual.
 
     Returns
@@ -212,7 +214,7 @@ def predicted_chi2(system: LinearSystem, held: HeldOut) -> Array:
         Over what may be expected of a prediction; captures that are always in the fit as fitted.
 
     """
-    return system.reduced_chi2(held.or_fit(system) / held.widening)
+    return system.reduced_chi2(held_out.or_fit(system) / held_out.widening)
 
 
 def _units(system: LinearSystem) -> NDArray[np.int64]:
@@ -232,9 +234,9 @@ def _units(system: LinearSystem) -> NDArray[np.int64]:
     return units
 
 
-def _lost(less: Array, normal: Array, policy: Goodness) -> bool:
+def _loses_information(remaining: Array, normal: Array, policy: Goodness) -> bool:
     """Whether some constant keeps next to nothing of its information."""
-    return bool((np.diag(less) < policy.lost_share * np.diag(normal)).any())
+    return bool((np.diag(remaining) < policy.lost_share * np.diag(normal)).any())
 
 
 def signal_errors(system: LinearSystem, residual: Array) -> dict[str, float]:
@@ -254,11 +256,11 @@ def signal_errors(system: LinearSystem, residual: Array) -> dict[str, float]:
 
     """
     errors: dict[str, float] = {}
-    plain = (
+    signals = (
         reported_signal(system.segments[number], channel) if order == 0 else ""
         for number, channel, order in system.labels
     )
-    names = np.array(list(plain))
+    names = np.array(list(signals))
     of_row = names[system.group]
     for name in sorted({n for n in names.tolist() if n}):
         in_signal = (of_row == name) & np.isfinite(residual)
@@ -311,7 +313,7 @@ def over_floor(system: LinearSystem, large: bool = False) -> tuple[Remainder, ..
 
     """
     exceeding = []
-    for place, chi2_per_n, size, matters in _over(system, system.noise_ratio, large):
+    for place, chi2_per_n, size, matters in _groups_over_floor(system, system.noise_ratio, large):
         number, channel, order = system.labels[place]
         capture = system.segments[number].capture
         exceeding.append(Remainder(capture, channel, order, chi2_per_n, size, matters))
@@ -338,8 +340,8 @@ def significant_groups(system: LinearSystem) -> NDArray[np.bool_]:
     """
     significant = np.zeros(len(system.labels), dtype=bool)
     as_whitened = np.ones(system.size)
-    over = _over(system, as_whitened)
-    significant[[place for place, _, _, matters in over if matters]] = True
+    groups_over = _groups_over_floor(system, as_whitened)
+    significant[[place for place, _, _, matters in groups_over if matters]] = True
     return significant
 
 
@@ -369,13 +371,13 @@ def form_error_factor(system: LinearSystem) -> Array:
     JCGM 100:2008 (GUM), 4.3.7. doi:10.59161/JCGM100-2008E
 
     """
-    own = system.model_columns.size
+    size = system.model_columns.size
     weight = system.weights(system.reduced_chi2(system.residual))
-    factor = np.zeros((own, own))
-    for place, _, _, matters in _over(system, system.noise_ratio):
+    factor = np.zeros((size, size))
+    for place, _, _, matters in _groups_over_floor(system, system.noise_ratio):
         if matters:
             in_group = system.group == place
-            rows = system.matrix[in_group, :own] * weight[in_group, None]
+            rows = system.matrix[in_group, :size] * weight[in_group, None]
             excess = float(
                 (system.residual[in_group] ** 2 - system.noise_ratio[in_group] ** 2).sum()
             )
@@ -384,7 +386,7 @@ def form_error_factor(system: LinearSystem) -> Array:
     return factor
 
 
-def _over(
+def _groups_over_floor(
     system: LinearSystem, noise_ratio: Array, large: bool = False
 ) -> Iterator[tuple[int, float, float, bool]]:
     """Place, χ²/n, size of every group over its floor, and whether that size matters; the floor is

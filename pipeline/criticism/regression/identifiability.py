@@ -135,14 +135,14 @@ class Known:
         return np.array([self.u_of(one) for one in np.eye(self.rest.size)])
 
 
-def known(system: LinearSystem, held: HeldOut) -> Known:
+def known(system: LinearSystem, held_out: HeldOut) -> Known:
     """What a system and its priors say of a fit's own parameters.
 
     Parameters
     ----------
     system
         Around a fit, with columns that were made at it.
-    held
+    held_out
         What leaving out captures moves.
 
     Returns
@@ -151,17 +151,19 @@ def known(system: LinearSystem, held: HeldOut) -> Known:
         Without anything that only keeps steps short, or where the fit began.
 
     """
-    return known_by(system, held, _sizes(system.fit, system.columns[: system.model_columns.size]))
+    return known_by(
+        system, held_out, _sizes(system.fit, system.columns[: system.model_columns.size])
+    )
 
 
-def known_by(system: LinearSystem, held: HeldOut, sizes: Array) -> Known:
+def known_by(system: LinearSystem, held_out: HeldOut, sizes: Array) -> Known:
     """What a system and its priors determine, with the sizes of the parameters given.
 
     Parameters
     ----------
     system
         The fit.
-    held
+    held_out
         Its held-out residual.
     sizes
         Magnitudes [own] at which the parameters matter.
@@ -172,24 +174,24 @@ def known_by(system: LinearSystem, held: HeldOut, sizes: Array) -> Known:
         Without errors of the model's form.
 
     """
-    own = system.model_columns.size
+    count = system.model_columns.size
     weight = system.weights(system.reduced_chi2(system.residual))
-    matrix, prior_precision = system.matrix[:, :own], system.prior_precision[:own]
+    matrix, prior_precision = system.matrix[:, :count], system.prior_precision[:count]
     rows = np.vstack([matrix * np.sqrt(weight)[:, None], np.diag(np.sqrt(prior_precision))])
     identified = identify(rows, sizes)
-    slope = matrix.T @ (weight * system.residual) + system.prior_gradient[:own]
-    steps = np.array(list(held.steps.values())).reshape(-1, own)
+    slope = matrix.T @ (weight * system.residual) + system.prior_gradient[:count]
+    steps = np.array(list(held_out.steps.values())).reshape(-1, count)
     return Known(
-        identified, steps, -identified.root @ (identified.root.T @ slope), np.zeros((own, own))
+        identified, steps, -identified.root @ (identified.root.T @ slope), np.zeros((count, count))
     )
 
 
-def _reported(system: LinearSystem, held: HeldOut) -> Known:
+def _reported(system: LinearSystem, held_out: HeldOut) -> Known:
     """The same with what a form that misses the recordings may do to the numbers."""
-    return replace(known(system, held), form_error_factor=form_error_factor(system))
+    return replace(known(system, held_out), form_error_factor=form_error_factor(system))
 
 
-def significantly_nonzero(system: LinearSystem, held: HeldOut, least: float) -> set[str]:
+def significantly_nonzero(system: LinearSystem, held_out: HeldOut, least: float) -> set[str]:
     """Parameters that differ significantly from zero, as they are or over a constant that no motor
     is without.
 
@@ -197,7 +199,7 @@ def significantly_nonzero(system: LinearSystem, held: HeldOut, least: float) -> 
     ----------
     system
         Around a fit.
-    held
+    held_out
         What leaving out captures moves.
     least
         Standard uncertainties that they must be away from zero.
@@ -210,7 +212,7 @@ def significantly_nonzero(system: LinearSystem, held: HeldOut, least: float) -> 
         with most of the inertia behind it.
 
     """
-    fit = known(system, held)
+    fit = known(system, held_out)
     values = np.array([system.fit.values[c.name] for c in system.columns])
     inward = _inward(system)
     below = [n for n, c in enumerate(system.columns) if c.name in POSITIVE and values[n] > 0.0]
@@ -218,7 +220,9 @@ def significantly_nonzero(system: LinearSystem, held: HeldOut, least: float) -> 
     for n, column in enumerate(system.columns):
         gradient = _towards_zero(fit.identified.covariance, values, n, inward)
         if fit.excludes_zero(values[n], gradient, least) or any(
-            fit.excludes_zero(values[n] / values[j], _over(values, n, j), least, bent=True)
+            fit.excludes_zero(
+                values[n] / values[j], _ratio_gradient(values, n, j), least, bent=True
+            )
             for j in below
             if j != n
         ):
@@ -227,7 +231,7 @@ def significantly_nonzero(system: LinearSystem, held: HeldOut, least: float) -> 
 
 
 def together_nonzero(
-    system: LinearSystem, held: HeldOut, names: Sequence[str], least: float
+    system: LinearSystem, held_out: HeldOut, names: Sequence[str], least: float
 ) -> bool:
     """Whether parameters that are each unsure are not all zero.
 
@@ -235,7 +239,7 @@ def together_nonzero(
     ----------
     system
         Around a fit.
-    held
+    held_out
         What leaving out captures moves.
     names
         The parameters.
@@ -254,11 +258,11 @@ def together_nonzero(
     Hotelling, Ann. Math. Statist. 2(3), 1931, 360, doi:10.1214/aoms/1177732979.
 
     """
-    fit = known(system, held)
-    own = [column.name for column in system.columns[: system.model_columns.size]]
-    at = np.array([own.index(name) for name in names if name in own], dtype=int)
-    values = np.array([system.fit.values[own[n]] for n in at])
-    gradient = np.zeros(len(own))
+    fit = known(system, held_out)
+    parameters = [column.name for column in system.columns[: system.model_columns.size]]
+    at = np.array([parameters.index(name) for name in names if name in parameters], dtype=int)
+    values = np.array([system.fit.values[parameters[n]] for n in at])
+    gradient = np.zeros(len(parameters))
     covariance = fit.identified.covariance[np.ix_(at, at)]
     gradient[at] = np.linalg.pinv(covariance, hermitian=True) @ values
     least = math.sqrt(2.0 * gammaincinv(0.5 * max(at.size, 1), gammainc(0.5, 0.5 * least**2)))
@@ -288,13 +292,13 @@ def _towards_zero(covariance: Array, values: Array, one: int, inward: Array) -> 
     for other in np.flatnonzero(inward):
         variance = covariance[other, other]
         if other != one and variance > 0.0:
-            along = covariance[one, other] / variance
-            if along * inward[other] * values[one] > 0.0:
-                gradient[other] -= along
+            slope = covariance[one, other] / variance
+            if slope * inward[other] * values[one] > 0.0:
+                gradient[other] -= slope
     return gradient
 
 
-def _over(values: Array, one: int, other: int) -> Array:
+def _ratio_gradient(values: Array, one: int, other: int) -> Array:
     """Gradient [own] of a parameter over another one."""
     gradient = np.zeros(values.size)
     gradient[one] = 1.0 / values[other]
@@ -302,14 +306,14 @@ def _over(values: Array, one: int, other: int) -> Array:
     return gradient
 
 
-def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelParameter]:
+def reported_parameters(system: LinearSystem, held_out: HeldOut) -> dict[str, ModelParameter]:
     """Every physical parameter of a fit; without a value where it is not determined.
 
     Parameters
     ----------
     system
         The fit.
-    held
+    held_out
         Its held-out residual.
 
     Returns
@@ -325,32 +329,32 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
     chosen of a few, or given by a discriminator, is determined where an amplitude of its effect is.
 
     """
-    fit, model, own = system.fit, system.fit.model, system.columns[: system.model_columns.size]
-    sure_of = _reported(system, held)
-    u = dict(zip((c.name for c in own), sure_of.u.tolist(), strict=True))
+    fit, model, columns = system.fit, system.fit.model, system.columns[: system.model_columns.size]
+    sure_of = _reported(system, held_out)
+    u = dict(zip((c.name for c in columns), sure_of.u.tolist(), strict=True))
     beyond = _beyond(sure_of.u, _of_handbooks(system), fit.policy.fit)
     determined = within(beyond, sure_of.identified.sizes)
     sized = dict(zip(u, determined.tolist(), strict=True))
     limits, stated = limits_of(model), model.stated()
-    made = {}
+    reported = {}
     for c in BASE:
         if c.name in PHYSICAL:
             value = fit.values[c.name]
             if c.name in OF_PAIRS and not model.machine.pairs_known:
-                made[c.name] = _parameter(value, u[c.name], c.unit, False, False)
+                reported[c.name] = _parameter(value, u[c.name], c.unit, False, False)
                 continue
             bound = _at(value, limits.get(c.name))
             sure = c.name not in POSITIVE or (REACH * u[c.name] < value and not bound)
-            made[c.name] = _parameter(value, u[c.name], c.unit, sized[c.name] and sure, bound)
-            made[c.name] = _or_stated(made[c.name], stated.get(c.name))
+            reported[c.name] = _parameter(value, u[c.name], c.unit, sized[c.name] and sure, bound)
+            reported[c.name] = _or_stated(reported[c.name], stated.get(c.name))
     for name, (effect, p) in model.parameters().items():
         value = fit.values[name]
         beside = [f"{effect.name}.{q.name}" for q in effect.parameters_of(model.machine)]
         sure = sized[name] if name in u else any(sized.get(one, False) for one in beside)
         bound = not p.choice and _at(value, limits[name])
-        made[name] = _parameter(value, u.get(name, p.u), p.unit, sure, bound)
-        made[name] = _or_stated(made[name], stated.get(name))
-    return made
+        reported[name] = _parameter(value, u.get(name, p.u), p.unit, sure, bound)
+        reported[name] = _or_stated(reported[name], stated.get(name))
+    return reported
 
 
 def _or_stated(parameter: ModelParameter, stated: tuple[float, float] | None) -> ModelParameter:
@@ -360,14 +364,14 @@ def _or_stated(parameter: ModelParameter, stated: tuple[float, float] | None) ->
     return replace(parameter, value=stated[0], u=stated[1], stated=True)
 
 
-def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
+def against_stated(system: LinearSystem, held_out: HeldOut) -> tuple[str, ...]:
     """Notes of the stated constants that the captures, fitted without them, contradict.
 
     Parameters
     ----------
     system
         The fit.
-    held
+    held_out
         Its held-out residual.
 
     Returns
@@ -381,20 +385,20 @@ def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
     θ/u² − s/u_s², and data and prior agree within √(u_data² + u_s²).
 
     """
-    stated, sure_of, notes = system.fit.model.stated(), _reported(system, held), []
+    stated, sure_of, notes = system.fit.model.stated(), _reported(system, held_out), []
     policy = system.policy.fit
     for place, column in enumerate(system.columns[: system.model_columns.size]):
         if column.name not in stated:
             continue
         (stated_value, u_stated), u = stated[column.name], float(sure_of.u[place])
-        alone = _beyond(np.array([u]), np.array([u_stated**-2.0]), policy)[0]
-        if not math.isfinite(alone):
+        u_alone = _beyond(np.array([u]), np.array([u_stated**-2.0]), policy)[0]
+        if not math.isfinite(u_alone):
             continue
-        value = alone**2 * (system.fit.values[column.name] / u**2 - stated_value / u_stated**2)
-        if abs(value - stated_value) > policy.contradicted * math.hypot(alone, u_stated):
+        value = u_alone**2 * (system.fit.values[column.name] / u**2 - stated_value / u_stated**2)
+        if abs(value - stated_value) > policy.contradicted * math.hypot(u_alone, u_stated):
             notes.append(
                 f"{column.name} is stated as {stated_value:.4g} ± {u_stated:.2g}, and without that "
-                f"these captures say {value:.4g} ± {alone:.2g}"
+                f"these captures say {value:.4g} ± {u_alone:.2g}"
             )
     return tuple(notes)
 
@@ -403,9 +407,9 @@ def _of_handbooks(system: LinearSystem) -> Array:
     """Prior precision [own] of the parameters, without what full logs of these captures give."""
     known = system.fit.model.parameters()
     logged = {name for name, (_, p) in known.items() if p.amplitude and p.u > 0.0}
-    own = system.columns[: system.model_columns.size]
-    elsewhere = np.array([column.name not in logged for column in own])
-    return np.where(elsewhere, system.prior_precision[: len(own)], 0.0)
+    columns = system.columns[: system.model_columns.size]
+    elsewhere = np.array([column.name not in logged for column in columns])
+    return np.where(elsewhere, system.prior_precision[: len(columns)], 0.0)
 
 
 def _beyond(u: Array, prior_precision: Array, policy: GaussNewton) -> Array:
@@ -429,14 +433,14 @@ def _at(value: float, limits: tuple[float, float] | None) -> bool:
     )
 
 
-def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCombination, ...]:
+def reported_combinations(system: LinearSystem, held_out: HeldOut) -> tuple[KnownCombination, ...]:
     """Combinations that the captures determine of parameters that they do not determine one by one.
 
     Parameters
     ----------
     system
         The fit.
-    held
+    held_out
         Its held-out residual.
 
     Returns
@@ -452,7 +456,7 @@ def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCom
     """
     fit, policy = system.fit, system.policy.fit
     names = [c.name for c in system.columns[: system.model_columns.size]]
-    sure_of = _reported(system, held)
+    sure_of = _reported(system, held_out)
     identified = sure_of.identified
     values = np.array([fit.values[name] for name in names])
     physical = {**dict.fromkeys(PHYSICAL), **fit.model.parameters()}
@@ -460,17 +464,19 @@ def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCom
     open_ = np.isinf(identified.u) | ~identified.determined
     places = [n for n, name in enumerate(names) if name in physical and observed[n] and open_[n]]
     positive = [names.index(name) for name in POSITIVE if fit.values[name] > 0.0]
-    made = known_combinations(identified, values, places, positive)
+    combinations = known_combinations(identified, values, places, positive)
     moving = np.zeros(len(names), dtype=bool)
-    for moved, there in (
-        walked(identified, values, made, math.log(policy.walk_factor)) if made else ()
+    for moved, walked_to in (
+        walked(identified, values, combinations, math.log(policy.walk_factor))
+        if combinations
+        else ()
     ):
-        at = replace(fit, values=fit.values | dict(zip(names, there.tolist(), strict=True)))
+        at = replace(fit, values=fit.values | dict(zip(names, walked_to.tolist(), strict=True)))
         deviance = linear_system(at, before=system, chord=True).deviance
         if not abs(deviance - system.deviance) < policy.walk_rise:
             moving |= moved
     named = _named(system, sure_of)
-    wide = [(one, sure_of.u_of(one.gradient, bent=one.product)) for one in made]
+    wide = [(one, sure_of.u_of(one.gradient, bent=one.product)) for one in combinations]
     wide = [
         (one, u)
         for one, u in wide
@@ -517,11 +523,11 @@ def _named(system: LinearSystem, sure_of: Known) -> dict[KnownCombination, Array
     )
     first = {segment.kind: segment for segment in reversed(system.segments)}
     offered = [(s, one) for s in first.values() for one in equation_of(s).use.combinations]
-    made: dict[KnownCombination, Array] = {}
+    named: dict[KnownCombination, Array] = {}
     for segment, one in offered:
         if not any(open_.get(name, True) for name in one.of):
             continue
-        here = one.value(segment, fit.model, fit.values)
+        value = one.value(segment, fit.model, fit.values)
         gradient = np.zeros(len(names))
         for place, (name, step) in enumerate(steps.items()):
             ahead, back = (
@@ -531,17 +537,17 @@ def _named(system: LinearSystem, sure_of: Known) -> dict[KnownCombination, Array
             gradient[place] = (ahead - back) / (2.0 * step)
         u = sure_of.u_of(gradient, bent=True)
         sized = gradient * identified.sizes
-        if within(np.array(u), np.array(max(abs(here), float(np.abs(sized).max())))):
-            made[KnownCombination(one.expression, here, u, one.unit, one.of)] = sized
-    return made
+        if within(np.array(u), np.array(max(abs(value), float(np.abs(sized).max())))):
+            named[KnownCombination(one.expression, value, u, one.unit, one.of)] = sized
+    return named
 
 
 def _of_pairs(combination: KnownCombination) -> KnownCombination | None:
     """A combination of a machine whose pole pairs, unknown, were taken as one."""
     if {"ld_h", "lq_h"}.intersection(combination.of):
         return None
-    alone = combination.expression == "psi_wb"
-    named = "pole_pairs*psi_wb" if alone else "(pole_pairs*psi_wb)"
+    flux_alone = combination.expression == "psi_wb"
+    named = "pole_pairs*psi_wb" if flux_alone else "(pole_pairs*psi_wb)"
     return replace(combination, expression=combination.expression.replace("psi_wb", named))
 
 
@@ -561,8 +567,8 @@ def _combined(
             tuple(weights),
         )
     (first, _), (second, factor) = weights.items()
-    words = f"{first} {'+' if factor > 0.0 else '-'} {abs(factor):.9g}*{second}"
-    return KnownCombination(words, combination.value, u, units[first], tuple(weights))
+    expression = f"{first} {'+' if factor > 0.0 else '-'} {abs(factor):.9g}*{second}"
+    return KnownCombination(expression, combination.value, u, units[first], tuple(weights))
 
 
 def _fraction(factors: Sequence[str], weights: Mapping[str, float], times: str) -> str:
@@ -593,8 +599,8 @@ def _sizes(fit: Fit, columns: Sequence[Column]) -> Array:
             for q in effect.parameters_of(model.machine)
             if q.amplitude and (q.unit, q.scale) == (p.unit, p.scale)
         ]
-        own = alike if p.amplitude else [abs(values[name])]
-        known[name] = max(*own, p.typical * model.machine.scale(p), 1e-300)
+        sizes = alike if p.amplitude else [abs(values[name])]
+        known[name] = max(*sizes, p.typical * model.machine.scale(p), 1e-300)
     nuisances = (c.name for c in base_of(model.machine) if c.name not in PHYSICAL)
     known |= {name: priors[name][1] for name in nuisances if name in priors}
     return np.array([known.get(column.name, 1.0) for column in columns])

@@ -133,8 +133,8 @@ class LinearSystem:
     @property
     def excess(self) -> float:
         """The part of the deviance that is over noise floors and priors."""
-        over = np.log(np.maximum(self.reduced_chi2(self.residual), 1.0))
-        return float(self.counts @ over) + float(self.prior_costs().sum())
+        nats = np.log(np.maximum(self.reduced_chi2(self.residual), 1.0))
+        return float(self.counts @ nats) + float(self.prior_costs().sum())
 
     def prior_costs(
         self, places: NDArray[np.int64] | None = None, step: Array | None = None
@@ -173,8 +173,8 @@ class LinearSystem:
             1/max(χ²/n, 1) of the row's group.
 
         """
-        each: Array = 1.0 / np.maximum(reduced_chi2, 1.0)
-        return each[self.group]
+        by_group: Array = 1.0 / np.maximum(reduced_chi2, 1.0)
+        return by_group[self.group]
 
     def predicted_deviance(self, step: Array) -> float:
         """Deviance after a step along the first columns, to first order.
@@ -254,13 +254,13 @@ class LinearSystem:
             The priors of the other columns cost what they cost at the fit.
 
         """
-        along = np.arange(len(self.columns)) if places is None else places
+        selected = np.arange(len(self.columns)) if places is None else places
         elsewhere = self.prior_costs()
-        elsewhere[along] = 0.0
+        elsewhere[selected] = 0.0
         prior = Prior(
-            self.prior_precision[along], self.prior_gradient[along], float(elsewhere.sum())
+            self.prior_precision[selected], self.prior_gradient[selected], float(elsewhere.sum())
         )
-        rows = np.column_stack([self.residual, self.matrix[:, along]])
+        rows = np.column_stack([self.residual, self.matrix[:, selected]])
         return NormalEquations.of(rows, self.group, len(self.labels), prior, self.policy.fit)
 
     def normal_equations_of(self, residuals: Array) -> list[NormalEquations]:
@@ -289,7 +289,7 @@ class LinearSystem:
             power[number] = (group_residuals**2).sum(axis=1)
         return [replace(known, power=power[:, n], slope=slope[:, n]) for n in range(len(residuals))]
 
-    def along(self, places: NDArray[np.int64]) -> LinearSystem:
+    def restricted_to(self, places: NDArray[np.int64]) -> LinearSystem:
         """The same system with some of its columns.
 
         Parameters
@@ -372,15 +372,15 @@ def linear_system(
 
     """
     model, values = fit.model, fit.values
-    own = model_columns(model)
-    columns = [*own, *candidates]
-    known = _kept(before, fit, columns, chord)
+    own_columns = model_columns(model)
+    columns = [*own_columns, *candidates]
+    known = _reusable_columns(before, fit, columns, chord)
     new = [column for column in columns if column.key not in known]
-    each = [(model, values, new, floor) for floor in fit.floors]
-    rows = on_each(linearise, fit.segments, each)
+    arguments = [(model, values, new, floor) for floor in fit.floors]
+    rows = on_each(linearise, fit.segments, arguments)
     group, labels = _numbered(rows)
     prior_precision, prior_gradient = _priors(model, columns, values)
-    made = LinearSystem(
+    system = LinearSystem(
         columns=tuple(columns),
         residual=np.concatenate([r.residual for r in rows]),
         matrix=_placed(columns, new, np.concatenate([r.columns for r in rows])),
@@ -393,10 +393,10 @@ def linear_system(
         prior_precision=prior_precision,
         prior_gradient=prior_gradient,
         fit=fit,
-        model_column_count=len(own),
+        model_column_count=len(own_columns),
         made_at={column.key: values for column in new},
     )
-    return made if before is None or not known else _with_known(made, before, known)
+    return system if before is None or not known else _with_known(system, before, known)
 
 
 def _numbered(
@@ -411,13 +411,13 @@ def _numbered(
     return np.concatenate(groups), tuple(labels)
 
 
-def _placed(columns: Sequence[Column], new: Sequence[Column], made: Array) -> Array:
-    """A matrix [R, P] of all columns with the `new` ones in it, as they were `made` [R, new]."""
-    matrix = np.empty((made.shape[0], len(columns)))
+def _placed(columns: Sequence[Column], new: Sequence[Column], computed: Array) -> Array:
+    """A matrix [R, P] of all columns with the `new` ones in it, `computed` [R, new]."""
+    matrix = np.empty((computed.shape[0], len(columns)))
     fresh = {column.key: n for n, column in enumerate(new)}
     for place, column in enumerate(columns):
         if column.key in fresh:
-            matrix[:, place] = made[:, fresh[column.key]]
+            matrix[:, place] = computed[:, fresh[column.key]]
     return matrix
 
 
@@ -432,18 +432,18 @@ def _with_known(
     inertia = before.fit.values["j_kgm2"] / now.fit.values["j_kgm2"]
     lighter = np.where(free, inertia, 1.0)[now.group]
     places = [n for n, column in enumerate(now.columns) if column.key in known]
-    kept = np.column_stack([known[now.columns[n].key] for n in places]) * lighter[:, None]
+    carried_over = np.column_stack([known[now.columns[n].key] for n in places]) * lighter[:, None]
     counts = np.bincount(now.segment, minlength=len(segments)).tolist()
-    now.matrix[:, places] = _over(
-        segments, kept, (before.row_weight, now.row_weight), counts, now.policy.noise_floors
+    now.matrix[:, places] = _rewhitened(
+        segments, carried_over, (before.row_weight, now.row_weight), counts, now.policy.noise_floors
     )
     made_at = {**now.made_at, **{key: before.made_at[key] for key in known}}
     return replace(now, made_at=made_at)
 
 
-def _over(
+def _rewhitened(
     segments: Sequence[Segment],
-    kept: Array,
+    rows: Array,
     weights: tuple[Array, Array],
     counts: Sequence[int],
     policy: NoiseFloors,
@@ -453,14 +453,14 @@ def _over(
     """
     before, now = weights
     if np.array_equal(before, now):
-        return kept
+        return rows
     edges = np.cumsum(counts)[:-1]
-    parts = zip(*(np.split(one, edges) for one in (kept, before, now)), strict=True)
-    each = [(*part, policy) for part in parts]
-    return np.concatenate(on_each(whitened_anew, segments, each))
+    parts = zip(*(np.split(one, edges) for one in (rows, before, now)), strict=True)
+    arguments = [(*part, policy) for part in parts]
+    return np.concatenate(on_each(whitened_anew, segments, arguments))
 
 
-def _kept(
+def _reusable_columns(
     before: LinearSystem | None, fit: Fit, columns: Sequence[Column], chord: bool
 ) -> dict[ColumnKey, Array]:
     """Those of the columns that an earlier system has and that hold at a new fit too.
@@ -473,22 +473,22 @@ def _kept(
     if before is None:
         return {}
     known = before.fit.model.effects
-    found = [e for e in fit.model.effects if e not in known]
-    if any(p.starts for e in found for p in e.parameters_of(fit.model.machine)):
+    added = [e for e in fit.model.effects if e not in known]
+    if any(p.starts for e in added for p in e.parameters_of(fit.model.machine)):
         return {}
-    turned = any(e.angle is not None for e in found)
+    turned = any(e.angle is not None for e in added)
 
     def stays(column: Column) -> bool:
         of_angle = column.effect is not None and column.effect.angle is not None
-        return not (turned and of_angle) and _holds(column, before.made_at[column.key], fit)
+        return not (turned and of_angle) and _is_valid(column, before.made_at[column.key], fit)
 
     places = {column.key: place for place, column in enumerate(before.columns)}
     carried_over = [column for column in columns if column.key in places]
-    kept = [column.key for column in carried_over if chord or stays(column)]
-    return {key: before.matrix[:, places[key]] for key in kept}
+    unchanged = [column.key for column in carried_over if chord or stays(column)]
+    return {key: before.matrix[:, places[key]] for key in unchanged}
 
 
-def _holds(column: Column, made_at: Values, fit: Fit) -> bool:
+def _is_valid(column: Column, made_at: Values, fit: Fit) -> bool:
     """Whether a column is near what it would be at a fit.
 
     It goes with the constants; that of J with J, since a coasting shaft goes by 1/J; those of
@@ -502,8 +502,10 @@ def _holds(column: Column, made_at: Values, fit: Fit) -> bool:
     if _linear(column, model):
         return True
     parameters = model.parameters()
-    gone = any(value and "." in name and name not in parameters for name, value in made_at.items())
-    return not gone and all(
+    removed = any(
+        value and "." in name and name not in parameters for name, value in made_at.items()
+    )
+    return not removed and all(
         abs(now[name] - made_at.get(name, 0.0))
         <= far * max(abs(now[name]), p.typical * model.machine.scale(p))
         for name, (_, p) in parameters.items()

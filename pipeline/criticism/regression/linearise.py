@@ -135,16 +135,23 @@ def linearise(
     sampler = _sampler(segment, model, values)
     noise, scale = floor.noise_and_scale(group[valid], sampler.reading_error(floor.near, valid))
     row_weight = 1.0 / scale
-    kept = _weak_columns(segment, sampler, columns, valid)
-    both = (
-        np.column_stack([projected(segment, sampler.base_residual)[valid], *kept])
+    weak_columns = _weak_columns(segment, sampler, columns, valid)
+    whitened = (
+        np.column_stack([projected(segment, sampler.base_residual)[valid], *weak_columns])
         * row_weight[:, None]
     )
-    absorb(both, offsets(segment, valid, row_weight, model.policy.noise_floors))
+    absorb(whitened, offsets(segment, valid, row_weight, model.policy.noise_floors))
     unit = reported_unit(segment, values) / (row_weight * window_gain(segment))
     noise_ratio = noise * row_weight
     return Rows(
-        both[:, 0], both[:, 1:], group[valid], window[valid], unit, noise_ratio, row_weight, groups
+        whitened[:, 0],
+        whitened[:, 1:],
+        group[valid],
+        window[valid],
+        unit,
+        noise_ratio,
+        row_weight,
+        groups,
     )
 
 
@@ -195,15 +202,15 @@ def _weak_columns(
     for first in range(0, len(new), _CHUNK):
         changes = {column.key: sampler.change(column) for column in new[first : first + _CHUNK]}
         observed = {key: change for key, change in changes.items() if change is not None}
-        made = dict.fromkeys(changes, nothing)
+        computed = dict.fromkeys(changes, nothing)
         if observed:
             stacked = np.concatenate(list(observed.values()))
             moving = stacked.any(axis=1)
             weak = np.zeros((stacked.shape[0], *valid.shape[1:]))
             weak[moving] = projected(segment, stacked[moving])
             parts = weak.reshape(len(observed), *valid.shape)
-            made |= {key: one[valid] for key, one in zip(observed, parts, strict=True)}
-        known.update({c.key: (c, made[c.key]) for c in new[first : first + _CHUNK]})
+            computed |= {key: one[valid] for key, one in zip(observed, parts, strict=True)}
+        known.update({c.key: (c, computed[c.key]) for c in new[first : first + _CHUNK]})
     return [known[column.key][1] for column in columns]
 
 
@@ -224,8 +231,8 @@ def absorb(rows: Array, unknown: Sequence[Array]) -> None:
     """
     if unknown:
         axes, sizes, _ = np.linalg.svd(np.column_stack(list(unknown)), full_matrices=False)
-        lost = 1.0 - 1.0 / np.sqrt(1.0 + sizes**2)
-        rows -= (axes * lost) @ (axes.T @ rows)
+        shrinkage = 1.0 - 1.0 / np.sqrt(1.0 + sizes**2)
+        rows -= (axes * shrinkage) @ (axes.T @ rows)
 
 
 def whitened_anew(
@@ -254,11 +261,11 @@ def whitened_anew(
 
     """
     _, _, valid, _ = row_index(segment)
-    bare = rows.copy()
-    _restore(bare, offsets(segment, valid, before, policy))
-    bare *= (after / before)[:, None]
-    absorb(bare, offsets(segment, valid, after, policy))
-    return bare
+    unabsorbed = rows.copy()
+    _restore(unabsorbed, offsets(segment, valid, before, policy))
+    unabsorbed *= (after / before)[:, None]
+    absorb(unabsorbed, offsets(segment, valid, after, policy))
+    return unabsorbed
 
 
 def _restore(rows: Array, unknown: Sequence[Array]) -> None:
@@ -284,8 +291,8 @@ def _sampler(segment: Segment, model: Model, values: Values) -> _Sampler:
     known: _Sampler | None = segment.kept.get("sampler")
     if known is not None and known.at(segment, model, values):
         return known
-    made = segment.kept["sampler"] = _Sampler(segment, model, dict(values))
-    return made
+    sampler = segment.kept["sampler"] = _Sampler(segment, model, dict(values))
+    return sampler
 
 
 class _Sampler:
@@ -440,21 +447,23 @@ class _Sampler:
         parts = (change.psi_wb, change.slope_wb, change.drop_v, change.drag_nm)
         if not any(part.any() for part in parts):
             return None
-        alone = effect.hook == "torque" and effect.parallel is None
-        if alone and self.observes.torque_in:
+        only_drag = effect.hook == "torque" and effect.parallel is None
+        if only_drag and self.observes.torque_in:
             # a drag is in the torque alone: no voltage needs to be predicted for it
             drag = np.zeros_like(self.start)
             place = self.segment.channels.index(self.observes.torque_in)
             drag[place] = change.drag_nm * (1.0 + self.values["gain_torque"]) / column.step
             return drag if np.any(drag) else None
-        plain = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
+        without_shaft = self.model.without(
+            *(e.name for e in self.model.effects if e.shaft is not None)
+        )
         if self.observes.form == "affine":
-            still = self._pieces_of_nothing()
-            after = predicted(self.segment, self.x, change, plain, self.values) - predicted(
-                self.segment, self.x, still, plain, self.values
+            zero_pieces = self._pieces_of_nothing()
+            after = predicted(self.segment, self.x, change, without_shaft, self.values) - predicted(
+                self.segment, self.x, zero_pieces, without_shaft, self.values
             )
         else:
-            after = predicted(self.segment, self.x, change, plain, self.quiet)
+            after = predicted(self.segment, self.x, change, without_shaft, self.quiet)
         return -after / column.step if np.any(np.abs(after) > _NOTHING) else None
 
     def _pieces_of_nothing(self) -> Pieces:
@@ -468,9 +477,9 @@ class _Sampler:
         shape = x.omega_rad_s.shape
         nothing = np.zeros(shape)
         flux, slope = effect_flux(effect, x, q)
-        still: Complex = nothing.astype(np.complex128)
-        lost = effect.drop if "drop" in self.hooks else None
-        drop = still if lost is None else lost(self.mean, q)
+        zero_drop: Complex = nothing.astype(np.complex128)
+        effect_drop = effect.drop if "drop" in self.hooks else None
+        drop = zero_drop if effect_drop is None else effect_drop(self.mean, q)
         drag = nothing if effect.torque is None else effect.torque(x, q)
         if effect.parallel is not None:
             flux = flux - flux_of(effect.parallel(x, q), self.values)
@@ -512,9 +521,9 @@ def effect_columns(
 
     """
     inside = effect in model.effects
-    made = []
+    columns = []
     for p in effect.parameters_of(model.machine):
         if p.amplitude or (inside and not p.choice):
             step = max(p.negligible, 1e-2 * p.typical) * model.machine.scale(p)
-            made.append(Column(f"{effect.name}.{p.name}", step, effect, at))
-    return made
+            columns.append(Column(f"{effect.name}.{p.name}", step, effect, at))
+    return columns

@@ -104,12 +104,13 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
         ]
         for channel, one in _as_sensed(segment, model, values).items():
             most = (policy.largest * _whole(channel, model.machine)) ** 2
-            for freq, seen in zip(lines, spectrum.lines(one, lines, most), strict=True):
-                powers[segment.kind, channel, freq].append(seen)
-                if seen[0] > policy.stands_out * seen[1]:
+            for freq, line_powers in zip(lines, spectrum.lines(one, lines, most), strict=True):
+                powers[segment.kind, channel, freq].append(line_powers)
+                if line_powers[0] > policy.stands_out * line_powers[1]:
                     clear[freq].add(segment.capture)
     ratios = {
-        key: np.array([line / beside for line, beside in seen]) for key, seen in powers.items()
+        key: np.array([line / beside for line, beside in line_powers])
+        for key, line_powers in powers.items()
     }
     common = {freq for freq, captures in clear.items() if len(captures) >= policy.captures}
     return tuple(
@@ -174,9 +175,9 @@ def _humming(segment: Segment, hums: Sequence[Hum], model: Model, values: Values
         if hum.signal not in segment.channels:
             lines.append(disturbed(segment, weak, model, values, hum.signal, waves))
             continue
-        both = np.zeros((2, len(segment.channels), weak.starts.size, weak.orders.size))
-        both[:, segment.channels.index(hum.signal)] = weak.project(waves)
-        lines.append(both)
+        projected_waves = np.zeros((2, len(segment.channels), weak.starts.size, weak.orders.size))
+        projected_waves[:, segment.channels.index(hum.signal)] = weak.project(waves)
+        lines.append(projected_waves)
     for name, rms, freq in _in_currents(segment, present):
         waves = rms * _waves(segment, freq)
         lines.append(disturbed(segment, weak, model, values, name, waves))
@@ -238,7 +239,7 @@ class _Spectrum:
         weight = np.zeros(place.size)
         for first, last in pairwise(ends):
             weight[first:last] = np.hanning(last - first + 2)[1:-1]
-        runs = tuple(slice(*both) for both in pairwise(ends))
+        runs = tuple(slice(*edges) for edges in pairwise(ends))
         weight *= np.hanning(int(place[-1]) + 3)[1:-1][place]
         return cls(segment.ts_s, int(place[-1]) + 1, runs, place, weight, policy)
 
@@ -310,12 +311,12 @@ class _Spectrum:
         wave = flat * np.exp(-2j * np.pi * line / (_FINER * self.bins) * self.place)
         part = np.minimum(self.place * self.policy.parts // self.bins, self.policy.parts - 1)
         size = np.bincount(part, self.weight, self.policy.parts)
-        seen = np.bincount(part, wave.real, self.policy.parts) + 1j * np.bincount(
+        sums = np.bincount(part, wave.real, self.policy.parts) + 1j * np.bincount(
             part, wave.imag, self.policy.parts
         )
         nonzero = size > 0.0
-        power = float((np.abs(seen[nonzero]) ** 2 / size[nonzero]).sum())
-        return float(np.abs(seen.sum()) ** 2 / size.sum()) / max(power, 1e-300)
+        power = float((np.abs(sums[nonzero]) ** 2 / size[nonzero]).sum())
+        return float(np.abs(sums.sum()) ** 2 / size.sum()) / max(power, 1e-300)
 
 
 def _whole(channel: str, machine: Machine) -> float:

@@ -99,7 +99,7 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     """
     policy = model.policy.noise_floors
     group, _, valid, groups = row_index(segment)
-    plain = projected(segment, residual(segment, model, values))
+    unperturbed = projected(segment, residual(segment, model, values))
     total, count = np.zeros(len(groups)), np.zeros(len(groups))
     replicate_count = policy.pooled // max(int(valid.sum()) // max(len(groups), 1), 1)
     replicates = min(max(replicate_count, policy.replicates), policy.pooled)
@@ -121,13 +121,13 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
             step, shift = sensors.angle_step_rad, generator.uniform(-0.5, 0.5)
             error = rounding_error(even["theta_mech_rad"], step, shift)
             noisy["theta_mech_rad"] = theta + parabolas(error, sensors.parabola)
-        change = projected(segment, residual(segment, model, values, noisy)) - plain
+        change = projected(segment, residual(segment, model, values, noisy)) - unperturbed
         np.add.at(total, group[valid], change[valid] ** 2)
         np.add.at(count, group[valid], 1.0)
     variance = total / np.maximum(count, 1.0)
     if UNSMOOTHED in segment.recorded:
         rough = {**segment.recorded, "theta_mech_rad": segment.recorded[UNSMOOTHED]}
-        change = projected(segment, residual(segment, model, values, rough)) - plain
+        change = projected(segment, residual(segment, model, values, rough)) - unperturbed
         power = np.bincount(group[valid], change[valid] ** 2, len(groups))
         variance += power / np.maximum(np.bincount(group[valid], minlength=len(groups)), 1)
     return np.sqrt(variance) + 1e-300
@@ -286,24 +286,26 @@ def reading_error(
     scales = [
         channel_scale(segment, channel, model.machine, values) for channel in segment.channels
     ]
-    own = (
+    of_scale = (
         part
         * window_gain(segment)
         / reported_unit(segment, values)
         * np.array(scales)[:, None, None]
     )
-    both: Array = np.hypot(reading, own)
+    combined: Array = np.hypot(reading, of_scale)
     if "late_speed" in sensing.errors and SPEED in segment.channels:
         place, slope = segment.channels.index(SPEED), np.gradient(segment.recorded[SPEED])
         late = np.abs(weak.project(policy.speed_periods * slope[None])[0])
-        both[place] = np.hypot(both[place], late)
+        combined[place] = np.hypot(combined[place], late)
     if "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
-        both[place] = np.hypot(both[place], _of_torque(segment, model, values, state))
+        combined[place] = np.hypot(combined[place], _of_torque(segment, model, values, state))
     for place, channel in enumerate(segment.channels):
         if channel in VOLTS:
-            both[place] = np.hypot(both[place], _of_voltage(segment, channel, model, values, state))
-    return both
+            combined[place] = np.hypot(
+                combined[place], _of_voltage(segment, channel, model, values, state)
+            )
+    return combined
 
 
 def _of_voltage(
@@ -377,15 +379,15 @@ def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
     for effect in model.effects:
         known = {**zero(effect, model), **known}
     evaluate(model, x, known, frozenset({"flux"}))
-    more = 1.0 + model.policy.selection.form_error
-    moved = replace(x, id_a=x.id_a * more, iq_a=x.iq_a * more, kept={})
+    factor = 1.0 + model.policy.selection.form_error
+    moved = replace(x, id_a=x.id_a * factor, iq_a=x.iq_a * factor, kept={})
     change = np.zeros(x.omega_rad_s.shape, dtype=complex)
     for effect in model.effects:
         if effect.drop is not None:
             q = values_of(effect, model.machine, known)
             before = effect.drop(x, q)
             step = effect.drop(moved, q) - before
-            steeper = np.abs(step) - (more - 1.0) * np.abs(before)
+            steeper = np.abs(step) - (factor - 1.0) * np.abs(before)
             change = change + np.maximum(steeper, 0.0) * np.exp(1j * np.angle(step))
     return change
 
@@ -489,10 +491,10 @@ def offsets(
 
     """
     shapes, lines = segment.disturbances.offsets, segment.disturbances.lines
-    made = [] if lines is None else [line[valid] * row_weight for line in lines]
+    constants = [] if lines is None else [line[valid] * row_weight for line in lines]
     if shapes is not None:
-        own = [projected(segment, one[None])[valid] * row_weight for one in shapes]
-        return own + made
+        of_shapes = [projected(segment, one[None])[valid] * row_weight for one in shapes]
+        return of_shapes + constants
     if segment.weak is None:
         return []
     of_one = segment.weak.functions.sum(axis=2)
@@ -505,8 +507,8 @@ def offsets(
             continue
         constant = np.zeros((len(segment.channels), *of_one.shape))
         constant[place] = prior * of_one
-        made.append(constant[valid] * row_weight)
-    return made
+        constants.append(constant[valid] * row_weight)
+    return constants
 
 
 def window_gain(segment: Segment) -> float:

@@ -80,7 +80,7 @@ class Prior:
         gradient = self.gradient + self.precision * step
         return float(prior_costs(gradient, self.precision).sum())
 
-    def along(self, places: NDArray[np.int64]) -> Prior:
+    def restricted_to(self, places: NDArray[np.int64]) -> Prior:
         """The prior of some of the parameters.
 
         Parameters
@@ -143,19 +143,19 @@ class NormalEquations:
             When a fit has converged.
 
         """
-        both = rows[np.argsort(group, kind="stable")]
+        sorted_rows = rows[np.argsort(group, kind="stable")]
         counts = np.bincount(group, minlength=count)
         edges = np.concatenate([[0], np.cumsum(counts)])
-        size = both.shape[1]
+        size = sorted_rows.shape[1]
         upper = np.triu_indices(size)
         normal = np.empty((count, upper[0].size))
         for number in range(count):
-            in_group = both[edges[number] : edges[number + 1]]
+            in_group = sorted_rows[edges[number] : edges[number + 1]]
             normal[number] = (in_group.T @ in_group)[upper]
         power, slope = normal[:, 0].copy(), normal[:, 1:size].copy()
         return cls(counts.astype(float), power, slope, normal[:, size:].copy(), prior, policy)
 
-    def along(self, places: NDArray[np.int64]) -> NormalEquations:
+    def restricted_to(self, places: NDArray[np.int64]) -> NormalEquations:
         """The normal equations of some of the columns.
 
         Parameters
@@ -164,9 +164,9 @@ class NormalEquations:
             Their indices.
 
         """
-        return self._along(places, self.prior.along(places))
+        return self._restricted_to(places, self.prior.restricted_to(places))
 
-    def _along(self, places: NDArray[np.int64], prior: Prior) -> NormalEquations:
+    def _restricted_to(self, places: NDArray[np.int64], prior: Prior) -> NormalEquations:
         rows, columns = np.triu_indices(places.size)
         normal = np.take(self.normal, self._products(places[rows], places[columns]), axis=1)
         return replace(self, slope=self.slope[:, places], normal=normal, prior=prior)
@@ -220,15 +220,17 @@ class NormalEquations:
 
         """
         all_columns, prior = np.arange(self.slope.shape[1]), self.prior
-        seen = np.flatnonzero(self.normal[:, self._products(all_columns, all_columns)].any(axis=0))
-        observed = Prior(prior.precision[seen], prior.gradient[seen], prior.elsewhere)
-        known = self._along(seen, observed)
+        nonzero = np.flatnonzero(
+            self.normal[:, self._products(all_columns, all_columns)].any(axis=0)
+        )
+        observed = Prior(prior.precision[nonzero], prior.gradient[nonzero], prior.elsewhere)
+        known = self._restricted_to(nonzero, observed)
         now = np.maximum(self._reduced_chi2(self.power), 1.0)
         ends = [known._descended(now**power, rounds or self.policy.most_rounds) for power in starts]
         end = min(ends, key=lambda end: end.deviance)
         # what no row observes goes to the centre of its prior, and stays where it has none
         step = -prior.gradient / np.where(prior.precision > 0, prior.precision, np.inf)
-        step[seen] = end.step
+        step[nonzero] = end.step
         return replace(end, step=step)
 
     def _descended(self, reduced_chi2: Array, rounds: int) -> Descent:
@@ -281,8 +283,8 @@ def deviance_of(counts: Array, reduced_chi2: Array) -> float:
     10.0
 
     """
-    each = np.log(np.maximum(reduced_chi2, 1.0)) + np.minimum(reduced_chi2, 1.0) - 1.0
-    return float((counts * each).sum())
+    nats = np.log(np.maximum(reduced_chi2, 1.0)) + np.minimum(reduced_chi2, 1.0) - 1.0
+    return float((counts * nats).sum())
 
 
 def pseudo_inverse(normal: Array) -> Array:

@@ -52,19 +52,19 @@ def alternatives_to(
     ties = [] if discriminate(wide.fit, effect) else list(alike)
     normal_equations = wide.normal_equations()
     most = policy.alternative_share * loss_without(wide, (name,), normal_equations=normal_equations)
-    near: dict[str, tuple[float, Candidate]] = {}
+    close: dict[str, tuple[float, Candidate]] = {}
     for candidate, places in placed(wide, offered):
         if candidate.effect.name in alike or not _meet(effect, candidate.effect):
             continue
         rise = loss_without(wide, (name,), places, normal_equations)
         other = candidate.effect.name
-        if rise < most and rise < near.get(other, (np.inf, candidate))[0]:
-            near[other] = rise, candidate
+        if rise < most and rise < close.get(other, (np.inf, candidate))[0]:
+            close[other] = rise, candidate
     for candidate in passed_over:
         if candidate.effect.name in alike:
             continue
-        near.setdefault(candidate.effect.name, (most, candidate))
-    nearest = sorted(near.values(), key=lambda pair: (pair[0], pair[1].effect.name))
+        close.setdefault(candidate.effect.name, (most, candidate))
+    nearest = sorted(close.values(), key=lambda pair: (pair[0], pair[1].effect.name))
     for _, candidate in nearest[: policy.most_alternatives]:
         swapped = _refitted(name, candidate, wide)
         if (
@@ -78,9 +78,9 @@ def alternatives_to(
 
 def _refitted(name: str, candidate: Candidate, wide: LinearSystem) -> LinearSystem | None:
     """The system with a candidate in an effect's place; None without a shape to speak of."""
-    less = wide.fit.without(name)
-    model = less.model.with_effects(candidate.effect)
-    start = replace(less, model=model, values={**less.values, **candidate.values})
+    without = wide.fit.without(name)
+    model = without.model.with_effects(candidate.effect)
+    start = replace(without, model=model, values={**without.values, **candidate.values})
     swapped = gauss_newton(start, before=wide)
     return swapped if shaped(swapped.fit, candidate.effect) else None
 

@@ -55,12 +55,14 @@ def with_free_shares(system: LinearSystem) -> LinearSystem | None:
 
 def _fall(system: LinearSystem, names: tuple[str, ...]) -> float:
     """Fall of the deviance, to first order, where shares are left free."""
-    places, own = system.place(names), system.model_columns
+    share_columns, model_columns = system.place(names), system.model_columns
     precision, gradient = system.prior_precision.copy(), system.prior_gradient.copy()
-    precision[places] = gradient[places] = 0.0
+    precision[share_columns] = gradient[share_columns] = 0.0
     free = replace(system, prior_precision=precision, prior_gradient=gradient)
     thorough = system.policy.selection.thorough
-    before, after = (one.normal_equations(own).best(*thorough) for one in (system, free))
+    before, after = (
+        weighted.normal_equations(model_columns).best(*thorough) for weighted in (system, free)
+    )
     return before.deviance - after.deviance
 
 

@@ -38,7 +38,7 @@ def reconsidered(system: LinearSystem) -> LinearSystem:
             break
         if effect.discriminator is not None:
             continue
-        for other in _others(effect, system.fit):
+        for other in _choices(effect, system.fit):
             fit = system.fit
             tried = gauss_newton(replace(fit, values={**fit.values, **other}))
             if tried.deviance < system.deviance - fit.policy.selection.tie:
@@ -46,7 +46,7 @@ def reconsidered(system: LinearSystem) -> LinearSystem:
     return system
 
 
-def _others(effect: Effect, fit: Fit) -> Iterator[Values]:
+def _choices(effect: Effect, fit: Fit) -> Iterator[Values]:
     """Every choice of an effect but that of the fit, by full names."""
     machine = fit.model.machine
     chosen = [p for p in effect.parameters_of(machine) if p.choice and len(p.scan) > 1]

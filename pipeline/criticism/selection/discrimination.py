@@ -52,10 +52,10 @@ def full_logs(fit: Fit, model: Model) -> list[FullLog]:
 
     """
     logs = [s for s in fit.segments if s.unthinned.columns is not None]
-    return [_whole(s, model, fit) for s in logs if not s.instrument.stator]
+    return [_full_log(s, model, fit) for s in logs if not s.instrument.stator]
 
 
-def _whole(segment: Segment, model: Model, fit: Fit) -> FullLog:
+def _full_log(segment: Segment, model: Model, fit: Fit) -> FullLog:
     """One log at full rate, as a model without the effect sees it."""
     signals = dict(segment.unthinned.columns or {})
     good = signals.pop("good") > 0

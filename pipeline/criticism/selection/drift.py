@@ -52,8 +52,8 @@ def drifting_segments(fit: Fit, remainders: Sequence[Remainder]) -> tuple[Segmen
     tests = {segment.test for segment in fit.segments if segment.capture in captures}
     if len(tests) < fit.policy.selection.drift_tests:
         return None
-    each = [(fit.model, fit.values)] * len(fit.segments)
-    drifting = on_each(with_drift, fit.segments, each)
+    arguments = [(fit.model, fit.values)] * len(fit.segments)
+    drifting = on_each(with_drift, fit.segments, arguments)
     system = gauss_newton(replace(fit, segments=drifting))
     return None if remainder(system, large=True) else drifting
 
@@ -81,13 +81,13 @@ def with_drift(segment: Segment, model: Model, values: Values) -> Segment:
     policy = model.policy.selection
     sines = policy.drift_size * slowest(clock(segment), policy.drift_terms)
     known = segment.disturbances.lines
-    made = [] if known is None else [known]
-    made += [
+    lines = [] if known is None else [known]
+    lines += [
         disturbed(segment, segment.weak, model, values, name, sigma * sines)
         for name, sigma in segment.sensors.noise.items()
         if sigma > 0.0 and name.startswith(_DRIFTING) and name in segment.recorded
     ]
-    return with_lines(segment, np.concatenate(made)) if made else segment
+    return with_lines(segment, np.concatenate(lines)) if lines else segment
 
 
 def slowest(time_s: Array, terms: int) -> Array:

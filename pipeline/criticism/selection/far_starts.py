@@ -91,7 +91,7 @@ def with_starts(
         return tuple(scores)
     best = {score.candidate.effect.name: score for score in scores}
     thorough = wide.policy.selection.thorough
-    base = wide.along(wide.model_columns)
+    base = wide.restricted_to(wide.model_columns)
     before = Standing.of(
         base, np.arange(len(base.columns)), base.normal_equations().best(*thorough)
     )
@@ -122,7 +122,7 @@ def _best_ends(base: LinearSystem, offered: Sequence[Candidate]) -> list[_End]:
         base,
         [[replace(e.trial, start=factor * e.trial.start) for factor in finer] for e in nearest],
     )
-    return [_least([first, *more]) for first, more in zip(nearest, beside, strict=True)]
+    return [_least([first, *finer_ends]) for first, finer_ends in zip(nearest, beside, strict=True)]
 
 
 def _least(ends: Sequence[_End]) -> _End:
@@ -135,26 +135,26 @@ def _ends(base: LinearSystem, trials: Sequence[Sequence[_Trial]]) -> list[list[_
     The columns stay those of where no candidate is, and so does what rows are divided by.
     """
     fit = base.fit
-    each = [trial for some in trials for trial in some]
-    asked = tuple((t.candidate.effect, t.values(fit.machine)) for t in each)
+    flat = [trial for group in trials for trial in group]
+    effects_at = tuple((t.candidate.effect, t.values(fit.machine)) for t in flat)
     weights = [base.row_weight[base.segment == n] for n in range(len(base.segments))]
-    arguments = [(fit.model, fit.values, asked, weight) for weight in weights]
+    arguments = [(fit.model, fit.values, effects_at, weight) for weight in weights]
     parts = on_each(_trial_residuals, base.segments, arguments)
-    whole = np.tile(base.residual, (len(each), 1))
+    residuals = np.tile(base.residual, (len(flat), 1))
     for number, part in enumerate(parts):
         rows = np.flatnonzero(base.segment == number)
         for place, residual in part.items():
-            whole[place, rows] = residual
+            residuals[place, rows] = residual
     thorough = base.policy.selection.thorough
     ends = iter(
         [
             _End(trial, replace(base, residual=residual), known.best(*thorough))
             for trial, residual, known in zip(
-                each, whole, base.normal_equations_of(whole), strict=True
+                flat, residuals, base.normal_equations_of(residuals), strict=True
             )
         ]
     )
-    return [[next(ends) for _ in some] for some in trials]
+    return [[next(ends) for _ in group] for group in trials]
 
 
 def _score(
@@ -185,12 +185,12 @@ def _trial_residuals(
     segment: Segment,
     model: Model,
     values: Values,
-    asked: Sequence[tuple[Effect, Values]],
+    trials: Sequence[tuple[Effect, Values]],
     row_weight: Array,
 ) -> dict[int, Array]:
     """Residuals [R] of the trials that a segment observes, by their places."""
-    seen = [n for n, (effect, _) in enumerate(asked) if observes(segment, effect)]
-    if not seen:
+    observed = [n for n, (effect, _) in enumerate(trials) if observes(segment, effect)]
+    if not observed:
         return {}
-    made = trial_residuals(segment, model, values, [asked[n] for n in seen], row_weight)
-    return dict(zip(seen, made, strict=True))
+    residuals = trial_residuals(segment, model, values, [trials[n] for n in observed], row_weight)
+    return dict(zip(observed, residuals, strict=True))

@@ -112,7 +112,9 @@ def _misses(wide: LinearSystem, significant: NDArray[np.bool_], channel: str) ->
     q = wide.reduced_chi2(wide.residual)
     groups = zip(wide.labels, q, significant, strict=True)
     return any(
-        over and q > least for (_, name, order), q, over in groups if (name, order) == (channel, 0)
+        is_over and q > least
+        for (_, name, order), q, is_over in groups
+        if (name, order) == (channel, 0)
     )
 
 
@@ -139,8 +141,8 @@ def scored(wide: LinearSystem, candidate: Candidate, begun: Fit) -> Score:
     with the effect.
 
     """
-    near = gauss_newton(replace(begun, sigma=floors(begun.segments, begun.model, begun.values)))
-    end = _reweighted(near.fit, near.fit)
+    refitted = gauss_newton(replace(begun, sigma=floors(begun.segments, begun.model, begun.values)))
+    end = _reweighted(refitted.fit, refitted.fit)
     base = _reweighted(wide.fit, end.fit)
     before, after = _standing(base), _standing(end)
     effect = begun.model.effects[-1]
@@ -180,17 +182,17 @@ def _begun(fit: Fit, effect: Effect, form: LinearForm) -> Fit | None:
     what makes it miss is something else.
     """
     silent, machine = fit.policy.fit.silent, fit.machine
-    plain = tuple(
+    sigmas = tuple(
         np.where(
             [c == form.channel and k != 0 for c, k in row_index(segment)[3]], silent * sigma, sigma
         )
         for segment, sigma in zip(fit.segments, fit.sigma, strict=True)
     )
     columns = tuple(effect_columns(form.effect, fit.model, ()))
-    system = linear_system(replace(fit, sigma=plain), columns)
+    system = linear_system(replace(fit, sigma=sigmas), columns)
     known, effort = system.normal_equations(), fit.policy.selection.thorough
-    end = known.along(np.arange(len(system.columns))).best(*effort)
-    rigid = known.along(system.model_columns).best(*effort)
+    end = known.restricted_to(np.arange(len(system.columns))).best(*effort)
+    rigid = known.restricted_to(system.model_columns).best(*effort)
     acting = np.array([channel == form.channel for _, channel, _ in system.labels])
     if not clears(system, acting, rigid.reduced_chi2, end.reduced_chi2):
         return None

@@ -52,27 +52,27 @@ def with_log_start(
         The largest fall first.
 
     """
-    found = list(scores)
+    ranked = list(scores)
     by_name = {c.effect.name: c for c in reversed(offered)}
     hooks = {c.effect.shown: c for c in by_name.values() if c.effect.shown is not None}
     for hook in hooks if significant.any() else ():
-        seen = hook(full_logs(wide.fit, wide.fit.model))
-        if seen is None or seen.found.name not in by_name:
+        shown = hook(full_logs(wide.fit, wide.fit.model))
+        if shown is None or shown.found.name not in by_name:
             continue
-        candidate = by_name[seen.found.name]
-        effect = settled(candidate.effect, seen.found)
-        given = {name: value for name, (value, _) in seen.found.values.items()}
-        begun = _begun(wide.fit, effect, {**given, **seen.start}, seen.base)
+        candidate = by_name[shown.found.name]
+        effect = settled(candidate.effect, shown.found)
+        given = {name: value for name, (value, _) in shown.found.values.items()}
+        begun = _begun(wide.fit, effect, {**given, **shown.start}, shown.base)
         started = scored(wide, candidate, begun)
-        alike = [s for s in found if s.candidate.effect.shown is hook]
+        alike = [s for s in ranked if s.candidate.effect.shown is hook]
         best = max((s.fall for s in alike), default=0.0)
         if started.fall > started.policy.close_share * best:
-            found = with_better([s for s in found if s not in alike], started, offered)
-    return tuple(found)
+            ranked = with_better([s for s in ranked if s not in alike], started, offered)
+    return tuple(ranked)
 
 
 def _begun(fit: Fit, effect: Effect, values: Values, base: Values) -> Fit:
     """The fit with an effect at such values, by their short names, and such constants."""
     model = fit.model.with_effects(effect)
-    own = {f"{effect.name}.{name}": value for name, value in values.items()}
-    return replace(fit, model=model).at({**zero(effect, model), **base, **own})
+    starts = {f"{effect.name}.{name}": value for name, value in values.items()}
+    return replace(fit, model=model).at({**zero(effect, model), **base, **starts})

@@ -55,11 +55,11 @@ def unused(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str, ..
 
     """
     used = {segment.capture for segment in cut_segments}
-    idle = [
+    unused_paths = [
         c.path for c in campaign.captures if c.path not in used and c.meta.test in known_tests()
     ]
-    words = "without the signals of their test's equation, or an even stretch of samples"
-    return (f"not used, {words}: {', '.join(sorted(idle))}",) if idle else ()
+    reason = "without the signals of their test's equation, or an even stretch of samples"
+    return (f"not used, {reason}: {', '.join(sorted(unused_paths))}",) if unused_paths else ()
 
 
 def idle(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
@@ -81,18 +81,18 @@ def idle(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     needs: dict[str, list[str]] = {}
     for capture in campaign.captures:
         needs.setdefault(_needs(capture), []).append(capture.path)
-    known = (*mixed(campaign, machine), *loaded(campaign, machine))
-    lacking = (f"{', '.join(sorted(paths))}: {words}" for words, paths in sorted(needs.items()))
-    return known or tuple(lacking)
+    causes = (*mixed(campaign, machine), *loaded(campaign, machine))
+    lacking = (f"{', '.join(sorted(paths))}: {need}" for need, paths in sorted(needs.items()))
+    return causes or tuple(lacking)
 
 
 def _needs(capture: Capture) -> str:
     """What the equation that a capture is nearest to needs of it."""
     test = capture.meta.test
-    own = [one for one in equations().values() if test in one.tests]
-    if not own:
+    takers = [equation for equation in equations().values() if test in equation.tests]
+    if not takers:
         return f"no equation takes a {test}"
-    missing = [[n for n in one.columns if not capture.has(n)] for one in own]
+    missing = [[n for n in equation.columns if not capture.has(n)] for equation in takers]
     fewest = min(map(len, missing))
     if not fewest:
         return (
@@ -128,8 +128,10 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
         if share is not None and share >= machine.policy.cutting.unexplained_share:
             shares[current][recorded.path] = share
     where = {
-        current: ", ".join(f"{path} {100.0 * share:.2g} %" for path, share in sorted(own.items()))
-        for current, own in shares.items()
+        current: ", ".join(
+            f"{path} {100.0 * share:.2g} %" for path, share in sorted(by_path.items())
+        )
+        for current, by_path in shares.items()
     }
     notes = {
         True: "the motion of these drives gives no inertia and no friction, as a torque that "
@@ -140,7 +142,7 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
         "turns the shaft (voltage that follows neither speed nor acceleration over what the latter "
         f"takes, squared): {where[False]}; log iq_a, or record with nothing coupled to the shaft",
     }
-    return tuple(notes[current] for current, own in shares.items() if own)
+    return tuple(notes[current] for current, by_path in shares.items() if by_path)
 
 
 def at_ambient(fit: Fit) -> tuple[str, ...]:
@@ -193,19 +195,26 @@ def unrecorded(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str
 
     """
     used = {segment.capture for segment in cut_segments}
-    captures = [one for one in campaign.captures if one.path in used and one.has("t_s")]
-    without_d = [one.path for one in captures if one.has("iq_a") and not one.has("id_a")]
-    by_speed = [
-        one.path
-        for one in captures
-        if one.has("omega_mech_rad_s")
-        and not (one.has("theta_mech_rad") or one.has("theta_elec_rad"))
+    captures = [
+        capture for capture in campaign.captures if capture.path in used and capture.has("t_s")
     ]
-    taken = (("id_a", "taken as zero", without_d), ("angle", "known by omega_mech_rad_s", by_speed))
+    without_d = [
+        capture.path for capture in captures if capture.has("iq_a") and not capture.has("id_a")
+    ]
+    by_speed = [
+        capture.path
+        for capture in captures
+        if capture.has("omega_mech_rad_s")
+        and not (capture.has("theta_mech_rad") or capture.has("theta_elec_rad"))
+    ]
+    substitutes = (
+        ("id_a", "taken as zero", without_d),
+        ("angle", "known by omega_mech_rad_s", by_speed),
+    )
     return tuple(
         f"what is left may be of an {name} that was not recorded, and is {how}: log it in "
         + ", ".join(sorted(paths))
-        for name, how, paths in taken
+        for name, how, paths in substitutes
         if paths
     )
 
@@ -213,10 +222,12 @@ def unrecorded(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str
 def _warmer(fit: Fit, name: str) -> dict[str, float]:
     """How much warmer [K] each capture without this temperature is fitted than most of them."""
     known = fit.model.machine.unlogged
-    own = {path: fit.values[key] for key, (one, path) in known.items() if one == name}
+    temperature_of = {
+        path: fit.values[key] for key, (signal, path) in known.items() if signal == name
+    }
     # what all have in common is in the shared nuisance, or in theirs
-    usual = float(np.median(list(own.values()))) if own else 0.0
-    return {path: value - usual for path, value in own.items()}
+    usual = float(np.median(list(temperature_of.values()))) if temperature_of else 0.0
+    return {path: value - usual for path, value in temperature_of.items()}
 
 
 def unexcited(

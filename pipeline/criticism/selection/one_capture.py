@@ -18,14 +18,14 @@ from pipeline.criticism.regression.goodness import HeldOut, predicted_chi2
 from pipeline.criticism.regression.linear_system import LinearSystem
 
 
-def rests_on(systems: Sequence[LinearSystem], held: Sequence[HeldOut]) -> str | None:
+def rests_on(systems: Sequence[LinearSystem], held_out: Sequence[HeldOut]) -> str | None:
     """`only_capture` of the step from the first of two fits to the second.
 
     Parameters
     ----------
     systems
         The fits before and after the step.
-    held
+    held_out
         Their held-out residuals.
 
     Returns
@@ -34,7 +34,9 @@ def rests_on(systems: Sequence[LinearSystem], held: Sequence[HeldOut]) -> str | 
         Path of the capture.
 
     """
-    without, after = (predicted_chi2(one, out) for one, out in zip(systems, held, strict=True))
+    without, after = (
+        predicted_chi2(system, errors) for system, errors in zip(systems, held_out, strict=True)
+    )
     return only_capture(systems[-1], without, after)
 
 

@@ -71,10 +71,10 @@ def orders_left(system: LinearSystem) -> tuple[float, ...]:
     ]
     lines.sort(key=lambda line: line[0])
     orders = []
-    for near in _clustered(lines, policy):
-        logs = [log for _, log in near]
+    for cluster in _clustered(lines, policy):
+        logs = [log for _, log in cluster]
         if len({log.capture for log in logs}) >= policy.captures:
-            order = _common(float(np.median([order for order, _ in near])), logs, policy)
+            order = _common(float(np.median([order for order, _ in cluster])), logs, policy)
             orders.append(int(order) if order.is_integer() else order)
     return tuple(dict.fromkeys(orders))
 
@@ -109,8 +109,8 @@ class Part:
     @property
     def scales(self) -> Array:
         """What the square of a sum over one carrier is in mean squares of the signal [2]."""
-        own = np.array([self.weight.sum(), (self.weight * self.current) @ self.current])
-        scales: Array = 2.0 / np.maximum(own * self.weight.sum(), 1e-300)
+        power = np.array([self.weight.sum(), (self.weight * self.current) @ self.current])
+        scales: Array = 2.0 / np.maximum(power * self.weight.sum(), 1e-300)
         return scales
 
     def power(self, orders: Array) -> Array:
@@ -291,12 +291,12 @@ def _lines(log: Log, policy: OrderScan) -> list[float]:
             break
         order = _peak(parts, float(grid[best]), policy)
         parts = tuple(part.without(order) for part in parts)
-        left, beside = _spectrum(parts, count, policy)
+        remaining, beside = _spectrum(parts, count, policy)
         clear = np.where(matters[:, best], power[:, best] / beside[:, best], 0.0)
         if float(clear.max()) <= policy.stands_out:
             break
         lines.append(order)
-        power = left
+        power = remaining
     return lines
 
 
@@ -307,13 +307,15 @@ def _spectrum(parts: Sequence[Part], count: int, policy: OrderScan) -> tuple[Arr
     return power, np.maximum(beside, 1e-300)
 
 
-def _peak(parts: Sequence[Part], near: float, policy: OrderScan) -> float:
+def _peak(parts: Sequence[Part], approximate: float, policy: OrderScan) -> float:
     """The order within a step that has the most power; a whole one that has about as much."""
-    whole = float(round(near))
-    tried = np.append(near + policy.step * np.linspace(-1.0, 1.0, 2 * policy.finer + 1), whole)
+    integer = float(round(approximate))
+    tried = np.append(
+        approximate + policy.step * np.linspace(-1.0, 1.0, 2 * policy.finer + 1), integer
+    )
     power = np.sum([part.power(tried) for part in parts], axis=0).max(axis=0)
     best = int(np.argmax(power))
-    return whole if power[-1] >= policy.whole_share * power[best] else float(tried[best])
+    return integer if power[-1] >= policy.whole_share * power[best] else float(tried[best])
 
 
 def _clustered(lines: Sequence[Line], policy: OrderScan) -> Iterator[list[Line]]:
@@ -324,24 +326,24 @@ def _clustered(lines: Sequence[Line], policy: OrderScan) -> Iterator[list[Line]]
         number += order - before > policy.apart
         before = order
         numbers.append(number)
-    for _, mine in groupby(zip(numbers, lines, strict=True), key=lambda one: one[0]):
-        yield [line for _, line in mine]
+    for _, members in groupby(zip(numbers, lines, strict=True), key=lambda one: one[0]):
+        yield [line for _, line in members]
 
 
-def _common(near: float, logs: Sequence[Log], policy: OrderScan) -> float:
+def _common(approximate: float, logs: Sequence[Log], policy: OrderScan) -> float:
     """The order that several logs have: whole, or where waves of one phase fit all of them best.
 
     Angles go on from turn to turn, so that a wave of any order is one function of them.
     """
-    order = _peak([part for log in logs for part in log.parts], near, policy)
+    order = _peak([part for log in logs for part in log.parts], approximate, policy)
     if order.is_integer():
         return order
     channels = dict.fromkeys(log.channel for log in logs)
     turned = np.ptp(np.concatenate([log.whole.theta_rad for log in logs])) / TURN_RAD
     count = int(policy.oversampled * policy.apart * turned) + 1
     tried = order + policy.apart * np.linspace(-1.0, 1.0, 2 * count + 1)
-    each = [_in_phase([g.whole for g in logs if g.channel == name], tried) for name in channels]
-    return round(float(tried[int(np.argmax(np.sum(each, axis=0).max(axis=0)))]), 4)
+    power = [_in_phase([g.whole for g in logs if g.channel == name], tried) for name in channels]
+    return round(float(tried[int(np.argmax(np.sum(power, axis=0).max(axis=0)))]), 4)
 
 
 def _in_phase(logs: Sequence[Part], orders: Array) -> Array:

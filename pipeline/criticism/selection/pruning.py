@@ -47,12 +47,12 @@ def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
         spare = _spare(system, effect, penalty)
         if not spare:
             continue
-        less = _unless_worth(system, name, spare, penalty)
-        if less is not None:
-            system = less
+        reduced = _unless_worth(system, name, spare, penalty)
+        if reduced is not None:
+            system = reduced
             continue
-        alone = spare if len(spare) > 1 else ()
-        for term in (*alone, *_doubtful(system, effect, spare, penalty)):
+        one_by_one = spare if len(spare) > 1 else ()
+        for term in (*one_by_one, *_doubtful(system, effect, spare, penalty)):
             system = _unless_worth(system, name, (term,), penalty) or system
     return system
 
@@ -73,10 +73,10 @@ def with_all_terms(fit: Fit) -> Fit:
 
     """
     model = fit.model
-    own = [e if e.hook == "sensor" else replace(e, left_out=()) for e in model.effects]
-    full = replace(model, effects=tuple(own))
+    complete = [e if e.hook == "sensor" else replace(e, left_out=()) for e in model.effects]
+    full = replace(model, effects=tuple(complete))
     values = dict(fit.values)
-    for effect in own:
+    for effect in complete:
         values = {**zero(effect, full), **values}
     return replace(fit, model=full, values=values)
 
@@ -107,18 +107,18 @@ def _spare(system: LinearSystem, effect: Effect, penalty: float) -> tuple[int, .
     parameters = effect.parameters_of(system.fit.machine)
     removable = sorted({p.optional for p in parameters} - {0})
     known = system.normal_equations()
-    gone: list[int] = []
+    dropped: list[int] = []
     while True:
         costs = []
         for term in removable:
-            if any(p.amplitude and p.optional not in (*gone, term) for p in parameters):
-                names = _parameters(system.fit, effect, (*gone, term))
-                more = len(names) * penalty
-                costs.append((_loss(system, known, names) - more, term))
+            if any(p.amplitude and p.optional not in (*dropped, term) for p in parameters):
+                names = _parameters(system.fit, effect, (*dropped, term))
+                saved = len(names) * penalty
+                costs.append((_loss(system, known, names) - saved, term))
         cheapest = min(costs, default=(0.0, 0))
         if cheapest[0] >= 0.0:
-            return tuple(gone)
-        gone.append(cheapest[1])
+            return tuple(dropped)
+        dropped.append(cheapest[1])
         removable.remove(cheapest[1])
 
 
@@ -128,7 +128,7 @@ def _loss(system: LinearSystem, known: NormalEquations, names: Sequence[str]) ->
     out = np.array([n for n in model_columns if system.columns[n].name in names], dtype=int)
     move = np.array([-system.fit.values[system.columns[n].name] for n in out])
     return (
-        known.moved(out, move).along(np.setdiff1d(model_columns, out)).best().deviance
+        known.moved(out, move).restricted_to(np.setdiff1d(model_columns, out)).best().deviance
         - known.deviance()
     )
 
@@ -150,10 +150,10 @@ def _doubtful(
 def _without(system: LinearSystem, effect: Effect, terms: Sequence[int]) -> LinearSystem:
     """The refit without some terms; columns of all else are taken over."""
     fit = system.fit
-    gone = _parameters(fit, effect, terms)
-    less = replace(effect, left_out=tuple(sorted({*effect.left_out, *terms})))
-    effects = tuple(less if e.name == effect.name else e for e in fit.model.effects)
-    values = {name: v for name, v in fit.values.items() if name not in gone}
+    dropped = _parameters(fit, effect, terms)
+    reduced = replace(effect, left_out=tuple(sorted({*effect.left_out, *terms})))
+    effects = tuple(reduced if e.name == effect.name else e for e in fit.model.effects)
+    values = {name: v for name, v in fit.values.items() if name not in dropped}
     start = replace(fit, model=replace(fit.model, effects=effects), values=values)
     prefix = f"{effect.name}."
     named = [

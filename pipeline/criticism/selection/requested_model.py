@@ -40,14 +40,14 @@ class BaseFit:
     hum: tuple[Hum, ...]
 
 
-def in_better_frame(system: LinearSystem, near: Fit) -> LinearSystem:
+def in_better_frame(system: LinearSystem, rough: Fit) -> LinearSystem:
     """The fit by the rotor frame that explains held voltages better.
 
     Parameters
     ----------
     system
         Fitted with vectors in the frame of the middle of their hold.
-    near
+    rough
         Where that fit began.
 
     Returns
@@ -62,10 +62,10 @@ def in_better_frame(system: LinearSystem, near: Fit) -> LinearSystem:
     logs it from before or behind that, and no capture states which.
 
     """
-    if not any(_held(segment) for segment in system.segments):
+    if not any(_has_held_vectors(segment) for segment in system.segments):
         return system
-    turned = tuple(_at_start(s) if _held(s) else s for s in system.segments)
-    other = first_fit(replace(near, segments=turned))
+    turned = tuple(_at_start(s) if _has_held_vectors(s) else s for s in system.segments)
+    other = first_fit(replace(rough, segments=turned))
     return other if other.deviance < system.deviance else system
 
 
@@ -87,7 +87,7 @@ def frame_notes(segments: Sequence[Segment]) -> tuple[str, ...]:
     return (_FRAME.format(len(captures)),) if captures else ()
 
 
-def _held(segment: Segment) -> bool:
+def _has_held_vectors(segment: Segment) -> bool:
     """Whether a segment has voltage vectors that are held from their sample on."""
     return segment.instrument.timing == "held" and "vd_v" in segment.channels
 
@@ -125,11 +125,11 @@ def fit_of(segments: Sequence[Segment], model: Model) -> BaseFit:
         for effect in model.effects
         if not all(p.amplitude for p in effect.parameters_of(model.machine))
     }
-    near = rough_fit(segments, model.without(*shaped))
-    hum = hum_of(segments, near.model, near.values)
-    humming = with_hum(segments, hum, near.model, near.values)
-    near = replace(near, segments=humming)
-    system = at_better_place(in_better_frame(first_fit(near), near))
+    rough = rough_fit(segments, model.without(*shaped))
+    hum = hum_of(segments, rough.model, rough.values)
+    humming = with_hum(segments, hum, rough.model, rough.values)
+    rough = replace(rough, segments=humming)
+    system = at_better_place(in_better_frame(first_fit(rough), rough))
     if not shaped:
         return BaseFit(system, hum)
     while shaped:
@@ -146,5 +146,5 @@ def fit_of(segments: Sequence[Segment], model: Model) -> BaseFit:
     settled = {effect.name: effect for effect in fit.model.effects}
     model = replace(model, effects=tuple(settled.get(e.name, e) for e in model.effects))
     unheard = {k: v for effect in shaped.values() for k, v in zero(effect, model).items()}
-    whole = replace(fit, model=model, values={**fit.values, **unheard})
-    return BaseFit(reconsidered(gauss_newton(whole)), hum)
+    full = replace(fit, model=model, values={**fit.values, **unheard})
+    return BaseFit(reconsidered(gauss_newton(full)), hum)

@@ -219,7 +219,7 @@ def widened(
     columns = [c for candidate in offered for c in candidate.columns]
     if before is not None:
         present = {column.key for column in model_columns(fit.model)}
-        before = before.along(
+        before = before.restricted_to(
             np.array([n for n, c in enumerate(before.columns) if c.key not in present], dtype=int)
         )
     return linear_system(fit, columns, before)
@@ -247,20 +247,20 @@ def score_all(
         The largest fall first.
 
     """
-    by, policy = _Scoring.of(system, significant), system.policy.selection
+    scoring, policy = _Scoring.of(system, significant), system.policy.selection
     penalty = math.log(float(system.size))
     searched_of = {c.effect.name: searched(offered, c.effect) for c in offered}
     best: dict[str, tuple[Score, NDArray[np.int64]]] = {}
     for candidate, places in placed(system, offered):
-        score = by.score(candidate, places, policy.quick)
+        score = scoring.score(candidate, places, policy.quick)
         cost = paid_for(candidate.effect, system.fit.machine, score) * penalty
         cost += searched_of[candidate.effect.name]
         if score is not None and score.fall > policy.quick_penalties * cost:
-            score = by.score(candidate, places, policy.thorough)
+            score = scoring.score(candidate, places, policy.thorough)
         known = best.get(candidate.effect.name)
         if score is not None and (known is None or score.fall > known[0].fall):
             best[candidate.effect.name] = replace(score, penalty=cost), places
-    scores = [replace(one, confounder=by.confounder(one, best)) for one, _ in best.values()]
+    scores = [replace(one, confounder=scoring.confounder(one, best)) for one, _ in best.values()]
     return tuple(sorted(scores, key=lambda s: (-s.fall, s.candidate.effect.name)))
 
 
@@ -356,7 +356,9 @@ class _Scoring:
     @classmethod
     def of(cls, system: LinearSystem, significant: NDArray[np.bool_] | None) -> _Scoring:
         model_columns, normal_equations = system.model_columns, system.normal_equations()
-        before = Standing.of(system, model_columns, normal_equations.along(model_columns).best())
+        before = Standing.of(
+            system, model_columns, normal_equations.restricted_to(model_columns).best()
+        )
         remaining = np.zeros(len(system.labels), dtype=bool) if significant is None else significant
         return cls(system, normal_equations, model_columns, before, remaining)
 
@@ -368,10 +370,10 @@ class _Scoring:
     ) -> Score | None:
         """Score of one candidate with parameters on the wrong side of a bound left at zero."""
         system, machine = self.system, self.system.fit.machine
-        known = {
+        parameters = {
             f"{candidate.effect.name}.{p.name}": p for p in candidate.effect.parameters_of(machine)
         }
-        best = self._inside(places, known, effort)
+        best = self._inside(places, parameters, effort)
         if best is None:
             return None
         live, end = best
@@ -379,9 +381,9 @@ class _Scoring:
             zip(self._names(live), end.step[self.model_columns.size :].tolist(), strict=True)
         )
         sizes = [
-            abs(value) / (known[name].negligible * machine.scale(known[name]))
+            abs(value) / (parameters[name].negligible * machine.scale(parameters[name]))
             for name, value in step.items()
-            if known[name].negligible > 0
+            if parameters[name].negligible > 0
         ]
         after = Standing.of(system, np.concatenate([self.model_columns, live]), end)
         names = self._names(self.model_columns)
@@ -413,9 +415,9 @@ class _Scoring:
         """
         live = places
         while live.size:
-            end = self.normal_equations.along(np.concatenate([self.model_columns, live])).best(
-                *effort
-            )
+            end = self.normal_equations.restricted_to(
+                np.concatenate([self.model_columns, live])
+            ).best(*effort)
             steps = zip(
                 self._names(live), end.step[self.model_columns.size :].tolist(), strict=True
             )
@@ -448,13 +450,13 @@ class _Scoring:
         clearest, beside = max(small, key=lambda pair: pair[0].fall)
         thorough = self.system.policy.selection.thorough
         _, shrunk = best[score.candidate.effect.name]
-        without = self.normal_equations.along(np.concatenate([self.model_columns, beside])).best(
-            *thorough
-        )
-        both = self.normal_equations.along(
+        without = self.normal_equations.restricted_to(
+            np.concatenate([self.model_columns, beside])
+        ).best(*thorough)
+        with_both = self.normal_equations.restricted_to(
             np.concatenate([self.model_columns, beside, shrunk])
         ).best(*thorough)
-        worth = without.deviance - both.deviance > score.penalty
+        worth = without.deviance - with_both.deviance > score.penalty
         return None if worth else clearest.candidate.effect.name
 
 
@@ -480,9 +482,9 @@ def clears(
         False where no group counts.
 
     """
-    over, remaining = (system.counts * np.maximum(q - 1.0, 0.0) for q in (before, after))
-    most = system.policy.selection.clears_share * float(over[significant].sum())
-    return bool(significant.any()) and float(remaining[significant].sum()) < most
+    excess, remaining = (system.counts * np.maximum(q - 1.0, 0.0) for q in (before, after))
+    allowed = system.policy.selection.clears_share * float(excess[significant].sum())
+    return bool(significant.any()) and float(remaining[significant].sum()) < allowed
 
 
 def _outside(value: float, parameter: Parameter) -> bool:
@@ -520,13 +522,13 @@ def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Stan
     excess = system.counts * np.log(np.maximum(before.reduced_chi2, 1.0))
     remaining = system.counts * np.log(np.maximum(after.reduced_chi2, 1.0))
     channel = np.array([name for _, name, _ in system.labels])
-    places = [channel == name for name in dict.fromkeys(channel.tolist())]
-    places.append(np.array([system.segments[n].test in effect.tests for n, _, _ in system.labels]))
+    groups = [channel == name for name in dict.fromkeys(channel.tolist())]
+    groups.append(np.array([system.segments[n].test in effect.tests for n, _, _ in system.labels]))
     shares = [0.0]
-    for place in places:
-        had = float(excess[place].sum())
-        if had > min(policy.excess, policy.excess_a_sample * float(system.counts[place].sum())):
-            shares.append(1.0 - float(remaining[place].sum()) / had)
+    for group in groups:
+        had = float(excess[group].sum())
+        if had > min(policy.excess, policy.excess_a_sample * float(system.counts[group].sum())):
+            shares.append(1.0 - float(remaining[group].sum()) / had)
     error = min(max(shares), power_share(system, before.reduced_chi2, after.reduced_chi2))
     cost = before.prior_cost
     return max(error, 1.0 - after.prior_cost / cost if cost > policy.excess else 0.0)

@@ -122,11 +122,13 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
             break
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
         fit = at_better_place(reconsidered(_backward(chosen, base))).fit
-        found = fit.model.effects[base:]
-        fit = replace(fit, tolerance=tolerances(fit, found))
-        if found and (found[-1].hook in ("sensor", "drop") or found[-1].discriminator is not None):
+        effects = fit.model.effects[base:]
+        fit = replace(fit, tolerance=tolerances(fit, effects))
+        if effects and (
+            effects[-1].hook in ("sensor", "drop") or effects[-1].discriminator is not None
+        ):
             fit = _floored_anew(fit)
-        if tuple(e.name for e in found) in {r.added for r in steps}:
+        if tuple(e.name for e in effects) in {r.added for r in steps}:
             break
     return tuple(steps)
 
@@ -165,16 +167,16 @@ def _floored_anew(fit: Fit) -> Fit:
     ratio = np.concatenate(floor) / np.concatenate(fit.sigma)
     if np.abs(np.log(ratio)).max() >= math.log(policy.floor_ratio):
         fit = replace(fit, sigma=floor, near=fit.values)
-        ended = gauss_newton(fit)
+        refitted = gauss_newton(fit)
     else:
-        ended = linear_system(fit)
-        if not significant_groups(ended).any():
+        refitted = linear_system(fit)
+        if not significant_groups(refitted).any():
             return fit
-    near = rough_anew(fit)
-    lighter, heavier = sorted(fit.values["j_kgm2"] for fit in (near, fit))
+    rough = rough_anew(fit)
+    lighter, heavier = sorted(fit.values["j_kgm2"] for fit in (rough, fit))
     if heavier < policy.inertia_ratio * lighter:
-        return ended.fit
-    return min(ended, first_fit(near), key=lambda end: end.deviance).fit
+        return refitted.fit
+    return min(refitted, first_fit(rough), key=lambda end: end.deviance).fit
 
 
 def _chosen(
@@ -196,7 +198,7 @@ def _chosen(
             cost = finished.deviance + math.log(wide.size) * finished.model_columns.size
             if cost > least + policy.tie:
                 return None
-            if _sure(linear_system(finished.fit)):
+            if _is_determined(linear_system(finished.fit)):
                 return finished
             least = min(least, cost)
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
@@ -250,27 +252,34 @@ class _Baseline:
 
     wide: LinearSystem
     added: Sequence[Effect]
-    held: HeldOut
+    held_out: HeldOut
     shrunk: Array
     doubt: Array
     significant: NDArray[np.bool_]
 
     @classmethod
     def of(cls, wide: LinearSystem, added: Sequence[Effect]) -> _Baseline:
-        held, significant = leave_out(wide), significant_groups(wide)
-        return cls(wide, added, held, _shrunk(wide), _doubt(wide, added), significant)
+        held_out, significant = leave_out(wide), significant_groups(wide)
+        return cls(
+            wide,
+            added,
+            held_out,
+            _floor_factors(wide),
+            _form_error_factors(wide, added),
+            significant,
+        )
 
     def is_improved_by(self, tried: LinearSystem, score: Score) -> bool:
         """Whether a candidate predicts captures held out better, and mends more than it spoils."""
         wide, policy = self.wide, self.wide.policy.selection
         same_hook = _same_hook(score.candidate.effect, self.added)
-        doubts = _doubt(wide, same_hook), self.doubt
+        doubts = _form_error_factors(wide, same_hook), self.doubt
         below = policy.same_hook_penalties if same_hook else policy.held_out_penalties
         promised = policy.held_out_penalties * score.penalty, below * score.penalty
-        one, other = in_common((wide, tried), (self.held, leave_out(tried)))
+        one, other = in_common((wide, tried), (self.held_out, leave_out(tried)))
         without = predicted_chi2(wide, one) * self.shrunk
-        after = predicted_chi2(tried, other) * _shrunk(tried)
-        holds = _holds(wide, without, tried, after, promised, doubts)
+        after = predicted_chi2(tried, other) * _floor_factors(tried)
+        holds = _improves_held_out(wide, without, tried, after, promised, doubts)
         return holds and not spoils(tried, without, after)
 
 
@@ -299,8 +308,8 @@ def _refitted(wide: LinearSystem, score: Score) -> LinearSystem:
     tried = gauss_newton(begin_from(wide.fit, score), before=wide)
     if tried.deviance + score.penalty < wide.deviance:
         return tried
-    again = gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)
-    return min(tried, again, key=lambda end: end.deviance)
+    restarted = gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)
+    return min(tried, restarted, key=lambda end: end.deviance)
 
 
 def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_]) -> bool:
@@ -310,12 +319,17 @@ def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np
     fit, effect = system.fit, system.fit.model.effects[-1]
     if material(fit, effect):
         return True
-    was, now = before.reduced_chi2(before.residual), system.reduced_chi2(system.residual)
-    most = effect.discriminator is None and clears(system, significant, was, now)
-    return most and shaped(fit, effect)
+    before_chi2, after_chi2 = (
+        before.reduced_chi2(before.residual),
+        system.reduced_chi2(system.residual),
+    )
+    takes_most = effect.discriminator is None and clears(
+        system, significant, before_chi2, after_chi2
+    )
+    return takes_most and shaped(fit, effect)
 
 
-def _sure(system: LinearSystem) -> bool:
+def _is_determined(system: LinearSystem) -> bool:
     """Whether some amplitude of the newest effect differs significantly from zero: two standard
     uncertainties away, whichever capture is left out; or all of them together do. Of a coupling,
     its twist or gap must be so as well, by the fit or by full logs, and full logs must not exclude
@@ -325,28 +339,32 @@ def _sure(system: LinearSystem) -> bool:
     sense at a reversal, while its own size is not known at all.
     """
     effect = system.fit.model.effects[-1]
-    held = leave_out(system)
-    sure = significantly_nonzero(system, held, system.policy.selection.least_u)
-    known = effect.parameters_of(system.fit.machine)
+    held_out = leave_out(system)
+    sure = significantly_nonzero(system, held_out, system.policy.selection.least_u)
+    parameters = effect.parameters_of(system.fit.machine)
     least, size = system.policy.selection.least_u, partial(system.fit.size, effect)
-    nonzero = [p for p in known if f"{effect.name}.{p.name}" in sure or 0.0 < least * p.u < size(p)]
-    twists = [p for p in known if p.negligible > 0 and not p.amplitude]
+    nonzero = [
+        p for p in parameters if f"{effect.name}.{p.name}" in sure or 0.0 < least * p.u < size(p)
+    ]
+    twists = [p for p in parameters if p.negligible > 0 and not p.amplitude]
     coupled = effect.discriminator is None or not twists or any(p in nonzero for p in twists)
-    seen = discriminate(system.fit, effect) if coupled else None
-    excluded = seen is not None and seen.name is None
-    amplitudes = [f"{effect.name}.{p.name}" for p in known if p.amplitude]
-    there = any(p.amplitude for p in nonzero) or together_nonzero(system, held, amplitudes, least)
-    return coupled and not excluded and there
+    discrimination = discriminate(system.fit, effect) if coupled else None
+    excluded = discrimination is not None and discrimination.name is None
+    amplitudes = [f"{effect.name}.{p.name}" for p in parameters if p.amplitude]
+    present = any(p.amplitude for p in nonzero) or together_nonzero(
+        system, held_out, amplitudes, least
+    )
+    return coupled and not excluded and present
 
 
 def _same_hook(effect: Effect, added: Sequence[Effect]) -> list[Effect]:
     """The found effects that act where an effect does: fluxes and drops in voltages, or drags."""
     voltage = ("flux", "drop")
     acts = voltage if effect.hook in voltage else (effect.hook,)
-    return [one for one in added if one.hook in acts and effect.hook != "sensor"]
+    return [other for other in added if other.hook in acts and effect.hook != "sensor"]
 
 
-def _doubt(wide: LinearSystem, added: Sequence[Effect]) -> Array:
+def _form_error_factors(wide: LinearSystem, added: Sequence[Effect]) -> Array:
     """Factors [G] on χ²/n if the forms of these effects are wrong by a twentieth.
 
     Windage that only takes up what the formula of Stribeck friction leaves is not there.
@@ -363,7 +381,7 @@ def _doubt(wide: LinearSystem, added: Sequence[Effect]) -> Array:
     return factors
 
 
-def _holds(
+def _improves_held_out(
     wide: LinearSystem,
     before: Array,
     tried: LinearSystem,
@@ -380,7 +398,7 @@ def _holds(
     """
     policy = wide.policy.selection
     same_hook, below = doubts
-    cost, after_cost = (float(one.prior_costs().sum()) for one in (wide, tried))
+    cost, after_cost = (float(system.prior_costs().sum()) for system in (wide, tried))
     fall = (
         wide.deviance_of(same_hook * before)
         + cost
@@ -389,7 +407,9 @@ def _holds(
     )
     priors = cost > policy.excess and after_cost < (1.0 - policy.least_share) * cost
     helps = priors or power_share(wide, same_hook * before, same_hook * after) >= policy.least_share
-    below_floor = min(fall_below_floor(wide, some * before, some * after) for some in (1.0, below))
+    below_floor = min(
+        fall_below_floor(wide, factors * before, factors * after) for factors in (1.0, below)
+    )
     return fall > least[0] and (helps or below_floor > least[1])
 
 
@@ -421,7 +441,7 @@ def spoils(tried: LinearSystem, before: Array, after: Array) -> bool:
     return float((tried.counts * change)[counts].sum()) > 0.0
 
 
-def _shrunk(tried: LinearSystem) -> Array:
+def _floor_factors(tried: LinearSystem) -> Array:
     """Factors [G] that turn χ²/n by the floors a fit was made with into χ²/n by those at its end.
 
     The equations hold the noise of a current times R and L: a fit that makes these smaller makes
@@ -519,10 +539,10 @@ def size_of(fit: Fit, effect: Effect, unit: str) -> float:
 
 def _backward(system: LinearSystem, base: int) -> LinearSystem:
     """Takes out effects that later ones have made superfluous."""
-    most = system.policy.selection.most_penalties
+    factor = system.policy.selection.most_penalties
     for effect in system.fit.model.effects[base:-1]:
         penalty = effect.dof(system.fit.machine) * math.log(system.size)
-        if material(system.fit, effect) and loss_without(system, (effect.name,)) > most * penalty:
+        if material(system.fit, effect) and loss_without(system, (effect.name,)) > factor * penalty:
             continue
         tried = gauss_newton(system.fit.without(effect.name), before=system)
         if tried.deviance - system.deviance < penalty:
@@ -555,9 +575,11 @@ def loss_without(
         To first order: the model is taken as linear between here and there.
 
     """
-    gone = tuple(f"{name}." for name in names)
+    prefixes = tuple(f"{name}." for name in names)
     fit, model_columns = system.fit, system.model_columns
-    out = np.array([n for n in model_columns if system.columns[n].name.startswith(gone)], dtype=int)
+    out = np.array(
+        [n for n in model_columns if system.columns[n].name.startswith(prefixes)], dtype=int
+    )
     stay = np.setdiff1d(model_columns, out)
     if instead is not None:
         stay = np.concatenate([stay, instead])
@@ -569,6 +591,6 @@ def loss_without(
     }
     names_out = [system.columns[n].name for n in out]
     move = np.array([-fit.values[n] if amplitude[n] else 0.0 for n in names_out])
-    known = system.normal_equations() if normal_equations is None else normal_equations
-    end = known.moved(out, move).along(stay).best(*fit.policy.selection.thorough)
-    return end.deviance - known.deviance()
+    equations = system.normal_equations() if normal_equations is None else normal_equations
+    end = equations.moved(out, move).restricted_to(stay).best(*fit.policy.selection.thorough)
+    return end.deviance - equations.deviance()

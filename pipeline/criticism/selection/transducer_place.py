@@ -37,9 +37,9 @@ def at_better_place(system: LinearSystem) -> LinearSystem:
         by `policy.selection.tie`.
 
     """
-    over = significant_groups(system)
+    significant = significant_groups(system)
     torques = [channel == TORQUE for _, channel, _ in system.labels]
-    if not over[torques].any():
+    if not significant[torques].any():
         return system
     segments = tuple(_elsewhere(s) if _reads_torque(s) else s for s in system.segments)
     other = gauss_newton(replace(system.fit, segments=segments))

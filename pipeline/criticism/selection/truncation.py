@@ -22,7 +22,7 @@ SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
 
 
 def truncated(
-    steps: Sequence[LadderStep], held: Sequence[HeldOut]
+    steps: Sequence[LadderStep], held_out: Sequence[HeldOut]
 ) -> tuple[tuple[LadderStep, ...], tuple[Remainder, ...]]:
     """The search without unsupported trailing steps.
 
@@ -30,7 +30,7 @@ def truncated(
     ----------
     steps
         Steps of the search.
-    held
+    held_out
         Held-out residuals of each, over the same rows.
 
     Returns
@@ -52,17 +52,17 @@ def truncated(
     for count in range(len(steps), 0, -1):
         kept, system = tuple(steps[:count]), steps[count - 1].system
         remainders = remainder(system)
-        most = (1.0 - policy.little_share) * held[count - 2].total
-        worse = count > 2 and held[count - 1].total > most
-        if count == 1 or not remainders or (explained(kept, held, remainders) and not worse):
+        allowed = (1.0 - policy.little_share) * held_out[count - 2].total
+        worse = count > 2 and held_out[count - 1].total > allowed
+        if count == 1 or not remainders or (explained(kept, held_out, remainders) and not worse):
             break
         if contradiction(steps[count - 1]):
             continue
-        if held[count - 1].total < (1.0 - policy.guess_share) * held[count - 2].total:
+        if held_out[count - 1].total < (1.0 - policy.guess_share) * held_out[count - 2].total:
             break
         if not worse and _clears_orders(steps[count - 2].system, system):
             break
-        if _clears_its_side(steps[count - 2 : count], held[count - 2 : count]):
+        if _clears_its_side(steps[count - 2 : count], held_out[count - 2 : count]):
             break
     return kept, remainders
 
@@ -108,7 +108,7 @@ def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:
     return bool(_waved(before) - _waved(after))
 
 
-def _clears_its_side(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> bool:
+def _clears_its_side(steps: Sequence[LadderStep], held_out: Sequence[HeldOut]) -> bool:
     """Whether the newest effect of two steps takes most of the held-out power over the floor of its
     own side, winding or shaft, while the other side misses as well.
 
@@ -122,12 +122,12 @@ def _clears_its_side(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> bo
         for n, c in enumerate(after.columns[: after.model_column_count])
         if c.name.startswith(name)
     ]
-    out = np.isfinite(held[-1].residual) & np.any(after.matrix[:, columns] != 0.0, axis=1)
+    out = np.isfinite(held_out[-1].residual) & np.any(after.matrix[:, columns] != 0.0, axis=1)
     acts = np.bincount(after.group, out, len(after.labels))
     shaft = np.array([channel in SHAFT for _, channel, _ in after.labels])
     was, now = (
-        step.system.counts * np.maximum(predicted_chi2(step.system, one) - 1.0, 0.0)
-        for step, one in zip(steps, held, strict=True)
+        step.system.counts * np.maximum(predicted_chi2(step.system, errors) - 1.0, 0.0)
+        for step, errors in zip(steps, held_out, strict=True)
     )
     falls = [float((was - now)[(acts > 0) & side].sum()) for side in (shaft, ~shaft)]
     side = shaft if falls[0] >= falls[1] else ~shaft
@@ -141,12 +141,14 @@ def _waved(system: LinearSystem) -> set[str]:
     """Signals with waves of the angle that are reported."""
     significant = significant_groups(system)
     return {
-        c for (_, c, order), over in zip(system.labels, significant, strict=True) if over and order
+        channel
+        for (_, channel, order), is_over in zip(system.labels, significant, strict=True)
+        if is_over and order
     }
 
 
 def explained(
-    steps: Sequence[LadderStep], held: Sequence[HeldOut], remainders: Sequence[Remainder]
+    steps: Sequence[LadderStep], held_out: Sequence[HeldOut], remainders: Sequence[Remainder]
 ) -> bool:
     """Whether the effects found explain what is left over the floor.
 
@@ -154,7 +156,7 @@ def explained(
     ----------
     steps
         Steps of the search.
-    held
+    held_out
         Held-out residuals of each.
     remainders
         What is over the floor at the end.
@@ -174,7 +176,7 @@ def explained(
 
     """
     policy = steps[0].fit.policy.selection
-    first, last = (max(held[n].total ** 2 - 1.0, 0.0) for n in (0, len(steps) - 1))
+    first, last = (max(held_out[n].total ** 2 - 1.0, 0.0) for n in (0, len(steps) - 1))
     if last > policy.unexplained_share * first:
         return not remainders
     signals = sorted({r.signal for r in remainders})
@@ -182,9 +184,9 @@ def explained(
         np.array([_excess(step, {name}) for name in signals]) for step in (steps[0], steps[-1])
     )
     large = before > policy.least_share * before.sum()
-    taken = bool((after[large] <= (1.0 - policy.least_share) * before[large]).all())
-    most = policy.unexplained_share * float(before.sum())
-    return not remainders or (taken and float(after.sum()) < most)
+    removed = bool((after[large] <= (1.0 - policy.least_share) * before[large]).all())
+    allowed = policy.unexplained_share * float(before.sum())
+    return not remainders or (removed and float(after.sum()) < allowed)
 
 
 def _excess(step: LadderStep, channels: set[str]) -> float:

@@ -12,7 +12,11 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors
-from pipeline.criticism.regression.linear_system import _kept, linear_system, model_columns
+from pipeline.criticism.regression.linear_system import (
+    _reusable_columns,
+    linear_system,
+    model_columns,
+)
 from pipeline.criticism.regression.linearise import _Sampler, absorb, effect_columns, whitened_anew
 from pipeline.criticism.regression.noise_floors import offsets
 from pipeline.criticism.residuals.residual import operate, residual
@@ -80,10 +84,10 @@ def test_what_turns_the_angle_is_made_anew_where_another_error_of_it_was_found()
     model = PLAIN.with_effects(off)
     found = {**BASE, **zero(off, model), "angle_eccentricity.sine_rad": 0.1}
     turned = Fit(segments, model, found, start.sigma, found)
-    kept = _kept(before, turned, before.columns, chord=False)
+    kept = _reusable_columns(before, turned, before.columns, chord=False)
     assert drag[0].key in kept
     assert not any(name.startswith("angle_offset.") for name, _ in kept)
-    again = _kept(before, start, before.columns, chord=False)
+    again = _reusable_columns(before, start, before.columns, chord=False)
     assert any(name.startswith("angle_offset.") for name, _ in again)
 
 
@@ -97,12 +101,12 @@ def test_a_sensor_s_column_holds_until_a_parameter_of_the_model_moves():
     before = linear_system(here)
     near, far = (replace(here, values={**values, name: size}) for size in (0.0103, 0.012))
     keys = {column.key for column in effect_columns(off, model)}
-    assert keys <= set(_kept(before, near, before.columns, chord=False))
-    assert keys.isdisjoint(_kept(before, far, before.columns, chord=False))
-    assert ("lq_h", ()) in _kept(before, far, before.columns, chord=False)
+    assert keys <= set(_reusable_columns(before, near, before.columns, chord=False))
+    assert keys.isdisjoint(_reusable_columns(before, far, before.columns, chord=False))
+    assert ("lq_h", ()) in _reusable_columns(before, far, before.columns, chord=False)
     without = Fit(segments, PLAIN, {**BASE}, here.sigma, BASE)
     heat = [c for c in before.columns if c.name == "offset_temp_k"]
-    assert _kept(before, without, heat, chord=False) == {}
+    assert _reusable_columns(before, without, heat, chord=False) == {}
     # what is made anew is of the new place, and what stays of the old one
     after = linear_system(far, before=before)
     assert all(after.made_at[key][name] == 0.012 for key in keys)

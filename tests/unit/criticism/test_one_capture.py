@@ -102,6 +102,6 @@ def test_trailing_effects_that_one_capture_alone_asks_for_are_notes_and_no_names
         search, "rests_on", lambda _, held: "spin_down_0" if held[-1] in alone else None
     )
     ladder = search.ladder_from(SimpleNamespace(system=SimpleNamespace(fit=None)), {})
-    assert len(ladder.steps) == len(ladder.held) == kept
+    assert len(ladder.steps) == len(ladder.held_out) == kept
     assert set(ladder.cut) == noted
     assert all("spin_down_0" in note for note in ladder.cut.values())

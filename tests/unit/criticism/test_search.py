@@ -51,8 +51,8 @@ def climbs(monkeypatch):
 
     monkeypatch.setattr(search, "ladder_from", climbed)
     monkeypatch.setattr(search, "_sketched", sketched)
-    monkeypatch.setattr(search, "_beside", lambda *_: [])
-    monkeypatch.setattr(search, "_freed", lambda _: made.freed)
+    monkeypatch.setattr(search, "_other_side_note", lambda *_: [])
+    monkeypatch.setattr(search, "_freed_share_notes", lambda _: made.freed)
     monkeypatch.setattr(search, "changed_constant", lambda _: made.change)
     monkeypatch.setattr(search, "changed_within", lambda _: None)
     monkeypatch.setattr(search, "segments", lambda _, of: of.load_orders)

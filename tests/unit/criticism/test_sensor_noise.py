@@ -23,7 +23,7 @@ from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.regression.noise_floors import noise_floor
 from pipeline.criticism.residuals.segments import _by_encoder
-from pipeline.criticism.selection.stepwise import _shrunk
+from pipeline.criticism.selection.stepwise import _floor_factors
 from tests.unit.criticism.machines import BASE, coasting, log, machine
 
 SENSORS = DEFAULT.sensor_noise
@@ -151,6 +151,6 @@ def test_noise_of_a_current_counts_by_the_constants_that_it_goes_through():
     assert grown[volts] == pytest.approx(0.5, abs=0.05)
     assert np.array_equal(free, np.ones(free.size))
     system = linear_system(fit)
-    factors = _shrunk(system)
+    factors = _floor_factors(system)
     assert factors.min() >= 1.0 - 1e-9
     assert 1.2 < factors[volts].max() <= 4.0 + 1e-9

@@ -12,7 +12,13 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.selection.requested_model import fit_of
-from pipeline.criticism.selection.stepwise import _doubt, _same_hook, material, search, size_of
+from pipeline.criticism.selection.stepwise import (
+    _form_error_factors,
+    _same_hook,
+    material,
+    search,
+    size_of,
+)
 from tests.unit.criticism.machines import (
     BASE,
     LIBRARY,
@@ -88,7 +94,7 @@ def test_floors_at_a_fit_s_end_count_on_both_sides_of_a_comparison(monkeypatch):
     def eightfold(system):
         return np.full(len(system.labels), 8.0)
 
-    monkeypatch.setattr("pipeline.criticism.selection.stepwise._shrunk", eightfold)
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise._floor_factors", eightfold)
     hidden = (with_drag(curved(0.02)), with_drag(curved(0.02), 6))
     assert search(cautious(hidden, 3.0), LIBRARY)[-1].added == ("windage",)
 
@@ -157,7 +163,7 @@ def test_beside_an_effect_of_its_kind_another_must_stand_for_more_than_its_error
     segments = (with_drag(drag), with_drag(drag, 6))
     last = search(fitted(segments), LIBRARY)[-1]
     (windage,) = last.fit.model.effects
-    doubt = _doubt(last.system, (windage,))
+    doubt = _form_error_factors(last.system, (windage,))
     omega = np.gradient(log().recorded["theta_mech_rad"], 5e-5)
     place = last.system.labels.index((0, "torque_shaft_nm", 0))
     mine = last.system.group == place
@@ -170,7 +176,7 @@ def test_beside_an_effect_of_its_kind_another_must_stand_for_more_than_its_error
     delay = effects()["sample_delay"]
     assert _same_hook(effects()["iron_eddy"], (windage, delay)) == [windage]
     assert _same_hook(delay, (windage, delay)) == []
-    assert (_doubt(last.system, ()) == 1.0).all()
+    assert (_form_error_factors(last.system, ()) == 1.0).all()
 
 
 def test_what_is_asked_for_is_looked_for_at_all_its_trial_shapes():
@@ -208,5 +214,5 @@ def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkey
 
     hidden = tuple(with_drag(curved(0.1), seed) for seed in (5, 6))
     assert search(fitted(hidden), LIBRARY)[-1].added == ("windage",)
-    monkeypatch.setattr("pipeline.criticism.selection.stepwise._sure", unsure)
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise._is_determined", unsure)
     assert search(fitted(hidden), LIBRARY)[-1].added == ()

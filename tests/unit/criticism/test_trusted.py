@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.diagnosis import _drop, _ranking
+from pipeline.criticism.diagnosis import _ranking, _share_of_fall
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
@@ -20,7 +20,13 @@ from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.search import Ladder, ladder_from
 from pipeline.criticism.selection.requested_model import BaseFit
 from pipeline.criticism.selection.score_test import Candidate, Score
-from pipeline.criticism.selection.stepwise import LadderStep, _holds, _refitted, _sure, search
+from pipeline.criticism.selection.stepwise import (
+    LadderStep,
+    _improves_held_out,
+    _is_determined,
+    _refitted,
+    search,
+)
 from pipeline.criticism.selection.truncation import contradiction, explained, truncated
 from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, fitted, log, machine, with_drag
@@ -169,7 +175,7 @@ def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept
     wide, tried = (missing_by(torque_shaft_nm=q).system for q in (3.0, 0.2))
     after = tried.reduced_chi2(tried.residual)
     doubts = np.array([doubt]), np.array([doubt])
-    assert _holds(wide, np.array([3.0]), tried, after, (10.0, 10.0), doubts) is kept
+    assert _improves_held_out(wide, np.array([3.0]), tried, after, (10.0, 10.0), doubts) is kept
 
 
 @pytest.mark.parametrize(
@@ -202,7 +208,7 @@ def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, s
     step = np.array([apart.get(key, 0.0) for key in values])
     held = HeldOut(plain.residual, 1.0, {0: step, 1: -step})
     monkeypatch.setattr("pipeline.criticism.selection.stepwise.leave_out", lambda _: held)
-    assert _sure(system) is sure
+    assert _is_determined(system) is sure
 
 
 @pytest.mark.parametrize(("damping_nm", "sure"), [(0.1, True), (-0.1, False)])
@@ -273,8 +279,8 @@ def test_an_effect_s_drop_is_that_of_the_step_it_came_with():
         for added in ((), ("cogging",), ("saturation",), ("saturation", "windage"))
     ]
     held = [HeldOut(np.zeros(1), total) for total in (math.e**4, math.e**3, math.e, math.e**1.5)]
-    assert _drop(steps, held, "saturation") == pytest.approx(2.0 / 2.5)
-    assert _drop(steps, held, "windage") == 0.0
+    assert _share_of_fall(steps, held, "saturation") == pytest.approx(2.0 / 2.5)
+    assert _share_of_fall(steps, held, "windage") == 0.0
 
 
 @pytest.mark.parametrize(("after", "kept"), [(9.5, 1), (8.5, 1), (5.0, 2)])
