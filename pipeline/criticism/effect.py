@@ -623,7 +623,7 @@ class Shown:
 
     Attributes
     ----------
-    found
+    discrimination
         The effect, and parameters with their standard uncertainties.
     start
         Where a fit with it begins: further parameters of the effect, in their units.
@@ -632,7 +632,7 @@ class Shown:
 
     """
 
-    found: Discrimination
+    discrimination: Discrimination
     start: Values
     base: Values
 

@@ -91,13 +91,13 @@ def sampled_unevenly(
 
 def _roughness(signal: Array, at: Array) -> float:
     """Median distance of samples from the cubic through the two before and the two after."""
-    near = [n for n in range(-_REACH, _REACH + 1) if n]
+    offsets = [n for n in range(-_REACH, _REACH + 1) if n]
     inner = slice(_REACH, signal.size - _REACH)
-    moved = {n: slice(_REACH + n, signal.size - _REACH + n) for n in near}
+    moved = {n: slice(_REACH + n, signal.size - _REACH + n) for n in offsets}
     foretold = np.zeros(max(signal.size - 2 * _REACH, 0))
-    for n in near:
+    for n in offsets:
         weight = np.ones_like(foretold)
-        for other in near:
+        for other in offsets:
             if other != n:
                 weight *= (at[inner] - at[moved[other]]) / (at[moved[n]] - at[moved[other]])
         foretold += weight * signal[moved[n]]

@@ -84,8 +84,8 @@ def _joined(
     captures: Iterable[Capture], policy: Policy
 ) -> tuple[Array, Array, Array, NDArray[np.int64]] | None:
     """Angle, current, an offset a capture and sense, and the sector, of all cells."""
-    each = (holding_cells(capture, policy) for capture in captures)
-    tables = [cells for cells in each if cells is not None]
+    by_capture = (holding_cells(capture, policy) for capture in captures)
+    tables = [cells for cells in by_capture if cells is not None]
     if not tables:
         return None
     theta = np.concatenate([t.theta_mech_rad for t in tables])
@@ -102,8 +102,8 @@ def _held_out(design: Array, current: Array, sector: NDArray[np.int64]) -> Array
     errors = []
     for number in np.unique(sector):
         in_sector = sector == number
-        inside, seen = design[in_sector], current[in_sector]
-        less = np.linalg.pinv(normal - inside.T @ inside, rcond=1e-9, hermitian=True)
-        residual = seen - inside @ (less @ (slope - inside.T @ seen))
-        errors.append(float(residual @ residual) / seen.size)
+        inside, measured = design[in_sector], current[in_sector]
+        inverse = np.linalg.pinv(normal - inside.T @ inside, rcond=1e-9, hermitian=True)
+        residual = measured - inside @ (inverse @ (slope - inside.T @ measured))
+        errors.append(float(residual @ residual) / measured.size)
     return np.array(errors)

@@ -98,13 +98,13 @@ def _unlogged(campaign: Campaign) -> dict[str, tuple[str, str]]:
     Captures of one day may be of a cold machine and of a warm one. One that alone lacks a column
     has the nuisance that all captures have in common.
     """
-    made: dict[str, tuple[str, str]] = {}
+    nuisances: dict[str, tuple[str, str]] = {}
     warm = [c for c in campaign.captures if c.meta.test not in (*_SHAFT_ALONE, *_TABLES)]
     for column, nuisance in UNLOGGED.items():
         paths = sorted(c.path for c in warm if not c.has(column))
         if len(paths) > 1:
-            made |= {f"{nuisance}_{n}": (column, path) for n, path in enumerate(paths)}
-    return made
+            nuisances |= {f"{nuisance}_{n}": (column, path) for n, path in enumerate(paths)}
+    return nuisances
 
 
 def _scales(
@@ -143,8 +143,8 @@ def _scales(
 
 def _settling(campaign: Campaign, policy: Policy) -> dict[str, float]:
     """Time constant and delay [s] of logs without a current; nothing where there are none."""
-    found = settling_of(campaign.of("drive"), policy)
-    return {} if found is None else {"settling_s": found[0], "late_s": found[1]}
+    estimated = settling_of(campaign.of("drive"), policy)
+    return {} if estimated is None else {"settling_s": estimated[0], "late_s": estimated[1]}
 
 
 def _stated_torque(stated: Mapping[str, tuple[float, float]], speed: float) -> float:
@@ -333,10 +333,10 @@ def torque_orders(captures: Iterable[Capture], highest: int, usual: int) -> tupl
         if not capture.has("theta_mech_rad", "torque_shaft_nm"):
             continue
         signals = capture.arrays("theta_mech_rad", "torque_shaft_nm")
-        both = signals["theta_mech_rad"], signals["torque_shaft_nm"]
-        capture_orders = _standing_out(*both, highest)
+        angle_and_torque = signals["theta_mech_rad"], signals["torque_shaft_nm"]
+        capture_orders = _standing_out(*angle_and_torque, highest)
         if capture_orders is None and highest > usual:
-            capture_orders = _standing_out(*both, usual)
+            capture_orders = _standing_out(*angle_and_torque, usual)
         if capture_orders is not None:
             common_orders = (
                 capture_orders if common_orders is None else common_orders & capture_orders
@@ -396,7 +396,7 @@ def stated_parameters(
     Those are the flux linkage of the magnet: k = p ψ in each convention (`COUPLINGS`).
 
     """
-    found: dict[str, tuple[float, float]] = {}
+    values: dict[str, tuple[float, float]] = {}
     for one in stated:
         name, value, u = PARAMETERS.get(one.name, ""), one.number, one.u
         if one.name == "r_ll_ohm":
@@ -406,6 +406,6 @@ def stated_parameters(
             name, value, u = "psi_wb", flux_wb, flux_wb * u / value
         if not name or u <= 0.0 or (one.name in _OF_PAIRS and not counted):
             continue
-        if name not in found or u * abs(found[name][0]) < found[name][1] * abs(value):
-            found[name] = value, u
-    return found
+        if name not in values or u * abs(values[name][0]) < values[name][1] * abs(value):
+            values[name] = value, u
+    return values

@@ -202,10 +202,10 @@ class Segment:
         known = self.kept.get(name)
         if known is not None and known[0] is column and known[1] == by:
             return known[2]
-        made = make()
+        result = make()
         if any(column is one for one in self.recorded.values()):
-            self.kept[name] = column, by, made
-        return made
+            self.kept[name] = column, by, result
+        return result
 
 
 def segment_of(
@@ -396,9 +396,9 @@ def slow_orders(machine: Machine) -> tuple[float, ...]:
         Electrical orders, those seen, slots, and the cogging order with its double, sorted.
 
     """
-    seen = set(electrical_orders(machine)) | set(machine.torque_orders)
+    orders = set(electrical_orders(machine)) | set(machine.torque_orders)
     if machine.slots:
-        seen.add(machine.slots)
+        orders.add(machine.slots)
     if machine.cogging_order is not None:
-        seen |= {machine.cogging_order, 2 * machine.cogging_order}
-    return tuple(sorted(seen))
+        orders |= {machine.cogging_order, 2 * machine.cogging_order}
+    return tuple(sorted(orders))

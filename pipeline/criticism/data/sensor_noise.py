@@ -97,8 +97,8 @@ def resolution(signal: Array, policy: SensorNoise) -> float:
     if gaps.size == 0:
         return 0.0
     steps = gaps / gaps.min()
-    whole = np.abs(steps - np.round(steps)) < policy.whole
-    return float(gaps.min()) if whole.mean() > policy.mostly else 0.0
+    multiples = np.abs(steps - np.round(steps)) < policy.whole
+    return float(gaps.min()) if multiples.mean() > policy.mostly else 0.0
 
 
 def coarse_step(signal: Array, sigma: float, policy: SensorNoise) -> float:
@@ -269,11 +269,11 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     # an encoder has 2^n steps a turn, or 4 times its lines
     bits = math.log2(2.0 * math.pi / step)
     for count in (2.0 ** round(bits), float(round(2.0**bits))):
-        whole = 2.0 * math.pi / max(count, 1.0)
+        fraction = 2.0 * math.pi / max(count, 1.0)
         if abs(math.log2(max(count, 1.0)) - bits) < policy.snap_octaves:
-            both = _coherence(parts, np.array([step, whole]))
-            if both[1] >= both[0] - policy.snap_loss:
-                return whole
+            coherence = _coherence(parts, np.array([step, fraction]))
+            if coherence[1] >= coherence[0] - policy.snap_loss:
+                return fraction
     return step
 
 

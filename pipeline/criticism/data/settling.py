@@ -38,8 +38,10 @@ def settling_of(captures: Iterable[Capture], policy: Policy) -> tuple[float, flo
     which from another order of magnitude takes inertia for a delay.
 
     """
-    found = [one for capture in captures if (one := _of_log(capture, policy)) is not None]
-    return min(found)[1:] if found else None
+    estimates = [
+        estimate for capture in captures if (estimate := _of_log(capture, policy)) is not None
+    ]
+    return min(estimates)[1:] if estimates else None
 
 
 def unexplained_voltage(capture: Capture, policy: Policy) -> float | None:
@@ -59,8 +61,8 @@ def unexplained_voltage(capture: Capture, policy: Policy) -> float | None:
         `settling_of` says nothing of the log.
 
     """
-    found = _of_log(capture, policy)
-    return None if found is None else found[0]
+    estimate = _of_log(capture, policy)
+    return None if estimate is None else estimate[0]
 
 
 def _of_log(recorded: Capture, policy: Policy) -> tuple[float, float, float] | None:
@@ -96,19 +98,19 @@ def _of_log(recorded: Capture, policy: Policy) -> tuple[float, float, float] | N
     for late_s in np.linspace(0.0, longest, max(2, round(4.0 * longest / width) + 1)).tolist():
         target = weak.integral(np.interp(t_s - late_s, t_s, volts))[turns]
         (_, k_speed, k_gain), power = _fitted(design, target)
-        own = np.hypot(noise[0] * weak.noise_gain(0), k_gain * noise[1] * weak.noise_gain(2))
-        power = max(power - target.size * float(own) ** 2, 0.0)
-        left = power / max(float(np.sum((k_gain * design[:, 2]) ** 2)), 1e-300)
+        sigma = np.hypot(noise[0] * weak.noise_gain(0), k_gain * noise[1] * weak.noise_gain(2))
+        power = max(power - target.size * float(sigma) ** 2, 0.0)
+        unexplained = power / max(float(np.sum((k_gain * design[:, 2]) ** 2)), 1e-300)
         if k_speed > 0.0 and k_gain > 0.0:
-            best = min(best, (left, float(k_gain / k_speed), late_s))
+            best = min(best, (unexplained, float(k_gain / k_speed), late_s))
     return best if np.isfinite(best[0]) else None
 
 
 def _fitted(design: Array, target: Array) -> tuple[Array, float]:
     """Coefficients [3], and the power that they leave of the target [w]."""
-    found = np.asarray(np.linalg.lstsq(design, target, rcond=None)[0], dtype=np.float64)
-    left = target - design @ found
-    return found, float(left @ left)
+    coefficients = np.asarray(np.linalg.lstsq(design, target, rcond=None)[0], dtype=np.float64)
+    residual = target - design @ coefficients
+    return coefficients, float(residual @ residual)
 
 
 def _period(t_s: Array) -> float:

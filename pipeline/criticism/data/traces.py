@@ -54,12 +54,12 @@ def with_values(capture: Capture) -> Capture | None:
         return None
     if capture.meta.test not in TESTS_WITHOUT_CLOCK and not _rises(table):
         return None
-    kept = [[n for n in t.columns if _has_values(t, n, table)] for t in capture.tables]
-    if all(set(names) <= {"t_s"} for names in kept):
+    names_of = [[n for n in t.columns if _has_values(t, n, table)] for t in capture.tables]
+    if all(set(names) <= {"t_s"} for names in names_of):
         return None
-    if all(len(names) == len(t.columns) for names, t in zip(kept, capture.tables, strict=True)):
+    if all(len(names) == len(t.columns) for names, t in zip(names_of, capture.tables, strict=True)):
         return capture
-    tables = tuple(t.select(names) for names, t in zip(kept, capture.tables, strict=True))
+    tables = tuple(t.select(names) for names, t in zip(names_of, capture.tables, strict=True))
     return replace(capture, tables=tables)
 
 
@@ -71,10 +71,10 @@ def _rises(table: pl.DataFrame) -> bool:
 
 def _has_values(table: pl.DataFrame, name: str, home: pl.DataFrame) -> bool:
     """Whether a column has a finite value, and one of another clock has it while this one ran."""
-    good = np.isfinite(table[name].to_numpy())
-    if table is home or not good.any() or "t_s" not in table.columns:
-        return bool(good.any())
-    known, time = table["t_s"].to_numpy()[good], home["t_s"].to_numpy()
+    finite = np.isfinite(table[name].to_numpy())
+    if table is home or not finite.any() or "t_s" not in table.columns:
+        return bool(finite.any())
+    known, time = table["t_s"].to_numpy()[finite], home["t_s"].to_numpy()
     return bool(known[0] <= time[-1] and known[-1] >= time[0])
 
 
@@ -114,10 +114,10 @@ def even_clock(
     time = columns.pop("t_s")
     period = float(np.median(np.diff(time)))
     for name, column in columns.items():
-        good = np.isfinite(column)
-        if not good.all() and good.any():
-            columns[name] = np.interp(time, time[good], column[good])
-            keep &= good
+        finite = np.isfinite(column)
+        if not finite.all() and finite.any():
+            columns[name] = np.interp(time, time[finite], column[finite])
+            keep &= finite
     uneven = np.abs(np.diff(time) - period).max() > policy.clock_even * period
     clock = counted(time, policy) if uneven else None
     if clock is not None and not sampled_unevenly(time, clock[1], columns.values(), policy):
@@ -130,13 +130,13 @@ def even_clock(
     elif uneven:
         even = time[0] + period * np.arange(round((time[-1] - time[0]) / period) + 1)
         after = np.clip(np.searchsorted(time, even), 1, time.size - 1)
-        near = (
+        bridged = (
             (time[after] - time[after - 1] < policy.clock_gap * period)
             & keep[after]
             & keep[after - 1]
         )
         columns = {name: np.interp(even, time, column) for name, column in columns.items()}
-        keep = near
+        keep = bridged
     keep[:1] = keep[-1:] = False
     return period, columns, keep
 

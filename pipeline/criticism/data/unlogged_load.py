@@ -70,34 +70,34 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
     if time[-1] < 2.0 * width or float(np.ptp(theta)) < policy.turning_rad:
         return None
     weak = weak_rows(time, width)
-    whole = weak.integral((~log.keep).astype(float)) == 0.0
+    complete = weak.integral((~log.keep).astype(float)) == 0.0
     omega = smooth_speed(time, theta, policy.load_window_s / 8)
-    driven, others = _columns(log, weak, machine, omega)
-    most = np.count_nonzero(whole) // policy.load_windows - len(driven)
+    driven, groups = _columns(log, weak, machine, omega)
+    most_columns = np.count_nonzero(complete) // policy.load_windows - len(driven)
     chosen = [*driven]
-    for group in others:
-        if len(chosen) + len(group) <= most:
+    for group in groups:
+        if len(chosen) + len(group) <= most_columns:
             chosen += group
-        elif group is others[0]:
+        elif group is groups[0]:
             return None
-    target = weak.integral(theta, order=2)[whole]
+    target = weak.integral(theta, order=2)[complete]
     noise = log.sensors.noise["theta_mech_rad"] * weak.noise_gain(2)
     spring, mounting = _spring(log, weak), _mounting(theta, omega, weak)
     shares: list[float] = []
-    for more in ([], mounting):
-        if more and len(chosen) + len(more) > most:
+    for extra in ([], mounting):
+        if extra and len(chosen) + len(extra) > most_columns:
             break
-        columns = np.column_stack([*chosen, *more])[whole]
+        columns = np.column_stack([*chosen, *extra])[complete]
         coefficients, residual, rank = _regressed(columns, target, policy)
-        if columns.shape[1] + len(spring) <= most:
-            with_spring = np.column_stack([columns, np.column_stack(spring)[whole]])
+        if columns.shape[1] + len(spring) <= most_columns:
+            with_spring = np.column_stack([columns, np.column_stack(spring)[complete]])
             sprung = _regressed(with_spring, target, policy)
             of_current, of_bend, of_fourth = sprung[0][[0, -2, -1]].tolist()
             if _two_masses(of_current, of_bend, of_fourth, policy):
                 coefficients, residual, rank = sprung
-        made = columns[:, : len(driven)] @ coefficients[: len(driven)]
+        explained = columns[:, : len(driven)] @ coefficients[: len(driven)]
         power = float(residual @ residual) / (target.size - rank) - noise**2
-        shares.append(max(power, 0.0) / max(float(np.mean(made**2)), 1e-300))
+        shares.append(max(power, 0.0) / max(float(np.mean(explained**2)), 1e-300))
     return min(shares)
 
 
@@ -146,11 +146,11 @@ def _columns(
     driven = [weak.integral(q)]
     if "id_a" in log.columns:
         driven.append(weak.integral(log.columns["id_a"] * q))
-    plain = [weak.integral(sense), weak.integral(omega), np.ones(weak.count)]
+    drags = [weak.integral(sense), weak.integral(omega), np.ones(weak.count)]
     curve = [weak.integral(sense * np.interp(pace, knots, one)) for one in np.eye(len(knots))]
     turns = []
     for order in slow_orders(machine):
         wave = [weak.integral(part(order * theta)) for part in (np.cos, np.sin)]
         if float(np.hypot(*wave).mean()) > policy.averaged_out:
             turns += wave
-    return driven, [plain, [weak.integral(q, order=1)], curve, turns]
+    return driven, [drags, [weak.integral(q, order=1)], curve, turns]

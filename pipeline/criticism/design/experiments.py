@@ -96,10 +96,14 @@ def separations(
             ),
             key=lambda one: (-one[0], one[1]),
         )
-        better = [(power, words) for power, words in ranked if power > base + policy.least_power][
-            : policy.most_experiments
+        better = [
+            (power, description)
+            for power, description in ranked
+            if power > base + policy.least_power
+        ][: policy.most_experiments]
+        separations_found += [
+            Separation(other, description, power) for power, description in better
         ]
-        separations_found += [Separation(other, words, power) for power, words in better]
         if not better:
             separations_found.append(Separation(other, remedy, None))
     return tuple(separations_found)
@@ -139,10 +143,8 @@ def _now(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Normal matrix of [d, the model's other columns, the alternative's], and their places."""
     prefix = f"{effect.name}."
-    others = np.array(
-        [n for n in wide.model_columns if not wide.columns[n].name.startswith(prefix)]
-    )
-    places = np.concatenate([others, alternative]).astype(np.int64)
+    fixed = np.array([n for n in wide.model_columns if not wide.columns[n].name.startswith(prefix)])
+    places = np.concatenate([fixed, alternative]).astype(np.int64)
     weight = wide.weights(wide.reduced_chi2(wide.residual))
     matrix = _stacked(wide.matrix, _amplitudes(effect, wide), places)
     normal = (matrix * weight[:, None]).T @ matrix
@@ -188,22 +190,22 @@ def _calibrations(places: NDArray[np.int64], wide: LinearSystem) -> Iterator[Pla
     for place, column in enumerate(places):
         name = wide.columns[column].name
         if name in _GAIN_WORDS:
-            size, words = 1.0, _GAIN_WORDS[name]
+            size, description = 1.0, _GAIN_WORDS[name]
         elif name in _KNOWN_WORDS:
-            size, words = abs(wide.fit.values[name]), _KNOWN_WORDS[name]
+            size, description = abs(wide.fit.values[name]), _KNOWN_WORDS[name]
         else:
             continue
         normal = np.zeros((places.size + 1, places.size + 1))
         normal[place + 1, place + 1] = (policy.calibrated_u * size) ** -2.0 if size > 0.0 else 0.0
-        yield Plan(words.format(100.0 * policy.calibrated_u), normal)
+        yield Plan(description.format(100.0 * policy.calibrated_u), normal)
 
 
 def _planned_rows(test: str, wide: LinearSystem) -> Array | None:
     """Columns [R, P] over the noise of a test that was not done."""
-    made = []
+    columns = []
     model, values = wide.fit.model, wide.fit.values
     for number, segment in enumerate(planned(test, wide.fit)):
         sigma = noise_floor(segment, model, values, _SEED + number)
         rows = linearise(segment, model, values, wide.columns, Floor(sigma, values))
-        made.append(rows.columns)
-    return np.concatenate(made) if made else None
+        columns.append(rows.columns)
+    return np.concatenate(columns) if columns else None

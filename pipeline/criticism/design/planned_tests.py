@@ -97,7 +97,7 @@ def _torque_map(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
     i_d, i_q = (np.repeat([pair[k] for pair in levels], policy.map_samples) for k in (0, 1))
     current = machine.scales["current_a"]
     keep = np.tile(np.arange(policy.map_samples) > policy.map_samples // 4, len(levels))
-    made = []
+    maps = []
     for speed in policy.map_speeds:
         theta = speed * machine.scales["speed_rad_s"] * period * np.arange(i_d.size, dtype=float)
         recorded = {
@@ -110,7 +110,7 @@ def _torque_map(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
         }
         window = policy.map_samples // 2
         weak = projection(theta, window_starts(keep, window), window, electrical_orders(machine))
-        made.append(
+        maps.append(
             Segment(
                 capture=f"planned torque_map {speed:g}",
                 test="torque_map",
@@ -124,7 +124,7 @@ def _torque_map(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
                 fixed={"ambient_k": 0.0},
             )
         )
-    return made
+    return maps
 
 
 def _shaft(
@@ -163,11 +163,11 @@ def _spin_down(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
     top, b = scales["speed_rad_s"], max(values["b_nm_s_rad"], 1e-9)
     dry = max(values.get("coulomb_friction.torque_nm", 0.0), 0.0)
     tau = values["j_kgm2"] / b
-    rest = dry / b
-    length = tau * math.log((top + rest) / (0.1 * top + rest))
+    dry_rad_s = dry / b
+    length = tau * math.log((top + dry_rad_s) / (0.1 * top + dry_rad_s))
     period = length / policy.coast_samples
     t = period * np.arange(policy.coast_samples)
-    theta: Array = (top + rest) * tau * (1.0 - np.exp(-t / tau)) - rest * t
+    theta: Array = (top + dry_rad_s) * tau * (1.0 - np.exp(-t / tau)) - dry_rad_s * t
     return [
         _shaft(
             f"planned spin_down {sign}",

@@ -251,8 +251,8 @@ def _orders(variable: Variable, machine: Machine, policy: Discovery) -> tuple[fl
         return (*_lowest(policy), 12)
     p = machine.pole_pairs
     slots = {order for order in (machine.slots, machine.cogging_order) if order}
-    seen = slots.union(machine.torque_orders, machine.load_orders)
-    return tuple(sorted(seen.union(_lowest(policy), (p, 2 * p, 6 * p))))
+    orders = slots.union(machine.torque_orders, machine.load_orders)
+    return tuple(sorted(orders.union(_lowest(policy), (p, 2 * p, 6 * p))))
 
 
 def _nodes(variable: Variable, policy: Discovery) -> Array:

@@ -89,10 +89,10 @@ def changed_within(system: LinearSystem) -> ChangeWithin | None:
 
     """
     significant = significant_groups(system)
-    over = {
+    captures = {
         system.segments[place].capture
-        for (place, _, _), some in zip(system.labels, significant, strict=True)
-        if some
+        for (place, _, _), is_significant in zip(system.labels, significant, strict=True)
+        if is_significant
     }
     places = [
         n for n in system.model_columns.tolist() if may_change(system, system.columns[n].name)
@@ -100,7 +100,7 @@ def changed_within(system: LinearSystem) -> ChangeWithin | None:
     rows = _Rows.of(system)
     tried = [
         found
-        for capture in sorted(over)
+        for capture in sorted(captures)
         for found in _found(system, rows, capture, places, significant)
     ]
     return max(tried, key=lambda change: change.gain, default=None)

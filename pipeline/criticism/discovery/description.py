@@ -89,8 +89,8 @@ def _columns(port: Port, expression: Expression) -> tuple[str, ...]:
         return port.columns
     used = [port.monomials[term.monomial] for term in expression.terms]
     names = ("id_a", "iq_a")
-    kept = tuple(c for n, c in enumerate(names) if any(powers[n] for powers in used))
-    return kept or names
+    used_names = tuple(c for n, c in enumerate(names) if any(powers[n] for powers in used))
+    return used_names or names
 
 
 def _signal(port: Port, carrier: int, signals: Sequence[str]) -> str:
@@ -116,8 +116,8 @@ def _visited(pursuit: Pursuit) -> tuple[float, float]:
     if basis is None or not basis.nodes.size:
         return 0.0, 2 * np.pi
     hats = pursuit.system.matrix[:, pursuit.model_size : pursuit.model_size + basis.nodes.size]
-    seen = np.abs(hats).max(axis=0)
-    live = np.flatnonzero(seen > pursuit.policy.visited_share * seen.max())
+    largest = np.abs(hats).max(axis=0)
+    live = np.flatnonzero(largest > pursuit.policy.visited_share * largest.max())
     return float(basis.nodes[live[0]]), float(basis.nodes[live[-1]])
 
 
@@ -166,18 +166,20 @@ def turn_angles(orders: Sequence[float]) -> Array:
 
 def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:
     """The smooth curves of a port [K, k] as coefficients of its hats, one block a carrier."""
-    fine, few = pursuit.port.basis, smooth.basis
-    if fine is None or few is None or not fine.nodes.size:
+    hat_basis, smooth_basis = pursuit.port.basis, smooth.basis
+    if hat_basis is None or smooth_basis is None or not hat_basis.nodes.size:
         return np.eye(pursuit.system.matrix.shape[1] - pursuit.model_size)
-    block = np.zeros((len(fine.names), len(few.names)))
-    for n in range(len(few.names)):
-        weights = np.zeros(len(few.names))
+    block = np.zeros((len(hat_basis.names), len(smooth_basis.names)))
+    for n in range(len(smooth_basis.names)):
+        weights = np.zeros(len(smooth_basis.names))
         weights[n] = 1.0
-        block[: fine.nodes.size, n] = few.curve(fine.nodes, weights)
-    for n, order in enumerate(fine.orders):
-        first = 2 * few.orders.index(order)
+        block[: hat_basis.nodes.size, n] = smooth_basis.curve(hat_basis.nodes, weights)
+    for n, order in enumerate(hat_basis.orders):
+        first = 2 * smooth_basis.orders.index(order)
         block[:, first : first + 2] = 0.0
-        block[fine.nodes.size + 2 * n, first] = block[fine.nodes.size + 2 * n + 1, first + 1] = 1.0
+        block[hat_basis.nodes.size + 2 * n, first] = block[
+            hat_basis.nodes.size + 2 * n + 1, first + 1
+        ] = 1.0
     return np.asarray(np.kron(np.eye(len(pursuit.port.carriers)), block), dtype=float)
 
 
@@ -190,8 +192,8 @@ def _map_curve(pursuit: Pursuit, expression: Expression) -> tuple[CurvePoint, ..
         rows = []
         for term in expression.terms:
             powers = pursuit.port.monomials[term.monomial]
-            own, other = powers[axis], powers[1 - axis]
-            rows.append(own * at ** max(own - 1, 0) if other == 0 else np.zeros(at.size))
+            power, other_power = powers[axis], powers[1 - axis]
+            rows.append(power * at ** max(power - 1, 0) if other_power == 0 else np.zeros(at.size))
         slopes = np.stack(rows) if rows else np.zeros((0, at.size))
         value = expression.amplitudes @ slopes
         spread = np.sqrt(
@@ -221,14 +223,14 @@ def _shape(
 ) -> str:
     """The curve in words: parity, where it is largest, and what else would explain as much."""
     port = pursuit.port
-    words = port.effect.words
+    text = port.effect.words
     variable = port.variable
     if variable is not None and curve:
-        words += f": {_run(port, curve, expression, carrier, pursuit.policy)}"
+        text += f": {_run(port, curve, expression, carrier, pursuit.policy)}"
     if others:
         listed = "; ".join(" and ".join(columns) for columns, _ in others)
-        words += f"; the captures would be explained nearly as well by {listed}"
-    return words
+        text += f"; the captures would be explained nearly as well by {listed}"
+    return text
 
 
 def _run(
@@ -299,15 +301,15 @@ def _term(port: Port, expression: Expression, n: int, current_a: float) -> str:
     term = expression.terms[n]
     if term.kind == POWER or port.variable is None:
         d, q = port.monomials[term.monomial]
-        over = f"/({current_a:.4g} A)"
-        parts = [f"(id_a{over})^{d}"] * (d > 0) + [f"(iq_a{over})^{q}"] * (q > 0)
+        divisor = f"/({current_a:.4g} A)"
+        parts = [f"(id_a{divisor})^{d}"] * (d > 0) + [f"(iq_a{divisor})^{q}"] * (q > 0)
         return " ".join(parts)
-    words = term.words(port.variable)
+    text = term.words(port.variable)
     carrier = port.carriers[term.carrier].words
     axis = ""
     if len(port.carriers) > 1:
         axis = "d axis: " if term.carrier == 0 else "q axis: "
-    return f"{axis}{carrier} · {words}" if carrier else f"{axis}{words}"
+    return f"{axis}{carrier} · {text}" if carrier else f"{axis}{text}"
 
 
 def _expression(port: Port, expression: Expression, current_a: float) -> str:

@@ -173,11 +173,11 @@ class Term:
             )
         if self.kind == "bump":
             return f"exp((cos({name} - {self.centre:.4g} rad) - 1)/({self.scale:.4g} rad)²)"
-        over = f"({name} - {_ABOVE_DEGC:g} degC)" if variable.kind == "warm" else name
+        shifted = f"({name} - {_ABOVE_DEGC:g} degC)" if variable.kind == "warm" else name
         if self.kind in CENTRED:
             shape = "exp(-u²)" if self.kind == "hump" else "1/(1 + u²)"
             sense = f"sign({name})·" if self.parity == "odd" else ""
-            size = over if self.parity == "plain" else f"|{name}|"
+            size = shifted if self.parity == "plain" else f"|{name}|"
             away = f"({size} - {self.centre:.4g} {variable.unit})"
             return f"{sense}{shape}, u = {away}/({self.scale:.4g} {variable.unit})"
         text = self.shape.odd if self.parity == "odd" else self.shape.even
@@ -185,7 +185,9 @@ class Term:
             text = text.replace("|u|", "u")
         if text == "sign(u)":
             return f"sign({name})"
-        return text if "u" not in text else f"{text}, u = {over}/({self.scale:.4g} {variable.unit})"
+        return (
+            text if "u" not in text else f"{text}, u = {shifted}/({self.scale:.4g} {variable.unit})"
+        )
 
     def code(self, scale: str, centre: str) -> str:
         """The term as Python, of `v`.

@@ -316,8 +316,8 @@ def expression(pursuit: Pursuit) -> Expression:
     """
     policy = pursuit.policy
     chosen: list[Group] = []
-    none = pursuit.curves([])
-    best = pursuit.fit(none)
+    nothing = pursuit.curves([])
+    best = pursuit.fit(nothing)
     start = cost = best[3]
     offered = list(_dictionary(pursuit.port, policy))
     for _ in range(policy.most_groups):
@@ -326,7 +326,7 @@ def expression(pursuit: Pursuit) -> Expression:
             (*_judged(pursuit, [*chosen, group]), [*chosen, group])
             for group in _promising(pursuit, flat, offered)
         ]
-        tried.sort(key=lambda one: one[0])
+        tried.sort(key=lambda candidate: candidate[0])
         if not tried:
             break
         now = tried[0][0]

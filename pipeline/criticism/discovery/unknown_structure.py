@@ -35,7 +35,7 @@ class RankedInput:
         The input.
     gain
         Fall of the deviance less its penalty.
-    held
+    held_out_gain
         The same, held out.
     residual
         Residual after it [R].
@@ -48,7 +48,7 @@ class RankedInput:
 
     port: Port
     gain: float
-    held: float
+    held_out_gain: float
     residual: Array
     step: Array
     place: int
@@ -91,15 +91,15 @@ def unknown_structure(
     policy = fit.policy.discovery
     best = _simplest(candidates, fit.policy)
     others = tuple(
-        (one.port.columns, one.held / best.held)
+        (one.port.columns, one.held_out_gain / best.held_out_gain)
         for one in candidates
-        if one is not best and one.held > (1.0 - policy.near_share) * best.held
+        if one is not best and one.held_out_gain > (1.0 - policy.near_share) * best.held_out_gain
     )
     port = refined(best.port, fit.model.machine, policy)
     model_size = wide.model_columns.size
     # a drag over an inertia is a product: the expression is sought around the inertia found
-    near = fit.moved(wide.columns[:model_size], best.step[:model_size])
-    fine = linear_system(near, effect_columns(port.effect, near.model), wide)
+    moved = fit.moved(wide.columns[:model_size], best.step[:model_size])
+    fine = linear_system(moved, effect_columns(port.effect, moved.model), wide)
     weight = fine.weights(fine.reduced_chi2(best.residual))
     pursuit = Pursuit(fine, model_size, port, weight)
     sketch = describe(pursuit, expression(pursuit), best.port, others, signals, name)
@@ -125,10 +125,10 @@ def _ranked(
     fit = before.fit
     offered = ports(fit.model.machine, fit.policy.discovery, hooks)
     columns = [effect_columns(port.effect, fit.model) for port in offered]
-    wide = linear_system(fit, [c for some in columns for c in some], before)
+    wide = linear_system(fit, [c for of_port in columns for c in of_port], before)
     model_columns = wide.model_columns
-    none = wide.normal_equations(model_columns).best()
-    residual, base = wide.after(model_columns, none.step), none.deviance
+    baseline = wide.normal_equations(model_columns).best()
+    residual, base = wide.after(model_columns, baseline.step), baseline.deviance
     missed = _missed(wide) if in_parts else None
     units = _units(wide, model_columns, residual, missed)
     reference = _held_out(wide, model_columns, residual, np.zeros(model_columns.size), units)
@@ -137,9 +137,9 @@ def _ranked(
     least = max(fit.policy.selection.tie, fit.policy.selection.least_share * excess)
     ranked = []
     first = model_columns.size
-    for place, (port, mine) in enumerate(zip(offered, columns, strict=True)):
-        places = np.arange(first, first + len(mine))
-        first += len(mine)
+    for place, (port, port_columns) in enumerate(zip(offered, columns, strict=True)):
+        places = np.arange(first, first + len(port_columns))
+        first += len(port_columns)
         live = places[np.any(wide.matrix[:, places] != 0.0, axis=0)]
         if live.size == 0:
             continue
@@ -157,7 +157,7 @@ def _ranked(
                     port, gain, held_out, after, _ridge_step(wide, chosen, after, ridge), place
                 )
             )
-    return sorted(ranked, key=lambda f: (-f.held, f.port.effect.name)), wide
+    return sorted(ranked, key=lambda f: (-f.held_out_gain, f.port.effect.name)), wide
 
 
 def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fit: Fit) -> Array:
@@ -178,18 +178,20 @@ def _simplest(candidates: Sequence[RankedInput], policy: Policy) -> RankedInput:
     machines.
     """
     tie = policy.selection.tie
-    enough = candidates[0].held - max(tie, policy.discovery.near_share * candidates[0].held)
-    close = [one for one in candidates if one.held >= enough]
+    enough = candidates[0].held_out_gain - max(
+        tie, policy.discovery.near_share * candidates[0].held_out_gain
+    )
+    close = [one for one in candidates if one.held_out_gain >= enough]
     fewest = min(len(one.port.columns) for one in close)
     simple = [one for one in close if len(one.port.columns) == fewest]
-    level = max(one.held for one in simple) - tie
-    return min((one for one in simple if one.held >= level), key=lambda one: one.place)
+    level = max(one.held_out_gain for one in simple) - tie
+    return min((one for one in simple if one.held_out_gain >= level), key=lambda one: one.place)
 
 
 def _missed(system: LinearSystem) -> NDArray[np.int64]:
     """Numbers of the segments in which a fit leaves something that is reported."""
-    over = np.flatnonzero(significant_groups(system))
-    return np.unique([system.labels[place][0] for place in over])
+    significant = np.flatnonzero(significant_groups(system))
+    return np.unique([system.labels[place][0] for place in significant])
 
 
 def _units(
@@ -235,11 +237,11 @@ def _carrying(
     for number in np.unique(units[units >= 0]).tolist():
         in_unit = units == number
         rows = matrix[in_unit]
-        less = normal - (rows * weight[in_unit, None]).T @ rows
-        inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        remaining = normal - (rows * weight[in_unit, None]).T @ rows
+        inverse = np.linalg.pinv(remaining / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         grown = np.diag(inverse) / np.maximum(spread, 1e-300)
-        lost = np.diag(less) < policy.lost_share * np.diag(normal)
-        if grown.max() > policy.carried_growth or lost.any():
+        unsupported = np.diag(remaining) < policy.lost_share * np.diag(normal)
+        if grown.max() > policy.carried_growth or unsupported.any():
             carrying.append(number)
     return carrying
 
@@ -281,8 +283,8 @@ def _held_out(
         in_unit = units == number
         if not np.any(matrix[in_unit]):
             continue
-        less = (normal - weighted[in_unit].T @ matrix[in_unit]) / np.outer(scale, scale)
-        right = (slope - weighted[in_unit].T @ system.residual[in_unit]) / scale
-        step = -np.linalg.lstsq(less, right, rcond=1e-12)[0] / scale
+        remaining = (normal - weighted[in_unit].T @ matrix[in_unit]) / np.outer(scale, scale)
+        slope_remaining = (slope - weighted[in_unit].T @ system.residual[in_unit]) / scale
+        step = -np.linalg.lstsq(remaining, slope_remaining, rcond=1e-12)[0] / scale
         predicted[in_unit] = system.residual[in_unit] + matrix[in_unit] @ step
     return system.deviance_of(system.reduced_chi2(predicted))

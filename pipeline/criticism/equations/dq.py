@@ -85,11 +85,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     most = policy.windows if capture.meta.test == "torque_map" else policy.windows_drive
     columns["t_s"] = period * np.arange(size, dtype=np.float64)
     logged = capture.meta.test == "drive" and len(channels) > 2
-    whole = {**columns, "good": keep.astype(float)} if logged else None
+    full = {**columns, "good": keep.astype(float)} if logged else None
     log = whole_log(columns, period, policy)
     columns, starts = thinned(columns, keep, window, most)
     weak = projection(columns["theta_mech_rad"], starts, window, orders)
-    made = segment_of(
+    segment = segment_of(
         capture,
         "dq",
         "drive",
@@ -99,7 +99,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         channels=channels,
         weak=weak,
     )
-    return replace(made, unthinned=Unthinned(whole, log))
+    return replace(segment, unthinned=Unthinned(full, log))
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
@@ -208,39 +208,41 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     (`frame_lag_s`, of commanded voltages), so as the shaft gathers speed the vector is behind the
     frame it is logged in.
     """
-    period, held = segment.ts_s, segment.instrument.timing == "held"
-    difference = forward if held else central
+    period, is_held = segment.ts_s, segment.instrument.timing == "held"
+    difference = forward if is_held else central
     omega, turn = x.once(x.theta_rad, "pace", lambda: _pace(segment, x, difference))
-    voltage = (held_voltage if held else rotor_voltage)(pieces, omega, period)
+    voltage = (held_voltage if is_held else rotor_voltage)(pieces, omega, period)
     edge, shift = values["ripple_edge"], values["ripple_shift"]
     averaged = 1.0 if segment.instrument.timing != "instant" else 0.0
-    lost = averaged / 24.0 + edge
-    kept = x.once(x.theta_rad, ("shortened", lost), lambda: _shortened(lost * turn**2))
-    mean: Complex = kept * voltage
+    shortening = averaged / 24.0 + edge
+    factor = x.once(
+        x.theta_rad, ("shortened", shortening), lambda: _shortened(shortening * turn**2)
+    )
+    mean: Complex = factor * voltage
     if segment.instrument.frame:
         mean = mean * np.exp(1j * segment.instrument.frame * turn)
     commanded = segment.instrument.meter == "gain_commanded"
     if commanded and (lag := values["frame_lag_s"]):
         mean = mean * np.exp(1j * lag * x.once(x.theta_rad, "behind", lambda: _behind(segment, x)))
     if shift:
-        psi = ahead(pieces.psi_wb) if held else pieces.psi_wb
+        psi = ahead(pieces.psi_wb) if is_held else pieces.psi_wb
         mean = mean - shift * 1j * psi * np.gradient(x.machine.pole_pairs * x.omega_rad_s)
     return mean
 
 
-def _shortened(lost: Array) -> Array:
-    """What is left [n] of a vector's mean over a turn φ [rad] of which `lost` is φ²/24.
+def _shortened(shortening: Array) -> Array:
+    """What is left [n] of a vector's mean over a turn φ [rad] of which `shortening` is φ²/24.
 
     Notes
     -----
     sinc: sin(φ/2) / (φ/2), continued to a mean that is too long: sinh for a negative φ².
 
     """
-    half = np.sqrt(6.0 * np.abs(lost))
-    left: Array = np.where(lost > 0.0, np.sinc(half / math.pi), 1.0)
-    longer = lost < 0.0
-    left[longer] = np.sinh(half[longer]) / half[longer]
-    return left
+    half = np.sqrt(6.0 * np.abs(shortening))
+    factor: Array = np.where(shortening > 0.0, np.sinc(half / math.pi), 1.0)
+    longer = shortening < 0.0
+    factor[longer] = np.sinh(half[longer]) / half[longer]
+    return factor
 
 
 def _pace(

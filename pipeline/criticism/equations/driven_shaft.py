@@ -46,8 +46,10 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     """
     if any(capture.has(name) for name in ("iq_a", "id_a", "torque_shaft_nm")):
         return None
-    left, log = unexplained_voltage(capture, machine.policy), drive_log(capture, machine)
-    if log is None or (left is not None and left >= machine.policy.cutting.unexplained_share):
+    unexplained, log = unexplained_voltage(capture, machine.policy), drive_log(capture, machine)
+    if log is None or (
+        unexplained is not None and unexplained >= machine.policy.cutting.unexplained_share
+    ):
         return None
     policy, columns = machine.policy, log.columns
     speed = np.gradient(columns["theta_mech_rad"], log.period_s)
@@ -60,7 +62,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     keep = log.keep & turns & (at >= 0) & log.keep[np.maximum(at, 0)]
     window = window_of(log.period_s, keep.size, policy.cutting)
     weak = projection(columns["theta_mech_rad"], window_starts(keep, window), window, ())
-    made = segment_of(
+    segment = segment_of(
         capture,
         "driven",
         "drive",
@@ -71,7 +73,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         weak=weak,
         blocks=in_time(weak.starts + window // 2, keep.size),
     )
-    return replace(made, fixed={**made.fixed, LATE_VOLTAGE: 1.0})
+    return replace(segment, fixed={**segment.fixed, LATE_VOLTAGE: 1.0})
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
@@ -119,16 +121,16 @@ def predicted(segment: Segment, x: Operating, _: Pieces, model: Model, values: V
     bend = np.zeros(x.theta_rad.size)
     bend[1:-1] = np.diff(x.theta_rad, 2) / segment.ts_s**2
     smooth = np.gradient(x.omega_rad_s, segment.ts_s)
-    there, pieces = x, evaluate(model, x, values)
+    driven, pieces = x, evaluate(model, x, values)
     for _round in range(2):
         kt = 1.5 * x.machine.pole_pairs * pieces.psi_wb.real
         current = (values["j_kgm2"] * smooth + pieces.drag_nm) / kt
-        there = replace(x, iq_a=current, kept={})
-        pieces = evaluate(model, there, values)
+        driven = replace(x, iq_a=current, kept={})
+        pieces = evaluate(model, driven, values)
     rough = (1.0 + values["lead_share"]) * values["r_ohm"] * values["j_kgm2"] / kt
     volts = pieces.drop_v + 1j * x.machine.pole_pairs * x.omega_rad_s * pieces.psi_wb.real
     volts = volts + 1j * rough * (bend - smooth)
-    return recorded_voltage(volts, segment, there, model, values, in_frame=True).imag[None]
+    return recorded_voltage(volts, segment, driven, model, values, in_frame=True).imag[None]
 
 
 def _winding(segment: Segment, model: Model, values: Values) -> tuple[float, float]:

@@ -60,7 +60,7 @@ def _axes_noise(columns: Signals, names: tuple[str, ...], policy: Tables) -> dic
     """A share of an axis's range, or a tenth of the other's at least: one instrument reads both."""
     ranges = {name: float(np.ptp(columns[name])) for name in names}
     least = policy.other_axis * max(ranges.values())
-    return {name: policy.flux_share * max(own, least) for name, own in ranges.items()}
+    return {name: policy.flux_share * max(span, least) for name, span in ranges.items()}
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
@@ -84,9 +84,9 @@ def state(segment: Segment, signals: Signals, model: Model, values: Values) -> O
 
     """
     current = signals["id_a"] + 1j * signals["iq_a"]
-    rest = at_rest(current.size)
-    current = table_current(segment, current, rest.theta_rad, rest.omega_rad_s, model, values)
-    return operating(segment, signals, model, values, current, rest)
+    motion = at_rest(current.size)
+    current = table_current(segment, current, motion.theta_rad, motion.omega_rad_s, model, values)
+    return operating(segment, signals, model, values, current, motion)
 
 
 def measured(_: Segment, signals: Signals, __: Model, ___: Values) -> Array:

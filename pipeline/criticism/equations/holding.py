@@ -148,8 +148,8 @@ def _current_slope(segment: Segment, model: Model, values: Values) -> float:
         for current in (zero.astype(np.complex128), np.full(4, 1j))
     )
     meter = segment.instrument.ammeter
-    still, moved = (true_current(one, meter, model, values) for one in (nothing, ampere))
-    return float((moved - still)[0].imag)
+    base, moved = (true_current(recorded, meter, model, values) for recorded in (nothing, ampere))
+    return float((moved - base)[0].imag)
 
 
 EQUATION = Equation(

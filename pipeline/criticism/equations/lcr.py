@@ -71,8 +71,8 @@ def state(segment: Segment, signals: Signals, model: Model, values: Values) -> O
     """A rotor at rest at each angle [n], without current, at the meter's frequency."""
     eps = np.radians(signals["theta_elec_deg"])
     zero = np.zeros(eps.size)
-    rest = Motion(zero, zero, signals.get("freq_hz", zero))
-    x = operating(segment, signals, model, values, zero.astype(np.complex128), rest)
+    motion = Motion(zero, zero, signals.get("freq_hz", zero))
+    x = operating(segment, signals, model, values, zero.astype(np.complex128), motion)
     return replace(x, eps_rad=eps)
 
 

@@ -51,9 +51,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     angle = with_angle(capture, [])
     if capture.has(*_BOTH_AXES) or not angle:
         return None
-    others = [name for name in ("id_a", *SMOOTHED) if capture.has(name)]
+    further = [name for name in ("id_a", *SMOOTHED) if capture.has(name)]
     policy = machine.policy.cutting
-    period, columns, keep = even_clock(capture, ("iq_a", TORQUE, *others, *angle), policy)
+    period, columns, keep = even_clock(capture, ("iq_a", TORQUE, *further, *angle), policy)
     shaft_angle(columns, period, machine)
     size = keep.size
     window = window_of(period, size, policy)
@@ -65,7 +65,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     weak = projection(cut_out["theta_mech_rad"], starts, window, orders)
     middle = np.rint(cut_out["t_s"][weak.starts + window // 2] / period)
     blocks = in_time(middle, size)
-    made = segment_of(
+    segment = segment_of(
         capture,
         "load",
         "drive",
@@ -77,7 +77,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         blocks=blocks,
     )
     share = {} if "id_a" in cut_out else {SHARE: 1.0}
-    return replace(made, fixed={**made.fixed, **share})
+    return replace(segment, fixed={**segment.fixed, **share})
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

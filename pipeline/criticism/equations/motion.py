@@ -58,13 +58,13 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     shaft["t_s"] = log.period_s * np.arange(log.keep.size, dtype=np.float64)
     policy = machine.policy.cutting
     window = window_of(log.period_s, log.keep.size, policy)
-    whole = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
+    full = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
     pad = max(policy.motion_pad, reach(log.period_s, machine.policy.torsion))
     shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion, pad)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     middle = np.rint(shaft["t_s"][starts + window // 2] / log.period_s)
     blocks = in_time(middle, log.keep.size)
-    made = segment_of(
+    segment = segment_of(
         capture,
         "motion",
         "drive",
@@ -75,7 +75,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         weak=weak,
         blocks=blocks,
     )
-    return replace(made, unthinned=Unthinned(whole))
+    return replace(segment, unthinned=Unthinned(full))
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

@@ -73,7 +73,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     columns, starts = thinned(columns, keep, window, policy.windows)
     weak = projection(columns["theta_mech_rad"], starts, window, electrical_orders(machine))
     weak = weak.only(_steady(weak, columns["theta_mech_rad"], policy))
-    made = segment_of(
+    segment = segment_of(
         capture,
         "open",
         "bench",
@@ -83,7 +83,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         channels=("vd_v", "vq_v"),
         weak=weak,
     )
-    return made if encoder else replace(made, fixed={**made.fixed, _VOLTAGE_FRAME: 1.0})
+    return segment if encoder else replace(segment, fixed={**segment.fixed, _VOLTAGE_FRAME: 1.0})
 
 
 def _by_voltage(
@@ -116,9 +116,9 @@ def _by_voltage(
     if short < width and inside.any():
         orders = np.arange(1, machine.policy.cutting.voltage_orders + 1)
         waves = np.exp(1j * orders * angle[:, None])
-        basis, rest = np.column_stack([waves.real, waves.imag]), upright - angle
-        found = np.linalg.lstsq(basis[inside], rest[inside], rcond=None)[0]
-        angle += smoothed(rest - basis @ found, short)
+        basis, deviation = np.column_stack([waves.real, waves.imag]), upright - angle
+        coefficients = np.linalg.lstsq(basis[inside], deviation[inside], rcond=None)[0]
+        angle += smoothed(deviation - basis @ coefficients, short)
     columns["theta_mech_rad"] = angle / machine.pole_pairs
     return inside
 
@@ -206,10 +206,10 @@ def _reading(segment: Segment, _: str, __: Model, ___: Values) -> Array:
     return np.sqrt(sum(column**2 for column in present))
 
 
-def _sensed(segment: Segment, left: Array, model: Model, values: Values) -> Signals:
+def _sensed(segment: Segment, residual: Array, model: Model, values: Values) -> Signals:
     """A residual [2, n] in the rotor's frame, turned back to each line's voltage [n]."""
     eps = _recorded_eps(segment, segment.recorded, model, values)
-    winding = math.sqrt(3.0) * (left[0] + 1j * left[1]) * np.exp(1j * (eps + math.pi / 6.0))
+    winding = math.sqrt(3.0) * (residual[0] + 1j * residual[1]) * np.exp(1j * (eps + math.pi / 6.0))
     lines = [name for name in LINES_V if name in segment.recorded]
     return {name: (winding * np.exp(-1j * _LINE_RAD[name])).real for name in lines}
 

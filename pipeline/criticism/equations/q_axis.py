@@ -49,7 +49,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     window = window_of(log.period_s, log.keep.size, machine.policy.cutting)
     starts = window_starts(log.keep, window)
     weak = projection(log.columns["theta_mech_rad"], starts, window, ())
-    made = segment_of(
+    segment = segment_of(
         capture,
         "q",
         "drive",
@@ -60,7 +60,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         weak=weak,
         blocks=in_time(weak.starts + window // 2, log.keep.size),
     )
-    return replace(made, fixed={**made.fixed, UNSAMPLED: 1.0})
+    return replace(segment, fixed={**segment.fixed, UNSAMPLED: 1.0})
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

@@ -78,9 +78,9 @@ def state(segment: Segment, signals: Signals, model: Model, values: Values) -> O
     omega = signals["omega_mech_rad_s"]
     zero = np.zeros(omega.size)
     electrical = model.machine.pole_pairs * omega
-    rest = model.machine.pole_pairs * zero
+    electrical_zero = model.machine.pole_pairs * zero
     current = signals["id_a"] + 1j * zero
-    current = table_current(segment, current, rest, electrical, model, values)
+    current = table_current(segment, current, electrical_zero, electrical, model, values)
     freq = np.abs(omega) * model.machine.pole_pairs / (2 * math.pi)
     return operating(segment, signals, model, values, current, Motion(zero, omega, freq))
 

@@ -57,7 +57,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     noise = None if parts is None else _noise(columns, policy.reading)
     if noise is None:
         return None
-    made = segment_of(
+    segment = segment_of(
         capture,
         "torque_table",
         "drive",
@@ -70,7 +70,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         offsets=np.full((1, torque.size), float(np.abs(torque).max())),
     )
     # angles that were set stand apart by more than the encoder's step
-    return replace(made, sensors=replace(made.sensors, angle_step_rad=0.0))
+    return replace(segment, sensors=replace(segment.sensors, angle_step_rad=0.0))
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

@@ -81,9 +81,9 @@ def effect_tables(
         else:
             machine = Machine(pole_pairs, None, model.scales)
             q = dict.fromkeys(_names(library[name], machine), 0.0) | known
-            found = _tables(library[name], _anywhere(machine, base), q)
-            tables += found
-            if not found:
+            tables_of_effect = _tables(library[name], _anywhere(machine, base), q)
+            tables += tables_of_effect
+            if not tables_of_effect:
                 without[name] = _why_not(library[name])
     return EffectTables(tuple(tables), without)
 
@@ -165,11 +165,11 @@ def _torque_table(effect: str, hook: TorqueHook, x: Operating, q: Values) -> Eff
 
     needs = _depends(drag, x)
     note = "at no current" if needs & {"id_a", "iq_a"} else ""
-    rest = needs - {"id_a", "iq_a"}
-    if rest == {"theta_rad"} and not note:
+    variables = needs - {"id_a", "iq_a"}
+    if variables == {"theta_rad"} and not note:
         grid = 2.0 * math.pi * np.arange(_angles(q)) / _angles(q)
         name, axis = "theta_mech_rad", {"theta_rad": grid}
-    elif rest == {"omega_rad_s"}:
+    elif variables == {"omega_rad_s"}:
         grid = _speeds(x.machine.scales["speed_rad_s"])
         name, axis = "omega_mech_rad_s", {"omega_rad_s": grid}
     else:
@@ -213,8 +213,8 @@ def _packed(flux: Any) -> Array:
 
 def _at_rest(x: Operating, size: int, **changed: Array) -> Operating:
     """The machine at 25 °C without current or motion, but for what is changed."""
-    still = {name: np.zeros(size) for name in (*_VARIABLES, "freq_hz")}
-    return _fresh(x, **{**still, "travel_rad": np.full(size, math.inf), **changed})
+    zeros = {name: np.zeros(size) for name in (*_VARIABLES, "freq_hz")}
+    return _fresh(x, **{**zeros, "travel_rad": np.full(size, math.inf), **changed})
 
 
 def _floats(values: Array) -> tuple[float, ...]:

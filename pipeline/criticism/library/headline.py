@@ -36,7 +36,7 @@ def headline(effect: Effect, parameters: Mapping[str, ReportedParameter]) -> str
     if not effect.headline:
         sizes = ", ".join(f"{name} {number_text(*one)}" for name, one in parameters.items())
         return f"{effect.name} ({sizes})" if sizes else effect.name
-    return _SIZE.sub(lambda found: _size(found[1], parameters), effect.headline)
+    return _SIZE.sub(lambda match: _size(match[1], parameters), effect.headline)
 
 
 def _size(parameter: str, parameters: Mapping[str, ReportedParameter]) -> str:

@@ -74,22 +74,24 @@ class Hook:
         shape, result = inputs[0].shape, np.asarray(value)
         where = f"{Path(self.file).name}{_at(getattr(self.call, '__code__', None))}: {self.what}"
         if result.dtype.kind not in "bifc":
-            words = f"{where} gives {type(value).__name__} and no numbers"
-            raise UsageError(words, "return an array of one number a sample")
+            message = f"{where} gives {type(value).__name__} and no numbers"
+            raise UsageError(message, "return an array of one number a sample")
         try:
             fits = np.broadcast_shapes(result.shape, shape) == shape
         except ValueError:
             fits = False
         if not fits:
-            words = f"{where} gives an array of shape {result.shape} for samples of shape {shape}"
-            raise UsageError(words, "return one number a sample")
+            message = f"{where} gives an array of shape {result.shape} for samples of shape {shape}"
+            raise UsageError(message, "return one number a sample")
         if np.isfinite(result).all():
             return
         known = np.logical_and.reduce([np.isfinite(one) for one in inputs if one.shape == shape])
-        lost = np.broadcast_to(~np.isfinite(result), shape) & known
-        if lost.any():
-            words = f"{where} gives no finite number at {np.count_nonzero(lost)} of {lost.size}"
-            raise UsageError(f"{words} samples", "give one for every current, speed and angle")
+        infinite = np.broadcast_to(~np.isfinite(result), shape) & known
+        if infinite.any():
+            message = (
+                f"{where} gives no finite number at {np.count_nonzero(infinite)} of {infinite.size}"
+            )
+            raise UsageError(f"{message} samples", "give one for every current, speed and angle")
 
 
 def _inputs(first: Any) -> list[NDArray[Any]]:
@@ -132,20 +134,20 @@ def guarded(effect: Effect, path: Path, text: str) -> Effect:
         called once to see that.
 
     """
-    what = f"effect {effect.name}"
+    label = f"effect {effect.name}"
     for parameter in effect.parameters:
-        _known_scale(parameter, path, what, text)
+        _known_scale(parameter, path, label, text)
     hooks = {name: getattr(effect, name) for name in _HOOKS}
     behind: dict[str, Any] = {
-        name: Hook(hook, f"{name} of {what}", str(path))
+        name: Hook(hook, f"{name} of {label}", str(path))
         for name, hook in hooks.items()
         if hook is not None
     }
     if effect.expand is not None:
-        behind["expand"] = _Expand(effect.expand, what, str(path))
-    made = replace(effect, **behind)
-    _try(made, path)
-    return made
+        behind["expand"] = _Expand(effect.expand, label, str(path))
+    wrapped = replace(effect, **behind)
+    _try(wrapped, path)
+    return wrapped
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +166,7 @@ class _Expand:
         return parameters
 
 
-def _known_scale(parameter: Parameter, path: Path, what: str, text: str = "") -> None:
+def _known_scale(parameter: Parameter, path: Path, label: str, text: str = "") -> None:
     if parameter.scale == "1" or parameter.scale in SCALES:
         return
     quoted = (f'"{parameter.scale}"', f"'{parameter.scale}'")
@@ -172,10 +174,10 @@ def _known_scale(parameter: Parameter, path: Path, what: str, text: str = "") ->
         n for n, line in enumerate(text.splitlines(), 1) if any(one in line for one in quoted)
     ]
     at = f", line {places[0]}" if places else ""
-    words = f"{path.name}{at}: {what}: {parameter.name} has the scale {parameter.scale!r}"
-    near = get_close_matches(parameter.scale, SCALES, 1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
-    raise UsageError(words, f"{hint}scales are 1, {', '.join(SCALES)}")
+    message = f"{path.name}{at}: {label}: {parameter.name} has the scale {parameter.scale!r}"
+    similar = get_close_matches(parameter.scale, SCALES, 1)
+    hint = f"did you mean {similar[0]!r}? " if similar else ""
+    raise UsageError(message, f"{hint}scales are 1, {', '.join(SCALES)}")
 
 
 class _NoNameError(KeyError):
@@ -231,14 +233,14 @@ def _ask(hook: Any, arguments: tuple[Any, ...], q: Mapping[str, float], path: Pa
 
 
 @contextmanager
-def errors_of(path: Path, what: str = "", q: Mapping[str, float] | None = None) -> Iterator[None]:
+def errors_of(path: Path, label: str = "", q: Mapping[str, float] | None = None) -> Iterator[None]:
     """Reports whatever goes wrong in a user's file as one line of file, line and remedy.
 
     Parameters
     ----------
     path
         The file.
-    what
+    label
         Which hook of which effect.
     q
         Its parameters.
@@ -254,22 +256,22 @@ def errors_of(path: Path, what: str = "", q: Mapping[str, float] | None = None) 
     except PipelineError:
         raise
     except (Exception, SystemExit) as error:
-        raise _fault(error, path, what, q or {}) from error
+        raise _fault(error, path, label, q or {}) from error
 
 
-def _fault(error: BaseException, path: Path, what: str, q: Mapping[str, float]) -> UsageError:
+def _fault(error: BaseException, path: Path, label: str, q: Mapping[str, float]) -> UsageError:
     line = _line(error, path)
-    where = path.name + ("" if line is None else f", line {line}") + (f": {what}" if what else "")
+    where = path.name + ("" if line is None else f", line {line}") + (f": {label}" if label else "")
     if isinstance(error, SystemExit):
         return UsageError(f"{where}: it ends the program", "take the exit out of the file")
     if isinstance(error, KeyError) and q and error.args and error.args[0] not in q:
-        asked = f"{where}: asks for {error.args[0]!r}"
+        lacking = f"{where}: asks for {error.args[0]!r}"
         return UsageError(
-            asked, f"its parameters are {', '.join(q)}; scales are {', '.join(SCALES)}"
+            lacking, f"its parameters are {', '.join(q)}; scales are {', '.join(SCALES)}"
         )
     lines = (error.msg if isinstance(error, SyntaxError) else str(error)).splitlines()
-    words = ": ".join(filter(None, [type(error).__name__, lines[0] if lines else ""]))
-    return UsageError(f"{where}: {words}", _MEND)
+    message = ": ".join(filter(None, [type(error).__name__, lines[0] if lines else ""]))
+    return UsageError(f"{where}: {message}", _MEND)
 
 
 def _line(error: BaseException, path: Path) -> int | None:

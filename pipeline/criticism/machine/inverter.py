@@ -171,6 +171,6 @@ def _passed(current_a: Array, ramp_a: float, width_a: float) -> Array:
     up, down = (np.abs(current_a + part * ramp_a) / width_a for part in (0.5, -0.5))
     bent = up - down
     for sign, apart in ((1.0, up), (-1.0, down)):
-        near = apart < _FAR
-        bent[near] += sign * np.log1p(np.exp(-2.0 * apart[near]))
+        close = apart < _FAR
+        bent[close] += sign * np.log1p(np.exp(-2.0 * apart[close]))
     return 0.5 + 0.5 * width_a / ramp_a * bent

@@ -203,18 +203,20 @@ class Model:
         stated = self.machine.stated_u
         sizes = {"1": 1.0, **self.machine.scales}
         base = [(c, c.u(self.policy.priors)) for c in base_of(self.machine)]
-        own = {
+        priors = {
             c.name: (c.center, stated.get(c.name, u * sizes[c.scale]))
             for c, u in base
             if u is not None
         }
-        own |= {n: p.usual for n, (_, p) in self.parameters().items() if p.usual is not None}
-        return own | self.stated()
+        priors |= {n: p.usual for n, (_, p) in self.parameters().items() if p.usual is not None}
+        return priors | self.stated()
 
     def stated(self) -> dict[str, tuple[float, float]]:
         """What is stated of the model's own parameters: value and standard uncertainty."""
         known = {*PHYSICAL, *self.parameters()}
-        return {name: both for name, both in self.machine.stated.items() if name in known}
+        return {
+            name: value_and_u for name, value_and_u in self.machine.stated.items() if name in known
+        }
 
     def with_effects(self, *effects: Effect) -> Model:
         """This model and further effects.
@@ -535,8 +537,8 @@ def evaluate(model: Model, x: Operating, values: Values, hooks: frozenset[str] =
     flux, slope = base_flux(x, values), np.zeros(x.omega_rad_s.shape)
     for effect in model.effects:
         if effect.coenergy is not None:
-            more, turn = effect_flux(effect, x, values_of(effect, model.machine, values))
-            flux, slope = flux + more, slope + turn
+            added, turn = effect_flux(effect, x, values_of(effect, model.machine, values))
+            flux, slope = flux + added, slope + turn
     x.psi_wb = flux
     for effect in model.effects:
         if effect.parallel is not None:

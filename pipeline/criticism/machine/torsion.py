@@ -156,8 +156,8 @@ def _windows(shaft: Shaft, policy: Torsion) -> Iterable[_Window]:
     block, theta, through, turned, least = _smoothed(shaft, policy)
     size = max(round(policy.window_s / (block * shaft.ts_s)), policy.window_blocks)
     closed = _closed(through, least)
-    kept = np.asarray(sliding_window_view(shaft.kept, 3 * block).all(axis=1))
-    closed &= kept[::block][: closed.size]
+    valid = np.asarray(sliding_window_view(shaft.kept, 3 * block).all(axis=1))
+    closed &= valid[::block][: closed.size]
     noise = _Noise.of(shaft, block, size)
     moves = max(policy.torque_range * least, policy.torque_moves * float(np.std(through)))
     for first in range(0, theta.size - size + 1, size // 2):
@@ -166,12 +166,12 @@ def _windows(shaft: Shaft, policy: Torsion) -> Iterable[_Window]:
         if pressed.size < policy.closed_blocks or np.ptp(pressed) < moves:
             continue
         side = np.sign(pressed)
-        own = [x[first : first + size][rows] - x[first] for x in (turned, theta)]
+        angles = [x[first : first + size][rows] - x[first] for x in (turned, theta)]
         parabola = np.vander(rows / size - 0.5, 3)
-        rest = np.linalg.qr(parabola, mode="complete")[0][:, 3:]
-        lower = np.linalg.cholesky(rest.T @ noise.error[np.ix_(rows, rows)] @ rest)
-        whiten = np.linalg.solve(lower, rest.T)
-        white = whiten @ np.column_stack([own[0], pressed, side, own[1]])
+        complement = np.linalg.qr(parabola, mode="complete")[0][:, 3:]
+        lower = np.linalg.cholesky(complement.T @ noise.error[np.ix_(rows, rows)] @ complement)
+        whiten = np.linalg.solve(lower, complement.T)
+        white = whiten @ np.column_stack([angles[0], pressed, side, angles[1]])
         yield _Window(
             white[:, :3],
             white[:, 3],
@@ -189,14 +189,14 @@ def _smoothed(shaft: Shaft, policy: Torsion) -> tuple[int, Array, Array, Array, 
     differenced twice. So a ringing, however fast, is in each of them alike. The block is the
     shortest in which noise is small against the torque, since what a gap does is short.
     """
-    whole = np.cumsum(np.cumsum(shaft.momentum_nm) - 0.5 * shaft.momentum_nm) * shaft.ts_s**2
+    travel = np.cumsum(np.cumsum(shaft.momentum_nm) - 0.5 * shaft.momentum_nm) * shaft.ts_s**2
     for length in policy.blocks_s:
         block = max(round(length / shaft.ts_s), 1)
         period = block * shaft.ts_s
         box, kernel = _kernel(block)
         theta, through, turned = (
             np.convolve(x, kernel, mode="valid")[1::block]
-            for x in (shaft.theta_rad, shaft.through_nm, whole)
+            for x in (shaft.theta_rad, shaft.through_nm, travel)
         )
         # the middle of three blocks is a sample after that of their weights
         means = np.convolve(shaft.theta_rad, box, mode="valid")[::block]
@@ -252,9 +252,9 @@ class _Noise:
             u**2 for u in (shaft.u_theta_rad, shaft.u_through_nm, shaft.u_momentum_nm)
         )
         momentum = u_momentum * turned @ turned.T
-        own = u_theta * angle @ angle.T
+        of_angle = u_theta * angle @ angle.T
         return cls(
-            own + momentum / shaft.inertia_kgm2**2,
+            of_angle + momentum / shaft.inertia_kgm2**2,
             momentum,
             u_through * turned @ angle.T,
             u_through * angle @ angle.T + u_theta * torque @ torque.T,

@@ -63,8 +63,8 @@ def passed_on(x: Operating, share: float) -> Array:
 
     """
     torque, theta = _sampled(x)
-    near = (1.0 - share) * x.base["j_kgm2"]
-    return _smoothed(x, torque[1:-1] - near * np.diff(theta, 2) / x.ts_s**2)
+    near_kgm2 = (1.0 - share) * x.base["j_kgm2"]
+    return _smoothed(x, torque[1:-1] - near_kgm2 * np.diff(theta, 2) / x.ts_s**2)
 
 
 def _sampled(x: Operating) -> tuple[Array, Array]:
@@ -146,8 +146,8 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
     torque, theta = _sampled(x)
     bend = np.diff(theta, 2) / x.ts_s**2
     bent = q["angle_s2"] * inertia_scale(x.machine)
-    made = _smoothed(x, q["torque_s2"] * torque[1:-1] - bent * bend)
-    return _at_points(x, -np.pad(np.diff(made, 2), 1) / x.ts_s**2)
+    twist = _smoothed(x, q["torque_s2"] * torque[1:-1] - bent * bend)
+    return _at_points(x, -np.pad(np.diff(twist, 2), 1) / x.ts_s**2)
 
 
 def inertia_scale(machine: Machine) -> float:
@@ -346,10 +346,10 @@ def _excluded(law: Law, log: FullLog, part: float, q: Values) -> bool:
     softness = part * q.get("twist_rad", 0.0) / machine.scales["torque_nm"]
     gap = part * q.get("gap_rad", 0.0)
     return all(
-        found < policy.sure_u * u
+        value < policy.sure_u * u
         if size == 0.0
-        else found + policy.sure_u * u < policy.least_shown * size
-        for size, found, u in (
+        else value + policy.sure_u * u < policy.least_shown * size
+        for size, value, u in (
             (softness, law.softness, law.u_softness),
             (gap, law.gap_rad, law.u_gap_rad),
         )
@@ -387,15 +387,18 @@ def _in_coupling(law: Law, log: FullLog, near_kgm2: float) -> Discrimination | N
     None without a far inertia.
     """
     policy = log.x.machine.policy.torsion
-    found = _discriminated(law, log, 1.0)
-    if found is None or law.mobility < policy.sure_u * law.u_mobility:
+    discrimination = _discriminated(law, log, 1.0)
+    if discrimination is None or law.mobility < policy.sure_u * law.u_mobility:
         return None
     torque = log.x.machine.scales["torque_nm"]
-    near = near_kgm2 * law.mobility
-    values = {**found.values, "share": (1.0 / (1.0 + near), near * law.u_mobility / law.mobility)}
+    near_share = near_kgm2 * law.mobility
+    values = {
+        **discrimination.values,
+        "share": (1.0 / (1.0 + near_share), near_share * law.u_mobility / law.mobility),
+    }
     if law.softness > policy.sure_u * law.u_softness:
         values["twist_rad"] = torque * law.softness, torque * law.u_softness
-    return Discrimination(found.name, values)
+    return Discrimination(discrimination.name, values)
 
 
 def shown(logs: Sequence[FullLog]) -> Shown | None:
@@ -422,11 +425,11 @@ def shown(logs: Sequence[FullLog]) -> Shown | None:
     law = _law(logs, True, 0.5) if logs else None
     if law is None:
         return None
-    near = logs[0].x.base["j_kgm2"]
-    found = _in_coupling(law, logs[0], near)
-    if found is None or "twist_rad" not in found.values:
+    near_kgm2 = logs[0].x.base["j_kgm2"]
+    discrimination = _in_coupling(law, logs[0], near_kgm2)
+    if discrimination is None or "twist_rad" not in discrimination.values:
         return None
-    return Shown(found, {"between": 1.0}, {"j_kgm2": near + 1.0 / law.mobility})
+    return Shown(discrimination, {"between": 1.0}, {"j_kgm2": near_kgm2 + 1.0 / law.mobility})
 
 
 def _shaft(log: FullLog, between: bool, share: float) -> Shaft:

@@ -36,12 +36,12 @@ def observes(segment: Segment, effect: Hooks) -> bool:
     """
     if effect.hook == "sensor":
         return any(observes_sensor(segment, sensor) for sensor in _sensors_of(effect))
-    seen = equation_of(segment).observes
-    if effect.parallel is not None and {"flux", "drop"} <= seen.hooks:
+    observed = equation_of(segment).observes
+    if effect.parallel is not None and {"flux", "drop"} <= observed.hooks:
         return True
     if effect.torque is not None and "torque" in hooks_in(segment):
         return True
-    return effect.hook != "torque" and effect.hook in seen.hooks
+    return effect.hook != "torque" and effect.hook in observed.hooks
 
 
 def hooks_in(segment: Segment) -> frozenset[str]:
@@ -58,9 +58,11 @@ def hooks_in(segment: Segment) -> frozenset[str]:
         Of `flux`, `drop` and `torque`.
 
     """
-    seen = equation_of(segment).observes
-    without = {"torque"} if seen.torque_in and seen.torque_in not in segment.channels else set()
-    return seen.hooks - without
+    observed = equation_of(segment).observes
+    without = (
+        {"torque"} if observed.torque_in and observed.torque_in not in segment.channels else set()
+    )
+    return observed.hooks - without
 
 
 def _sensors_of(effect: Hooks) -> tuple[str, ...]:

@@ -47,8 +47,8 @@ def residual(
     x = equation.state(segment, signals, model, values)
     x = x if beside is None else x.beside(beside)
     pieces = evaluate(model, x, values, hooks_in(segment))
-    seen = equation.measured(segment, signals, model, values)
-    return seen - equation.predicted(segment, x, pieces, model, values)
+    measured = equation.measured(segment, signals, model, values)
+    return measured - equation.predicted(segment, x, pieces, model, values)
 
 
 def operate(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

@@ -43,7 +43,7 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
         clock does not rise.
 
     """
-    made: list[Segment] = []
+    cut_segments: list[Segment] = []
     gains = gains_of(campaign.captures)
     mixed = {c.path for setup in mixed_setups(campaign, machine) for c in setup.captures}
     for recorded in campaign.captures:
@@ -52,12 +52,12 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
         if capture is not None:
             gain = gains[recorded.path]
             cut = (_by_encoder(s, machine) for s in _cut(capture, machine))
-            made += [_by_instruments(segment, gain) for segment in cut]
-    kinds = {segment.kind for segment in made}
+            cut_segments += [_by_instruments(segment, gain) for segment in cut]
+    kinds = {segment.kind for segment in cut_segments}
     # a table that other captures can predict is held out as a whole
-    whole = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
-    made = [replace(s, blocks=None) if s.kind in whole else s for s in made]
-    return tuple(replace(s, fixed={**s.fixed, **_beside(s, made)}) for s in made)
+    undivided = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
+    cut_segments = [replace(s, blocks=None) if s.kind in undivided else s for s in cut_segments]
+    return tuple(replace(s, fixed={**s.fixed, **_beside(s, cut_segments)}) for s in cut_segments)
 
 
 def mixed_setups(campaign: Campaign, machine: Machine) -> tuple[Setup, ...]:
@@ -123,8 +123,10 @@ def _unlogged(segment: Segment, equation: Equation, machine: Machine) -> dict[st
         UNLOGGED_AT_REST if hooks[name] == "drop" and equation.use.at_rest else UNLOGGED[name]
         for name in lacks
     )
-    own = (n for n, at in machine.unlogged.items() if at in {(c, segment.capture) for c in lacks})
-    return dict.fromkeys((*common, *own), 1.0)
+    of_capture = (
+        n for n, at in machine.unlogged.items() if at in {(c, segment.capture) for c in lacks}
+    )
+    return dict.fromkeys((*common, *of_capture), 1.0)
 
 
 def _late_speed(segment: Segment, capture: Capture) -> dict[str, float]:
@@ -189,8 +191,10 @@ def sparse(segment: Segment, windows: int) -> Segment:
     rows = np.clip(rows, 0, segment.size - 1).ravel()
     cut = {name: column[rows] for name, column in segment.recorded.items()}
     moved = PAD + (weak.length + 2 * PAD) * np.arange(windows)
-    few = replace(weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen])
+    thinned = replace(
+        weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen]
+    )
     blocks = None if segment.blocks is None else segment.blocks[chosen]
-    short = replace(segment, recorded=cut, weak=few, blocks=blocks, kept=Kept())
+    short = replace(segment, recorded=cut, weak=thinned, blocks=blocks, kept=Kept())
     lines = segment.disturbances.lines
     return short if lines is None else with_lines(short, lines[:, :, chosen])

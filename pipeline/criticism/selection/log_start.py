@@ -57,11 +57,11 @@ def with_log_start(
     hooks = {c.effect.shown: c for c in by_name.values() if c.effect.shown is not None}
     for hook in hooks if significant.any() else ():
         shown = hook(full_logs(wide.fit, wide.fit.model))
-        if shown is None or shown.found.name not in by_name:
+        if shown is None or shown.discrimination.name not in by_name:
             continue
-        candidate = by_name[shown.found.name]
-        effect = settled(candidate.effect, shown.found)
-        given = {name: value for name, (value, _) in shown.found.values.items()}
+        candidate = by_name[shown.discrimination.name]
+        effect = settled(candidate.effect, shown.discrimination)
+        given = {name: value for name, (value, _) in shown.discrimination.values.items()}
         begun = _begun(wide.fit, effect, {**given, **shown.start}, shown.base)
         started = scored(wide, candidate, begun)
         alike = [s for s in ranked if s.candidate.effect.shown is hook]

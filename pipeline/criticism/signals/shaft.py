@@ -69,8 +69,8 @@ def torque_between(segment: Segment, x: Operating, pieces: Pieces, values: Value
         return np.zeros(x.theta_rad.size)
     flux, current = ripple(x, values["ripple_held" if x.shaft.held else "ripple_mean"], values)
     torque = _torque_of_current(x, pieces, _moved_on(segment, x, values) - current)
-    less: Array = 1.5 * x.machine.pole_pairs * (np.conj(flux) * x.i_a).imag
-    return torque - less
+    ripple_torque: Array = 1.5 * x.machine.pole_pairs * (np.conj(flux) * x.i_a).imag
+    return torque - ripple_torque
 
 
 def _moved_on(segment: Segment, x: Operating, values: Values) -> Complex:

@@ -97,8 +97,8 @@ def _errors_of(
     system: LinearSystem,
     whitened: Array,
 ) -> Errors:
-    unit = np.concatenate([system.unit[mine] for _, mine in groups])
-    noise_ratio = np.concatenate([system.noise_ratio[mine] for _, mine in groups])
+    unit = np.concatenate([system.unit[rows] for _, rows in groups])
+    noise_ratio = np.concatenate([system.noise_ratio[rows] for _, rows in groups])
 
     def variable(name: str, number: int, in_capture: NDArray[np.bool_]) -> Array:
         values = variables[number].get(name, np.full(system.segments[number].size, np.nan))
@@ -107,10 +107,10 @@ def _errors_of(
     names = sorted({name for number, _ in groups for name in variables[number]})
     return Errors(
         signal,
-        np.concatenate([whitened[mine] for _, mine in groups]) * unit,
+        np.concatenate([whitened[rows] for _, rows in groups]) * unit,
         unit * noise_ratio,
-        np.concatenate([np.full(int(mine.sum()), number) for number, mine in groups]),
-        np.concatenate([system.window[mine] for _, mine in groups]),
+        np.concatenate([np.full(int(rows.sum()), number) for number, rows in groups]),
+        np.concatenate([system.window[rows] for _, rows in groups]),
         {name: np.concatenate([variable(name, *group) for group in groups]) for name in names},
     )
 
@@ -302,14 +302,14 @@ def angle_maps(fit: Fit) -> tuple[ErrorMap, ...]:
         for signal, variable, part in _by_angle(segment, fit, cells, first):
             parts.setdefault((signal, variable), []).append(part)
         first += segment.weak.starts.size
-    made = []
+    maps = []
     for (signal, variable), pieces in sorted(parts.items()):
-        error, sigma, cell, window = (np.concatenate(one) for one in zip(*pieces, strict=True))
+        error, sigma, cell, window = (np.concatenate(part) for part in zip(*pieces, strict=True))
         x = Bins(variable, tuple(np.linspace(0.0, 2 * math.pi, cells[variable] + 1).tolist()))
         cell = cell.astype(np.int64)
         visit = window.astype(np.int64) * x.count + cell
-        made.append(_map(signal, (error, sigma), cell, visit, x, None))
-    return tuple(made)
+        maps.append(_map(signal, (error, sigma), cell, visit, x, None))
+    return tuple(maps)
 
 
 def _turns(segment: Segment) -> bool:
@@ -372,11 +372,11 @@ def disjoint(starts: NDArray[np.int64], length: int) -> NDArray[np.int64]:
         Those that are kept, the earliest first.
 
     """
-    kept: list[int] = []
+    chosen: list[int] = []
     for start in starts.tolist():
-        if not kept or start >= kept[-1] + length:
-            kept.append(start)
-    return np.array(kept, dtype=np.int64)
+        if not chosen or start >= chosen[-1] + length:
+            chosen.append(start)
+    return np.array(chosen, dtype=np.int64)
 
 
 def histograms(errors: Sequence[Errors], policy: Validation) -> tuple[Histogram, ...]:
@@ -391,12 +391,12 @@ def histograms(errors: Sequence[Errors], policy: Validation) -> tuple[Histogram,
 
     """
     edges = np.linspace(-policy.histogram_reach, policy.histogram_reach, policy.histogram_cells + 1)
-    made = []
+    histograms_of = []
     for one in errors:
         inside = np.clip(one.error / one.sigma, edges[0], np.nextafter(edges[-1], 0.0))
         count, _ = np.histogram(inside, edges)
-        made.append(Histogram(one.signal, tuple(edges.tolist()), tuple(count.tolist())))
-    return tuple(made)
+        histograms_of.append(Histogram(one.signal, tuple(edges.tolist()), tuple(count.tolist())))
+    return tuple(histograms_of)
 
 
 def all_maps(system: LinearSystem, residual_over_floor: Array) -> tuple[ErrorMap, ...]:
@@ -410,10 +410,10 @@ def all_maps(system: LinearSystem, residual_over_floor: Array) -> tuple[ErrorMap
         [R].
 
     """
-    made: list[ErrorMap | None] = []
+    maps: list[ErrorMap | None] = []
     policy = system.policy.validation
     for errors in window_errors(system, residual_over_floor):
-        made.append(speed_current_map(errors, policy))
-        made.extend(curve(errors, variable, policy) for variable in CURVES)
-        made.append(direction(errors))
-    return (*(one for one in made if one is not None), *angle_maps(system.fit))
+        maps.append(speed_current_map(errors, policy))
+        maps.extend(curve(errors, variable, policy) for variable in CURVES)
+        maps.append(direction(errors))
+    return (*(one for one in maps if one is not None), *angle_maps(system.fit))

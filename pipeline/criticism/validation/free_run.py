@@ -92,8 +92,8 @@ class Run:
         if not self.drift[signal].size:
             return error * floor
         axes, size, _ = np.linalg.svd((self.drift[signal] / floor).T, full_matrices=False)
-        taken = axes @ ((1.0 - 1.0 / np.sqrt(1.0 + size**2)) * (axes.T @ error))
-        return (error - taken) * floor
+        absorbed = axes @ ((1.0 - 1.0 / np.sqrt(1.0 + size**2)) * (axes.T @ error))
+        return (error - absorbed) * floor
 
 
 def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
@@ -121,9 +121,9 @@ def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
     moved = _response(segment, model, values)
     if moved is None:
         return None
-    seen = moved.inside(moved.batch.segment.recorded)
+    measured = moved.inside(moved.batch.segment.recorded)
     floor, drift = _floor(moved), _drift(moved)
-    return Run(segment.capture, moved.time(), seen, moved.inside(moved.path), floor, drift)
+    return Run(segment.capture, moved.time(), measured, moved.inside(moved.path), floor, drift)
 
 
 def beside(run: Run, segment: Segment, model: Model, values: Values) -> dict[str, Array]:
@@ -151,11 +151,11 @@ def beside(run: Run, segment: Segment, model: Model, values: Values) -> dict[str
     windows = {float(time[0]): number for number, time in enumerate(moved.time())}
     known = [windows.get(float(time[0])) for time in run.t_s]
     rows = np.array([-1 if number is None else number for number in known])
-    made = moved.inside(moved.path)
+    simulated = moved.inside(moved.path)
     return {
-        name: np.where(rows[:, None] < 0, np.nan, made[name][rows])
+        name: np.where(rows[:, None] < 0, np.nan, simulated[name][rows])
         for name in run.signals
-        if name in made
+        if name in simulated
     }
 
 
@@ -164,8 +164,8 @@ def _response(segment: Segment, model: Model, values: Values) -> _Response | Non
     use = equation_of(segment).use
     if segment.test not in use.free_runs:
         return None
-    still = segment.ts_s * values["r_ohm"] > min(values["ld_h"], values["lq_h"])
-    batch = None if still and use.currents else batch_of(segment, model, values)
+    quasi_static = segment.ts_s * values["r_ohm"] > min(values["ld_h"], values["lq_h"])
+    batch = None if quasi_static and use.currents else batch_of(segment, model, values)
     if batch is None:
         return None
     recorded = batch.segment.recorded

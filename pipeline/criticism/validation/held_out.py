@@ -49,7 +49,7 @@ class Simulated:
 
 
 def values_without(
-    number: int, system: LinearSystem, held: HeldOut
+    number: int, system: LinearSystem, held_out: HeldOut
 ) -> tuple[dict[str, float], Split]:
     """Parameters fitted without a capture.
 
@@ -59,7 +59,7 @@ def values_without(
         Of the capture's segment.
     system
         Around the full fit.
-    held
+    held_out
         How far the parameters move without each capture.
 
     Returns
@@ -68,30 +68,30 @@ def values_without(
         `held_out`; those of the full fit, `fit`, where the capture alone determines a parameter.
 
     """
-    step = held.steps.get(number)
+    step = held_out.steps.get(number)
     if step is None:
         return system.fit.values, "fit"
     return system.fit.moved(system.columns[: step.size], step).values, "held_out"
 
 
-def simulate(system: LinearSystem, held: HeldOut) -> tuple[Simulated, ...]:
+def simulate(system: LinearSystem, held_out: HeldOut) -> tuple[Simulated, ...]:
     """Free runs of every capture that allows one.
 
     Parameters
     ----------
     system
         The fit.
-    held
+    held_out
         Its held-out residual, with the parameters that each capture is predicted by.
 
     """
-    made = []
+    runs = []
     for number, segment in enumerate(system.segments):
-        values, split = values_without(number, system, held)
+        values, split = values_without(number, system, held_out)
         run = free_run(segment, system.fit.model, values)
         if run is not None:
-            made.append(Simulated(number, split, values, run))
-    return tuple(made)
+            runs.append(Simulated(number, split, values, run))
+    return tuple(runs)
 
 
 def run_errors(simulated: Sequence[Simulated]) -> Iterator[SignalError]:
@@ -207,16 +207,22 @@ def _equations(
     if weak is None:
         return
     residuals = residual(segment, fit.model, simulated.values)
-    less = None
+    before_residuals = None
     if before is not None:
-        less = residual(segment, before.system.fit.model, before.values(simulated.number))
+        before_residuals = residual(
+            segment, before.system.fit.model, before.values(simulated.number)
+        )
     width = max(2 * round(fit.policy.validation.look_s / segment.ts_s / 2) + 1, 1)
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(width // 2, weak.length, max(width // 2, 1))[None, :]
     for place, channel in enumerate(segment.channels):
         recorded = smoothed(segment.recorded[channel], width)[rows]
         model = recorded - smoothed(residuals[place], width)[rows]
-        without = None if less is None else recorded - smoothed(less[place], width)[rows]
+        without = (
+            None
+            if before_residuals is None
+            else recorded - smoothed(before_residuals[place], width)[rows]
+        )
         time = segment.recorded["t_s"][rows]
         columns = (time, recorded, model, without)
         yield _trace(segment, channel, "equation", simulated.split, columns)

@@ -67,13 +67,13 @@ class _Curve:
 
 
 def signature(
-    whole: LinearSystem, added: Sequence[str], maps: Sequence[ErrorMap]
+    full: LinearSystem, added: Sequence[str], maps: Sequence[ErrorMap]
 ) -> Signature | None:
     """The curve in which effects show most clearly; None where none has cells.
 
     Parameters
     ----------
-    whole : LinearSystem
+    full : LinearSystem
         The fit with the effects.
     added : sequence of str
         Names of the effects.
@@ -95,14 +95,14 @@ def signature(
     Component-plus-residual plots: F. S. Wood, Technometrics 15 (1973) 677-695.
 
     """
-    bare = linear_system(whole.fit.without(*added))
-    curves = [*_window_curves(bare, whole), *_turn_curves(angle_maps(bare.fit), maps)]
+    without = linear_system(full.fit.without(*added))
+    curves = [*_window_curves(without, full), *_turn_curves(angle_maps(without.fit), maps)]
     if not curves:
         return None
     best = max(curves, key=lambda one: one.contrast)
     scale, signal = 1.0, best.signal
     if signal == _ACCELERATION:
-        scale, signal = whole.fit.values["j_kgm2"], _TORQUE
+        scale, signal = full.fit.values["j_kgm2"], _TORQUE
     return Signature(
         signal,
         unit_of(signal),
@@ -115,16 +115,16 @@ def signature(
     )
 
 
-def _window_curves(bare: LinearSystem, whole: LinearSystem) -> Iterator[_Curve]:
+def _window_curves(without: LinearSystem, full: LinearSystem) -> Iterator[_Curve]:
     """Window errors of every signal of every capture over every variable that was recorded."""
-    with_it = {one.signal: one for one in window_errors(whole, whole.residual)}
-    for before in window_errors(bare, bare.residual):
+    with_it = {one.signal: one for one in window_errors(full, full.residual)}
+    for before in window_errors(without, without.residual):
         after = with_it.get(before.signal)
         if after is None or after.error.size != before.error.size:
             continue
         for number in np.unique(before.segment).tolist():
             in_segment = before.segment == number
-            yield from _of_capture(bare.segments[number], before, after, in_segment)
+            yield from _of_capture(without.segments[number], before, after, in_segment)
 
 
 def _of_capture(
@@ -135,8 +135,8 @@ def _of_capture(
         cell, at = _cells(variable, value)
         inside = cell >= 0
         count = np.bincount(cell[inside], minlength=at.size).astype(float)
-        seen = count > 0
-        if seen.sum() < _FEWEST:
+        nonempty = count > 0
+        if nonempty.sum() < _FEWEST:
             continue
 
         def mean(
@@ -144,19 +144,19 @@ def _of_capture(
             cell: NDArray[np.int64] = cell[inside],
             inside: NDArray[np.bool_] = inside,
             count: Array = count,
-            seen: NDArray[np.bool_] = seen,
+            nonempty: NDArray[np.bool_] = nonempty,
         ) -> Array:
-            return np.bincount(cell, error[inside], count.size)[seen] / count[seen]
+            return np.bincount(cell, error[inside], count.size)[nonempty] / count[nonempty]
 
         yield _Curve(
             before.signal,
             variable,
             segment.capture,
-            at[seen],
+            at[nonempty],
             mean(before.error[in_capture]),
             mean(after.error[in_capture]),
-            count[seen],
-            np.sqrt(mean(sigma**2) / count[seen]),
+            count[nonempty],
+            np.sqrt(mean(sigma**2) / count[nonempty]),
         )
 
 
@@ -199,21 +199,21 @@ def _turn_curves(without: Sequence[ErrorMap], with_it: Sequence[ErrorMap]) -> It
         other = after.get(_key(one))
         if other is None or one.x != other.x:
             continue
-        seen = np.isfinite(one.mean) & np.isfinite(other.mean)
-        if seen.sum() < _FEWEST:
+        finite = np.isfinite(one.mean) & np.isfinite(other.mean)
+        if finite.sum() < _FEWEST:
             continue
         edges = np.array(one.x.edges)
-        whole = _Curve(
+        curve = _Curve(
             one.signal,
             one.x.variable,
             None,
-            ((edges[1:] + edges[:-1]) / 2.0)[seen],
-            one.mean[seen],
-            other.mean[seen],
-            one.count[seen].astype(float),
-            np.zeros(int(seen.sum())),
+            ((edges[1:] + edges[:-1]) / 2.0)[finite],
+            one.mean[finite],
+            other.mean[finite],
+            one.count[finite].astype(float),
+            np.zeros(int(finite.sum())),
         )
-        if (folded := _folded(whole, one.x.count)) is not None:
+        if (folded := _folded(curve, one.x.count)) is not None:
             yield folded
 
 

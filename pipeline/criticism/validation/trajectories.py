@@ -263,9 +263,9 @@ def _defects(batch: Batch, signals: Signals) -> tuple[Complex, Array]:
     # as the residual differences it, over the ends of the stretches too
     flat = pieces.psi_wb
     central.ravel()[1:-1] = (flat[2:] - flat[:-2]) / (2 * period)
-    plain = voltage + central
+    voltages = voltage + central
     step = np.zeros_like(psi)
-    step[:, :-1] = 0.5 * (plain[:, :-1] + plain[:, 1:]) - np.diff(psi, axis=1) / period
+    step[:, :-1] = 0.5 * (voltages[:, :-1] + voltages[:, 1:]) - np.diff(psi, axis=1) / period
     return step, torque
 
 
@@ -373,10 +373,10 @@ def _corrected(
                 turn = turn + period * speed
                 angle[n + 1] = turn
             if batch.currents:
-                right = voltage[n] - jacobian.emf[n] * speed if batch.shaft else voltage[n]
+                defect = voltage[n] - jacobian.emf[n] * speed if batch.shaft else voltage[n]
                 back, on = jacobian.behind[:, :, n], jacobian.ahead[:, :, n]
-                rd = back[0, 0] * d + back[0, 1] * q + right.real
-                rq = back[1, 0] * d + back[1, 1] * q + right.imag
+                rd = back[0, 0] * d + back[0, 1] * q + defect.real
+                rq = back[1, 0] * d + back[1, 1] * q + defect.imag
                 d, q = on[0, 0] * rd + on[0, 1] * rq, on[1, 0] * rd + on[1, 1] * rq
                 current[n + 1] = d + 1j * q
     current[stop + 1 :], angle[stop + 1 :] = current[stop], angle[stop]
