@@ -132,31 +132,31 @@ def _spread(capture: Capture, quantity: str) -> float:
     if quantity in ("ld_h", "lq_h"):
         return policy().capture_spread.inductance
     if quantity == "r_phase_ohm":
-        own = (
+        spread = (
             policy().capture_spread.resistance_temperature_known
             if capture.has("temp_winding_degc")
             else policy().capture_spread.resistance_temperature_unknown
         )
     elif capture.meta.test == "torque_map":
-        own = (
+        spread = (
             policy().capture_spread.torque
             if known
             else policy().capture_spread.flux_temperature_unknown
         )
     elif capture.meta.test in UNPOWERED and not known:
         stated = capture.meta.ambient_degc is not None
-        own = (
+        spread = (
             policy().capture_spread.flux_temperature_known
             if stated
             else policy().capture_spread.flux_temperature_unpowered
         )
     else:
-        own = (
+        spread = (
             policy().capture_spread.flux_temperature_known
             if known
             else policy().capture_spread.flux_temperature_unknown
         )
-    return max(own, policy().capture_spread.log) if capture.meta.test == "drive" else own
+    return max(spread, policy().capture_spread.log) if capture.meta.test == "drive" else spread
 
 
 def _inverter(capture: Capture, estimate: Estimate) -> float:
@@ -188,8 +188,8 @@ def _largest(capture: Capture, name: str) -> float:
 def _fastest_rad_s(capture: Capture) -> float:
     """The speed that the angle reaches, over pieces of a hundredth of the capture [rad/s]."""
     data = capture.arrays("t_s", "theta_mech_rad")
-    there = np.isfinite(data["theta_mech_rad"])
-    t_s, angle = data["t_s"][there], data["theta_mech_rad"][there]
+    finite = np.isfinite(data["theta_mech_rad"])
+    t_s, angle = data["t_s"][finite], data["theta_mech_rad"][finite]
     step = max(1, t_s.size // 100)
     speed = np.abs(np.diff(angle[::step]) / np.diff(t_s[::step]))
     return float(np.percentile(speed, 95.0)) if speed.size else 0.0
@@ -209,5 +209,5 @@ def _height(capture: Capture) -> str:
     """The class of a step's largest current, a quarter wide: inductance falls with current."""
     names = [name for name in LINES if capture.has(name)]
     largest = [np.nanmax(np.abs(c), initial=0.0) for c in capture.arrays(*names).values()]
-    most = float(max(largest, default=0.0))
-    return f"{round(math.log(most) / math.log(1.25))}" if most > 0.0 else ""
+    highest = float(max(largest, default=0.0))
+    return f"{round(math.log(highest) / math.log(1.25))}" if highest > 0.0 else ""

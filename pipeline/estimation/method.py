@@ -52,8 +52,8 @@ class Method:
             Neither knows the constant.
 
         """
-        own = next((term for term in self.terms if term.name == constant), None)
-        return (own or CONSTANTS[constant]).unit
+        declared = next((term for term in self.terms if term.name == constant), None)
+        return (declared or CONSTANTS[constant]).unit
 
     def scatter(self, of: str, u: float, dof: float = math.inf) -> Contribution:
         """The scatter of something that this method fits.
@@ -208,9 +208,9 @@ class Method:
         number, t_s, measured, fitted = rows
         plots = []
         for index, (capture, title) in enumerate(zip(captures, titles, strict=True)):
-            own = np.flatnonzero(number == index)
-            own = own[decimated(own.size)]
-            series = Series(capture.path, t_s[own], measured[own], fitted[own])
+            chosen = np.flatnonzero(number == index)
+            chosen = chosen[decimated(chosen.size)]
+            series = Series(capture.path, t_s[chosen], measured[chosen], fitted[chosen])
             plots.append(
                 self.plot(title, ("t_s", column), "line", (series,), caption, capture.path)
             )

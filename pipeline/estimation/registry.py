@@ -176,10 +176,10 @@ def _missing(estimator: Estimator, note: str) -> tuple[Estimate, ...]:
 
 def _possible(estimator: Estimator, result: Fit) -> Fit:
     """The result with what is not finite, out of range or of no known size not identifiable."""
-    own = {term.name: term for term in estimator.terms}
+    terms = {term.name: term for term in estimator.terms}
     return Fit(
         tuple(
-            _possible_estimate(e, own.get(e.name) or CONSTANTS.get(e.name))
+            _possible_estimate(e, terms.get(e.name) or CONSTANTS.get(e.name))
             for e in result.estimates
         ),
         result.evidence,
@@ -201,8 +201,8 @@ def _possible_estimate(estimate: Estimate, term: Term | None) -> Estimate:
     else:
         return estimate
     note = f"{wrong}: look at clock, signs and units of {', '.join(estimate.captures[:3])}"
-    gone = not_identifiable(estimate.name, estimate.unit, estimate.method, note)
-    return replace(gone, impossible=_beyond(estimate, term))
+    withheld = not_identifiable(estimate.name, estimate.unit, estimate.method, note)
+    return replace(withheld, impossible=_beyond(estimate, term))
 
 
 def _beyond(estimate: Estimate, term: Term | None) -> bool:
@@ -230,8 +230,8 @@ def _torn(estimate: Estimate) -> bool:
     The ends of value (1 ± 1/3) are a factor of two apart: not even the first digit is known then.
     """
     beyond = abs(estimate.number) / 3.0
-    plain = replace(estimate, budget=without_between(estimate.budget))
-    wide, narrow = (e.interval()[1] - e.number for e in (estimate, plain))
+    without = replace(estimate, budget=without_between(estimate.budget))
+    wide, narrow = (e.interval()[1] - e.number for e in (estimate, without))
     return wide > beyond >= narrow
 
 
@@ -247,5 +247,5 @@ def _in_range(value: float, term: Term) -> bool:
 
 
 def _unit(estimator: Estimator, name: str) -> str:
-    own = {term.name: term for term in estimator.terms}
-    return (own.get(name) or CONSTANTS[name]).unit
+    terms = {term.name: term for term in estimator.terms}
+    return (terms.get(name) or CONSTANTS[name]).unit

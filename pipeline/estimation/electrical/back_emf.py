@@ -261,13 +261,15 @@ def _unbroken(t_s: Array, vector: Complex, moving: NDArray[np.bool_]) -> list[tu
     Across such a gap the phase cannot be unwrapped. Half a cycle is seen by nine tenths of the
     advances from row to row.
     """
-    both = np.flatnonzero(moving[1:] & moving[:-1])
-    if not both.size:
+    consecutive = np.flatnonzero(moving[1:] & moving[:-1])
+    if not consecutive.size:
         return []
-    advance = np.abs(np.angle(vector[both + 1] * np.conj(vector[both])))
-    usual_s, after_s = float(np.median(np.diff(t_s)[both])), np.diff(t_s)
-    lost = float(np.quantile(advance, 0.9)) * after_s > math.pi * usual_s
-    gaps = np.flatnonzero(lost & (after_s > 1.5 * usual_s)) + 1 if usual_s > 0.0 else both[:0]
+    advance = np.abs(np.angle(vector[consecutive + 1] * np.conj(vector[consecutive])))
+    usual_s, after_s = float(np.median(np.diff(t_s)[consecutive])), np.diff(t_s)
+    missed = float(np.quantile(advance, 0.9)) * after_s > math.pi * usual_s
+    gaps = (
+        np.flatnonzero(missed & (after_s > 1.5 * usual_s)) + 1 if usual_s > 0.0 else consecutive[:0]
+    )
     pieces: list[tuple[int, int]] = []
     for start, stop in true_runs(moving):
         inner = gaps[(gaps > start) & (gaps < stop)]
@@ -494,12 +496,12 @@ def electrical_per_mechanical(spin: Spin, stretches: Sequence[Stretch]) -> tuple
                     np.column_stack([np.ones_like(turning), turning]), wave, rcond=None
                 )[0]
                 phase = phase + np.angle((wave - offset) / turning)
-            good = np.isfinite(theta)
-            if np.count_nonzero(good) < 2:
+            finite = np.isfinite(theta)
+            if np.count_nonzero(finite) < 2:
                 continue
-            turned = float(theta[good][-1] - theta[good][0])
-            along = theta[good] - theta[good].mean()
-            electrical += float(along @ phase[good] / (along @ along)) * abs(turned)
+            turned = float(theta[finite][-1] - theta[finite][0])
+            along = theta[finite] - theta[finite].mean()
+            electrical += float(along @ phase[finite] / (along @ along)) * abs(turned)
             mechanical += abs(turned)
         elif spin.omega_rad_s is not None:
             speed = float(np.nanmean(spin.omega_rad_s[stretch.rows]))

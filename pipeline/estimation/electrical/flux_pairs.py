@@ -69,22 +69,22 @@ def _matched(points: Sequence[Point]) -> tuple[list[tuple[Point, Point]], float]
     of the same capture goes first, then the nearest. A point without q current is its own pair.
     """
     largest = max(max(abs(p.iq_a), abs(p.id_a)) for p in points)
-    same = policy().flux_pairs.same_current * largest
-    matched, left = [], list(points)
-    while left:
-        one = left.pop(0)
-        if abs(2.0 * one.iq_a) < same:
+    tolerance_a = policy().flux_pairs.same_current * largest
+    matched, unmatched = [], list(points)
+    while unmatched:
+        one = unmatched.pop(0)
+        if abs(2.0 * one.iq_a) < tolerance_a:
             matched.append((one, one))
             continue
         fitting = [
             (other.capture is not one.capture, abs(one.iq_a + other.iq_a), k)
-            for k, other in enumerate(left)
+            for k, other in enumerate(unmatched)
             if one.group == other.group
-            and abs(one.id_a - other.id_a) < same
-            and abs(one.iq_a + other.iq_a) < same
+            and abs(one.id_a - other.id_a) < tolerance_a
+            and abs(one.iq_a + other.iq_a) < tolerance_a
         ]
         if fitting:
-            matched.append((one, left.pop(min(fitting)[2])))
+            matched.append((one, unmatched.pop(min(fitting)[2])))
     return matched, largest
 
 
@@ -228,8 +228,8 @@ def _lateness(
     design = np.column_stack(columns)
     lateness = np.linalg.lstsq(design, np.array(angles), rcond=None)[0]
     free = len(angles) - design.shape[1]
-    left = np.array(angles) - design @ lateness
-    wobble = float(np.sqrt(left @ left / free)) if free > 0 else 0.0
+    residuals = np.array(angles) - design @ lateness
+    wobble = float(np.sqrt(residuals @ residuals / free)) if free > 0 else 0.0
     return (float(lateness[0]) if spread else 0.0), float(lateness[-1]), wobble
 
 
@@ -271,10 +271,10 @@ def current_lag(points: Sequence[Point], pole_pairs: int, offset: float) -> floa
     rows = [np.array([p.group == g for p in points], dtype=float) for g in groups]
     omega = pole_pairs * np.array([p.omega_mech_rad_s for p in points])
     shared = [*rows, i_q, i_d * i_q, i_d, i_d**2, i_q**2, i_q**3, i_d * i_q**3, i_d**2 * i_q]
-    ratio, ones = 0.0, np.ones(torque.size)
+    ratio, sigma = 0.0, np.ones(torque.size)
     for _ in range(3):
         turned = omega * (i_d + ratio * (i_d**2 - i_q**2))
-        solution = linear_fit(np.column_stack([*shared, turned]), torque, ones)
+        solution = linear_fit(np.column_stack([*shared, turned]), torque, sigma)
         kt, reluctance = (float(solution.coefficients[len(groups) + k]) for k in (0, 1))
         if not solution.full_rank or solution.dof < 3 or kt == 0.0:
             return 0.0

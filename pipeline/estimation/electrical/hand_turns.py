@@ -161,8 +161,10 @@ def _by_vector(spin: Spin) -> list[Turn]:
     The centre c0 + c1 t is where |flux - centre|² is constant: |f|² = 2 Re(conj(f) centre) + k,
     linear in c0, c1 and k with the small |centre|² left in k.
     """
-    rest = [replace(c, v_v=c.v_v - float(np.mean(c.v_v[_at_rest(c.v_v)]))) for c in spin.channels]
-    vector = replace(spin, channels=tuple(rest)).vector_v(centred=False)
+    centred = [
+        replace(c, v_v=c.v_v - float(np.mean(c.v_v[_at_rest(c.v_v)]))) for c in spin.channels
+    ]
+    vector = replace(spin, channels=tuple(centred)).vector_v(centred=False)
     flux = cubic(spin.t_s, vector)
     flux = flux - flux.mean()
     time = (spin.t_s - spin.t_s.mean()) / float(np.ptp(spin.t_s))
@@ -248,8 +250,8 @@ def _one_swing(
     """
     if turning.size == 0 or abs(float(flux[-1] - flux[0])) > hidden_wb:
         return None
-    seen = abs(float(flux[turning[0]]) - 0.5 * float(flux[0] + flux[-1]))
-    amplitude, u = 0.5 * seen + 0.25 * hidden_wb, 0.25 * hidden_wb
+    swing_wb = abs(float(flux[turning[0]]) - 0.5 * float(flux[0] + flux[-1]))
+    amplitude, u = 0.5 * swing_wb + 0.25 * hidden_wb, 0.25 * hidden_wb
     return Turn(channel.name, 1.0, amplitude, u, math.inf, spin.t_s, flux, np.zeros(0))
 
 

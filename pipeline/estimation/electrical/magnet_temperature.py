@@ -30,8 +30,8 @@ def magnet_column(capture: Capture) -> str | None:
         about as warm then. None where no such column holds a value.
 
     """
-    near = NEAR if capture.meta.test in UNPOWERED else ()
-    return first_temperature(capture, "magnet", *near)
+    proxies = NEAR if capture.meta.test in UNPOWERED else ()
+    return first_temperature(capture, "magnet", *proxies)
 
 
 def assumed_temperature(capture: Capture, otherwise_degc: float = 25.0) -> float:

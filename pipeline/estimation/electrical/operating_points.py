@@ -170,8 +170,8 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
         if n < policy().evidence.rows:
             continue
         for rows in _stretches(data):
-            kept = _whole_cycles(rows, data, pole_pairs)
-            points.append(_point(capture, data, kept))
+            whole_cycles = _whole_cycles(rows, data, pole_pairs)
+            points.append(_point(capture, data, whole_cycles))
     numbered = _numbered(points)
     return PointTable(tuple(numbered), sum(p.rows for p in numbered), total)
 
@@ -181,10 +181,10 @@ def _numbered(points: Sequence[Point]) -> list[Point]:
     firsts: list[Point] = []
     numbered = []
     for point in points:
-        near = next((g for g, first in enumerate(firsts) if _alike(point, first)), len(firsts))
-        if near == len(firsts):
+        group = next((g for g, first in enumerate(firsts) if _alike(point, first)), len(firsts))
+        if group == len(firsts):
             firsts.append(point)
-        numbered.append(replace(point, group=near))
+        numbered.append(replace(point, group=group))
     return numbered
 
 
@@ -192,12 +192,12 @@ def _alike(point: Point, first: Point) -> bool:
     """Whether two points share drag, or cogging at rest: one speed, one angle, else one capture."""
     if point.standing or first.standing:
         apart = abs(np.angle(np.exp(1j * (point.angle_rad - first.angle_rad)))) / TURN_RAD
-        near = (
+        same_angle = (
             point.capture is first.capture
             if np.isnan(apart)
             else apart < policy().points.same_angle_turn
         )
-        return point.standing and first.standing and bool(near)
+        return point.standing and first.standing and bool(same_angle)
     speed = first.omega_mech_rad_s
     return abs(point.omega_mech_rad_s - speed) <= policy().points.same_speed * abs(speed)
 
@@ -225,8 +225,8 @@ def pole_pairs_of(known: Constants, nameplate: object) -> int | None:
 
 
 def _columns(capture: Capture) -> dict[str, Array]:
-    there = [n for n in (*MEANS, "t_s", "theta_mech_rad", "omega_mech_rad_s") if capture.has(n)]
-    data = capture.arrays(*there)
+    present = [n for n in (*MEANS, "t_s", "theta_mech_rad", "omega_mech_rad_s") if capture.has(n)]
+    data = capture.arrays(*present)
     blank = np.full(data["t_s"].size, np.nan)
     for name in (*MEANS, "theta_mech_rad", "omega_mech_rad_s"):
         data.setdefault(name, blank)

@@ -63,12 +63,14 @@ def count_pole_pairs(method: Method, groups: Sequence[Group]) -> tuple[Estimate,
     words = ""
     paths = []
     for capture in dict.fromkeys(g.capture.path for g in groups):
-        own = [g for g in groups if g.capture.path == capture]
-        ratio, by_angle = electrical_per_mechanical(own[0].spin, [g.stretch for g in own])
+        of_capture = [g for g in groups if g.capture.path == capture]
+        ratio, by_angle = electrical_per_mechanical(
+            of_capture[0].spin, [g.stretch for g in of_capture]
+        )
         if math.isfinite(ratio):
             ratios.append(ratio)
             paths.append(capture)
-            if len(own[0].spin.channels) > 1:
+            if len(of_capture[0].spin.channels) > 1:
                 senses.add(1 if ratio > 0.0 else -1)
             words = "theta_mech_rad" if by_angle else "omega_mech_rad_s"
     missing = (
@@ -125,11 +127,11 @@ def angle_offset(
 
     """
     name = "angle_offset_elec_rad"
-    own = [g for g in groups if g.spin.theta_rad is not None]
-    if not own or not pairs.known or not order.known:
+    with_angle = [g for g in groups if g.spin.theta_rad is not None]
+    if not with_angle or not pairs.known or not order.known:
         return method.missing(name, "record theta_mech_rad in the open_circuit capture")
     vectors = []
-    for group in own:
+    for group in with_angle:
         theta = group.spin.theta_rad
         if theta is None:
             continue

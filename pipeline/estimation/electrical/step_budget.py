@@ -55,8 +55,8 @@ def gains(name: str, solution: Solution) -> list[Contribution]:
             continue
         half = u * math.sqrt(0.5)
         parts.append(Contribution(source, half * sum(acting), "B"))
-        for day, own in zip(days, acting, strict=True):
-            parts.append(Contribution(f"{source}:{day}", half * own, "B"))
+        for day, share in zip(days, acting, strict=True):
+            parts.append(Contribution(f"{source}:{day}", half * share, "B"))
     return parts
 
 
@@ -184,9 +184,9 @@ def unexplained(solution: Solution) -> dict[str, float]:
     for record, weight in zip(solution.model.records, solution.weights, strict=True):
         rows = slice(first, first + record.i_a.size)
         first = rows.stop + record.i_a.size
-        left = solution.fit.residuals[rows] / weight[0]
+        residuals = solution.fit.residuals[rows] / weight[0]
         noise = record.current_noise.sigma**2 / record.count
-        excess = max(float(np.mean(left**2)) - float(np.mean(noise)), 0.0)
+        excess = max(float(np.mean(residuals**2)) - float(np.mean(noise)), 0.0)
         parts[record.capture.path] = math.sqrt(excess) / max(float(np.ptp(record.i_a)), 1e-300)
     return parts
 
@@ -220,14 +220,14 @@ def birge_ratio(solution: Solution) -> float:
     together = np.searchsorted(where, axes)
     factor = fit.jacobian[:, together] @ solution.parameters[axes]
     owner = np.repeat(np.arange(len(records)), [2 * r.i_a.size for r in records])
-    own = np.where(owner[:, None] == np.arange(len(records)), factor[:, None], 0.0)
-    rest = np.delete(fit.jacobian, together, axis=1)
-    scale = np.linalg.norm(rest, axis=0)
-    basis = np.linalg.qr(rest[:, scale > 0.0] / scale[scale > 0.0])[0]
-    own = own - basis @ (basis.T @ own)
-    left = fit.residuals - basis @ (basis.T @ fit.residuals)
-    spread = own * solution.scatter[:, None]
-    score, meat = own.T @ left, spread.T @ spread
+    of_record = np.where(owner[:, None] == np.arange(len(records)), factor[:, None], 0.0)
+    others = np.delete(fit.jacobian, together, axis=1)
+    scale = np.linalg.norm(others, axis=0)
+    basis = np.linalg.qr(others[:, scale > 0.0] / scale[scale > 0.0])[0]
+    of_record = of_record - basis @ (basis.T @ of_record)
+    residuals = fit.residuals - basis @ (basis.T @ fit.residuals)
+    spread = of_record * solution.scatter[:, None]
+    score, meat = of_record.T @ residuals, spread.T @ spread
     chi2 = float(score @ np.linalg.pinv(meat, 1e-10, hermitian=True) @ score)
     return max(1.0, math.sqrt(chi2 / (len(records) - len(axes))))
 
@@ -260,7 +260,7 @@ def _driven_currents(solution: Solution) -> list[Array]:
     model = solution.model
     rows = [solution.parameters[None, :]] * len(model.records)
     offsets = [
-        0.0 if own.offset_a is None else float(solution.parameters[at + own.offset_a])
-        for at, own in zip(model.layout.starts, model.layout.own, strict=True)
+        0.0 if slots.offset_a is None else float(solution.parameters[at + slots.offset_a])
+        for at, slots in zip(model.layout.starts, model.layout.own, strict=True)
     ]
     return [i[:, 0] - x for i, x in zip(model.predict(rows), offsets, strict=True)]

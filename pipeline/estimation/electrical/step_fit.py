@@ -103,16 +103,20 @@ def solve(model: StepModel, axes: Sequence[str]) -> Solution:
     start = start_of(model.records, model.layout)
     if len(axes) == 1:
         start[[LD, LQ]] = start[AXES[axes[0]][0]]
-    plain = [(r.current_noise.sigma, r.voltage_noise.sigma) for r in model.records]
-    solution = _fit(model, start, free, plain)
+    sigmas = [(r.current_noise.sigma, r.voltage_noise.sigma) for r in model.records]
+    solution = _fit(model, start, free, sigmas)
     penalty = bic_penalty(model)
     for _ in range(TERMS):
-        proposals = offers_of(solution, axes, plain)
-        wanted = [max(own)[1] for own in proposals.values() if own and max(own)[0] > penalty]
-        if not wanted:
+        proposals = offers_of(solution, axes, sigmas)
+        accepted = [
+            max(of_axis)[1]
+            for of_axis in proposals.values()
+            if of_axis and max(of_axis)[0] > penalty
+        ]
+        if not accepted:
             break
         free = solution.free.copy()
-        free[wanted] = True
+        free[accepted] = True
         solution = _fit(model, solution.parameters, free, solution.sigmas)
     while True:
         worth = {k: _worth(solution, k) for name in axes for k in AXES[name][1] if solution.free[k]}
@@ -238,15 +242,17 @@ def _weights(
     weights, shares = [], []
     for record, pair, read in zip(model.records, sigmas, model.predict_both(rows), strict=True):
         noises = (record.current_noise, record.voltage_noise)
-        there = (np.ones(record.count.size, dtype=bool), record.level != BETWEEN)
-        own = [
+        used_rows = (np.ones(record.count.size, dtype=bool), record.level != BETWEEN)
+        variances = [
             row_variance(values[:, 0], record.count, noise, sigma, used)
-            for values, noise, sigma, used in zip(read, noises, pair, there, strict=True)
+            for values, noise, sigma, used in zip(read, noises, pair, used_rows, strict=True)
         ]
         weights.append(
-            np.array([u / np.sqrt(total) for u, (total, _) in zip(there, own, strict=True)])
+            np.array(
+                [u / np.sqrt(total) for u, (total, _) in zip(used_rows, variances, strict=True)]
+            )
         )
-        shares.append(np.array([white / total for total, white in own]))
+        shares.append(np.array([white / total for total, white in variances]))
     return tuple(weights), tuple(shares)
 
 
@@ -306,14 +312,14 @@ def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sigmas) -> Solutio
     scatter = np.ones(fit.residuals.size)
     scaled, first = [], 0
     for pair, weight, share in zip(sigmas, weights, shares, strict=True):
-        own = []
+        rescaled = []
         for sigma, w, white in zip(pair, weight, share, strict=True):
             rows = slice(first, first + w.size)
             first = rows.stop
             power = _white_power(fit.residuals[rows], np.where(w > 0.0, white, 0.0))
             scatter[rows] = np.sqrt(power * white + 1.0 - white)
-            own.append(sigma * max(math.sqrt(power), 1e-9))
-        scaled.append((own[0], own[1]))
+            rescaled.append(sigma * max(math.sqrt(power), 1e-9))
+        scaled.append((rescaled[0], rescaled[1]))
     spread = fit.jacobian / scale * scatter[:, None]
     bread = fit.covariance * np.outer(scale, scale)
     covariance = bread @ (spread.T @ spread) @ bread / np.outer(scale, scale)

@@ -65,14 +65,14 @@ def own_of(record: StepRecord) -> Own:
     """
     wave, at = record.wave, 1
     places: list[int | None] = []
-    for there in (
+    for has_parameter in (
         wave.has_supply and not record.commanded,
         wave.levels_v.size > 1,
         not record.starts_settled,
         record.commanded,
     ):
-        places.append(at if there else None)
-        at += there
+        places.append(at if has_parameter else None)
+        at += has_parameter
     source, offset, first, drop = places
     moves = slice(at, at + wave.moves.shape[1])
     levels = slice(moves.stop, moves.stop + (wave.levels_v.size if wave.has_supply else 0))
@@ -106,9 +106,9 @@ def layout_of(records: Sequence[StepRecord]) -> Layout:
         The shared parameters first, then those of each capture in turn.
 
     """
-    own = tuple(own_of(record) for record in records)
-    starts = np.cumsum([len(SHARED), *(o.size for o in own[:-1])])
-    return Layout(tuple(int(s) for s in starts), own)
+    parameters = tuple(own_of(record) for record in records)
+    starts = np.cumsum([len(SHARED), *(o.size for o in parameters[:-1])])
+    return Layout(tuple(int(s) for s in starts), parameters)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,14 +129,14 @@ class Drive:
         return self.r_ohm + self.source_ohm
 
 
-def drive_of(record: StepRecord, own: Own, values: Array) -> Drive:
+def drive_of(record: StepRecord, places: Own, values: Array) -> Drive:
     """The drive of a capture from the columns of its own parameters [m, size].
 
     Parameters
     ----------
     record
         The capture.
-    own
+    places
         Where its own parameters sit.
     values : array [m, size]
         Variants of them.
@@ -147,12 +147,16 @@ def drive_of(record: StepRecord, own: Own, values: Array) -> Drive:
     def column(place: int | None) -> Array:
         return none if place is None else values[:, place]
 
-    r_ohm, source_ohm = values[:, own.r_ohm], column(own.source_ohm)
-    edges = wave.edges_s + wave.period_s * values[:, own.moves] @ wave.moves.T
-    levels = values[:, own.levels_v] if wave.has_supply else np.tile(wave.levels_v, (none.size, 1))
+    r_ohm, source_ohm = values[:, places.r_ohm], column(places.source_ohm)
+    edges = wave.edges_s + wave.period_s * values[:, places.moves] @ wave.moves.T
+    levels = (
+        values[:, places.levels_v] if wave.has_supply else np.tile(wave.levels_v, (none.size, 1))
+    )
     settled = levels[:, 0] / (r_ohm + source_ohm)
-    first = settled if own.first_a is None else values[:, own.first_a]
-    return Drive(r_ohm, source_ohm, column(own.offset_a), edges, first, column(own.drop_v), levels)
+    first = settled if places.first_a is None else values[:, places.first_a]
+    return Drive(
+        r_ohm, source_ohm, column(places.offset_a), edges, first, column(places.drop_v), levels
+    )
 
 
 def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
@@ -182,12 +186,12 @@ def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
     )
     start = np.zeros(layout.size)
     start[[LD, LQ]] = np.clip(both, 0.2 * l_total.min() / 2, 5.0 * l_total.max() / 2)
-    for record, at, own in zip(records, layout.starts, layout.own, strict=True):
+    for record, at, places in zip(records, layout.starts, layout.own, strict=True):
         start[at] = record.r_start_ohm
-        if own.source_ohm is not None:
-            start[at + own.source_ohm] = max(record.wave.source_ohm, -0.5 * record.r_start_ohm)
+        if places.source_ohm is not None:
+            start[at + places.source_ohm] = max(record.wave.source_ohm, -0.5 * record.r_start_ohm)
         if record.wave.has_supply:
-            start[at + own.levels_v.start : at + own.levels_v.stop] = record.wave.levels_v
+            start[at + places.levels_v.start : at + places.levels_v.stop] = record.wave.levels_v
     return start
 
 
@@ -209,9 +213,9 @@ def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
             nodes = np.array([0.0, 1.0])
         else:
             reach = min(8.0 * tau, length)
-            fine = np.linspace(0.0, reach, max(int(reach / tau * 16), 4) + 1)
+            dense = np.linspace(0.0, reach, max(int(reach / tau * 16), 4) + 1)
             coarse = np.linspace(reach, length, 8)[1:] if length > reach else np.zeros(0)
-            nodes = np.concatenate([fine, coarse]) / length
+            nodes = np.concatenate([dense, coarse]) / length
             nodes[-1] = 1.0
         segments += [index] * (nodes.size - 1)
         begin.append(nodes[:-1])
@@ -269,47 +273,47 @@ class StepModel:
         exp(−h R/L).
 
         """
-        shared, cos_g, width, volts, own = [], [], [], [], []
+        shared, cos_g, width, volts, drives = [], [], [], [], []
         for record, grid, rows, at, places in zip(
             self.records, self._grids, variants, self.layout.starts, self.layout.own, strict=True
         ):
-            mine = drive_of(record, places, rows[:, at : at + places.size])
+            drive = drive_of(record, places, rows[:, at : at + places.size])
             segment, begin, end = grid
-            lengths = np.diff(mine.edges_s, axis=1)[:, segment]
+            lengths = np.diff(drive.edges_s, axis=1)[:, segment]
             pad = self._count - segment.size
             width.append(np.pad(lengths * (end - begin), ((0, 0), (0, pad))))
-            volts.append(np.pad(mine.levels_v[:, segment], ((0, 0), (0, pad)), mode="edge"))
+            volts.append(np.pad(drive.levels_v[:, segment], ((0, 0), (0, pad)), mode="edge"))
             shared.append(rows[:, : len(SHARED)])
             cos_g.append(np.full(rows.shape[0], math.cos(record.axis_rad)))
-            own.append(mine)
+            drives.append(drive)
         nodes, l_mid, target = self._sweep(
             np.vstack(shared),
             np.concatenate(cos_g),
             np.vstack(width).T.copy(),
             np.vstack(volts).T.copy(),
-            own,
+            drives,
         )
         currents, first = [], 0
-        for record, grid, mine in zip(self.records, self._grids, own, strict=True):
-            block = slice(first, first + mine.r_ohm.size)
+        for record, grid, drive in zip(self.records, self._grids, drives, strict=True):
+            block = slice(first, first + drive.r_ohm.size)
             trace = (nodes[:, block], l_mid[:, block], target[:, block])
-            currents.append(_at_samples(record, grid, mine, trace))
-            first += mine.r_ohm.size
+            currents.append(_at_samples(record, grid, drive, trace))
+            first += drive.r_ohm.size
         return currents
 
     def _sweep(
-        self, shared: Array, cos_g: Array, width: Array, volts: Array, own: Sequence[Drive]
+        self, shared: Array, cos_g: Array, width: Array, volts: Array, drives: Sequence[Drive]
     ) -> tuple[Array, Array, Array]:
         """Currents at the nodes [k + 1, m]; inductance and final current of each step [k, m]."""
-        r = np.concatenate([o.loop_ohm for o in own])
-        drop = np.concatenate([o.drop_v for o in own])
+        r = np.concatenate([o.loop_ohm for o in drives])
+        drop = np.concatenate([o.drop_v for o in drives])
         knee = np.concatenate(
             [
                 np.full(o.r_ohm.size, policy().steps.drop_knee_share * c.largest_a)
-                for o, c in zip(own, self.records, strict=True)
+                for o, c in zip(drives, self.records, strict=True)
             ]
         )
-        current = np.concatenate([o.first_a for o in own])
+        current = np.concatenate([o.first_a for o in drives])
         nodes = np.empty((self._count + 1, r.size))
         l_mid, target = np.empty((self._count, r.size)), np.empty((self._count, r.size))
         nodes[0] = current
@@ -322,17 +326,17 @@ class StepModel:
             if dropping:
                 goal = goal - drop / r * np.clip(current / knee, -1.0, 1.0)
             l_d, l_q = self.inductances(shared, flux_d, flux_q)
-            here = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
-            rise = SPACE * (goal - current) * _covered(0.5 * width[k] * r / here)
+            inductance = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
+            rise = SPACE * (goal - current) * _covered(0.5 * width[k] * r / inductance)
             l_d, l_q = self.inductances(
                 shared, flux_d + l_d * cos_g * rise, flux_q + l_q * sin_g * rise
             )
-            here = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
-            step = (goal - current) * _covered(width[k] * r / here)
+            inductance = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
+            step = (goal - current) * _covered(width[k] * r / inductance)
             flux_d = flux_d + l_d * cos_g * SPACE * step
             flux_q = flux_q + l_q * sin_g * SPACE * step
             current = current + step
-            nodes[k + 1], l_mid[k], target[k] = current, here, goal
+            nodes[k + 1], l_mid[k], target[k] = current, inductance, goal
         return nodes, l_mid, target
 
     def residuals(
@@ -362,20 +366,22 @@ class StepModel:
         free = np.flatnonzero(jacobian)
         columns = [self.columns_of(c, free) for c in range(len(self.records))]
         variants = []
-        for mine in columns:
-            rows = np.tile(parameters, (mine.size + 1, 1))
-            rows[np.arange(1, mine.size + 1), mine] += widths[mine]
+        for used_columns in columns:
+            rows = np.tile(parameters, (used_columns.size + 1, 1))
+            rows[np.arange(1, used_columns.size + 1), used_columns] += widths[used_columns]
             variants.append(rows)
         blocks, slopes = [], []
         for c, (current, volts) in enumerate(self.predict_both(variants)):
-            record, mine = self.records[c], columns[c]
-            place = np.searchsorted(free, mine)
-            for read, seen, weight in zip(
+            record, used_columns = self.records[c], columns[c]
+            place = np.searchsorted(free, used_columns)
+            for predicted, measured, weight in zip(
                 (current, volts), (record.i_a, record.v_v), weights[c], strict=True
             ):
-                blocks.append((read[:, 0] - seen) * weight)
-                slope = np.zeros((seen.size, free.size))
-                slope[:, place] = (read[:, 1:] - read[:, :1]) / widths[mine] * weight[:, None]
+                blocks.append((predicted[:, 0] - measured) * weight)
+                slope = np.zeros((measured.size, free.size))
+                slope[:, place] = (
+                    (predicted[:, 1:] - predicted[:, :1]) / widths[used_columns] * weight[:, None]
+                )
                 slopes.append(slope)
         return np.concatenate(blocks), np.vstack(slopes)
 
@@ -395,7 +401,7 @@ class StepModel:
 
         """
         predicted = []
-        for current, record, rows, at, own in zip(
+        for current, record, rows, at, places in zip(
             self.predict(variants),
             self.records,
             variants,
@@ -403,11 +409,11 @@ class StepModel:
             self.layout.own,
             strict=True,
         ):
-            drive = drive_of(record, own, rows[:, at : at + own.size])
+            drive = drive_of(record, places, rows[:, at : at + places.size])
             volts = np.zeros_like(current)
-            there = record.level != BETWEEN
-            through = current[there] - drive.offset_a
-            volts[there] = drive.levels_v.T[record.level[there]] - drive.source_ohm * through
+            at_level = record.level != BETWEEN
+            through = current[at_level] - drive.offset_a
+            volts[at_level] = drive.levels_v.T[record.level[at_level]] - drive.source_ohm * through
             predicted.append((current, volts))
         return predicted
 
@@ -429,10 +435,10 @@ class StepModel:
         low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
         positive = [LD, LQ, *self.layout.starts]
         low[positive] = 1e-3 * start[positive]
-        for at, own in zip(self.layout.starts, self.layout.own, strict=True):
-            if own.source_ohm is not None:
-                low[at], low[at + own.source_ohm] = 0.6 * start[at], -0.5 * start[at]
-            moves = slice(at + own.moves.start, at + own.moves.stop)
+        for at, places in zip(self.layout.starts, self.layout.own, strict=True):
+            if places.source_ohm is not None:
+                low[at], low[at + places.source_ohm] = 0.6 * start[at], -0.5 * start[at]
+            moves = slice(at + places.moves.start, at + places.moves.stop)
             low[moves], high[moves] = -policy().steps.edge_reach, policy().steps.edge_reach
         return low, high
 
@@ -453,8 +459,8 @@ class StepModel:
 
         """
         start, size = self.layout.starts[capture], self.layout.own[capture].size
-        own = (free >= start) & (free < start + size)
-        return free[own | (free < len(SHARED))]
+        of_capture = (free >= start) & (free < start + size)
+        return free[of_capture | (free < len(SHARED))]
 
     def _widths(self, parameters: Array) -> Array:
         largest = SPACE * max(record.largest_a for record in self.records)
@@ -464,34 +470,38 @@ class StepModel:
             widths[place] = 1e-6 * parameters[place]
             powers = np.arange(1.0, 1.0 + TERMS) + (place == LQ)
             widths[place + 1 : place + 1 + TERMS] = 1e-6 * flux**-powers
-        for record, at, own in zip(self.records, self.layout.starts, self.layout.own, strict=True):
+        for record, at, places in zip(
+            self.records, self.layout.starts, self.layout.own, strict=True
+        ):
             ampere = max(record.largest_a, 1e-9)
-            widths[at : at + own.size] = 1e-5 * ampere
+            widths[at : at + places.size] = 1e-5 * ampere
             widths[at] = 1e-6 * parameters[at]
-            if own.source_ohm is not None:
-                widths[at + own.source_ohm] = 1e-6 * parameters[at]
-            widths[at + own.moves.start : at + own.moves.stop] = 1e-4
-            widths[at + own.moves.stop : at + own.size] = 1e-5 * ampere * parameters[at]
-            if own.drop_v is not None:
-                widths[at + own.drop_v] = 1e-5 * ampere * parameters[at]
+            if places.source_ohm is not None:
+                widths[at + places.source_ohm] = 1e-6 * parameters[at]
+            widths[at + places.moves.start : at + places.moves.stop] = 1e-4
+            widths[at + places.moves.stop : at + places.size] = 1e-5 * ampere * parameters[at]
+            if places.drop_v is not None:
+                widths[at + places.drop_v] = 1e-5 * ampere * parameters[at]
         return widths
 
 
 def _at_samples(
     record: StepRecord,
     grid: tuple[NDArray[np.intp], Array, Array],
-    own: Drive,
+    drive: Drive,
     trace: tuple[Array, Array, Array],
 ) -> Array:
     """Current [n, m] at the record's times, by the exact step from the node before each."""
     segment, begin, _ = grid
     nodes, l_mid, target = trace
-    currents = np.empty((record.t_s.size, own.r_ohm.size))
-    lengths = np.diff(own.edges_s, axis=1)
-    for column in range(own.r_ohm.size):
-        starts = own.edges_s[column, segment] + begin * lengths[column, segment]
+    currents = np.empty((record.t_s.size, drive.r_ohm.size))
+    lengths = np.diff(drive.edges_s, axis=1)
+    for column in range(drive.r_ohm.size):
+        starts = drive.edges_s[column, segment] + begin * lengths[column, segment]
         index = np.clip(np.searchsorted(starts, record.t_s, side="right") - 1, 0, segment.size - 1)
         goal = target[index, column]
-        decay = np.exp(-(record.t_s - starts[index]) * own.loop_ohm[column] / l_mid[index, column])
-        currents[:, column] = goal + (nodes[index, column] - goal) * decay + own.offset_a[column]
+        decay = np.exp(
+            -(record.t_s - starts[index]) * drive.loop_ohm[column] / l_mid[index, column]
+        )
+        currents[:, column] = goal + (nodes[index, column] - goal) * decay + drive.offset_a[column]
     return currents

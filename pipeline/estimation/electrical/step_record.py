@@ -222,6 +222,6 @@ def _cuts(size: int, wave: Waveform) -> NDArray[np.intp]:
     cuts = np.arange(0, size, max(1, size // policy().steps.most_bins))
     if not wave.has_supply:
         return cuts
-    near = np.flatnonzero(np.diff(wave.level_of)) + 1
-    around = (near[:, None] + np.arange(-2, 3)).ravel()
+    edges = np.flatnonzero(np.diff(wave.level_of)) + 1
+    around = (edges[:, None] + np.arange(-2, 3)).ravel()
     return np.unique(np.concatenate([cuts, around[(around > 0) & (around < size)]]))

@@ -154,16 +154,16 @@ def _supplied(
         level_of[group[-1] + 1 :] += 1
     for group in groups:
         level_of[group[0] + 1 : group[-1] + 1] = BETWEEN
-    there = level_of >= 0
-    columns = np.eye(len(groups) + 1)[level_of[there]]
+    at_level = level_of >= 0
+    columns = np.eye(len(groups) + 1)[level_of[at_level]]
     if not ideal:
-        columns = np.column_stack([columns, -i_a[there]])
-    fit = linear_fit(columns, v_v[there])
+        columns = np.column_stack([columns, -i_a[at_level]])
+    fit = linear_fit(columns, v_v[at_level])
     source_ohm = 0.0 if ideal or not fit.full_rank else float(fit.coefficients[-1])
     sigma = math.hypot(noise.sigma, source_ohm * noise_of(i_a).sigma)
     for level in range(len(groups) + 1):
-        rows = level_of[there] == level
-        skew = 0.5 * source_ohm * i_a[there][rows]
+        rows = level_of[at_level] == level
+        skew = 0.5 * source_ohm * i_a[at_level][rows]
         if not _is_noise(fit.residuals[rows], skew, sigma, noise.rounding):
             return None
     places = [t_s[g[0]] + 0.5 * (t_s[g[-1] + 1] - t_s[g[0]]) for g in groups]
@@ -207,12 +207,16 @@ def _sampled(
     else:
         edges, means = t_s, 0.5 * (v_v[1:] + v_v[:-1])
     group = -(-means.size // policy().steps.most_cells)
-    near = {k + d for together in free for k in together for d in (-1, 0, 1)}
-    cuts = np.array(sorted({*range(0, means.size, group), *near, means.size}), dtype=np.intp)
+    beside_edges = {k + d for together in free for k in together for d in (-1, 0, 1)}
+    cuts = np.array(
+        sorted({*range(0, means.size, group), *beside_edges, means.size}), dtype=np.intp
+    )
     areas = np.add.reduceat(means * np.diff(edges), cuts[:-1])
     moves = np.ones((cuts.size, 1))
     if free:
-        moves = np.column_stack([np.isin(cuts, own) for own in free]).astype(np.float64)
+        moves = np.column_stack([np.isin(cuts, edges_of_group) for edges_of_group in free]).astype(
+            np.float64
+        )
     kept_s = edges[cuts]
     none = np.zeros(0, dtype=np.intp)
     return Waveform(kept_s, areas / np.diff(kept_s), moves, period_s, 0.0, none)
@@ -244,4 +248,4 @@ def _lines_and_edges(
         edges.append(float(t_s[after]))
         k = after
     last = len(edges) - 1
-    return np.array(edges), np.array(means), [[k for k in own if k < last] for own in free]
+    return np.array(edges), np.array(means), [[k for k in group if k < last] for group in free]

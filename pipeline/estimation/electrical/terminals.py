@@ -45,9 +45,9 @@ def voltage_columns(capture: Capture, pair: str) -> tuple[str, ...]:
         The line voltage, else both phase voltages, else empty.
 
     """
-    own = (f"v{pair}_v",)
+    of_pair = (f"v{pair}_v",)
     phases = (f"v{pair[0]}_v", f"v{pair[1]}_v")
-    return next((names for names in (own, phases) if capture.has(*names)), ())
+    return next((names for names in (of_pair, phases) if capture.has(*names)), ())
 
 
 def current_columns(capture: Capture, pair: str) -> tuple[str, ...]:
@@ -64,8 +64,8 @@ def current_columns(capture: Capture, pair: str) -> tuple[str, ...]:
     return tuple(n for n in (f"i{pair[0]}_a", f"i{pair[1]}_a") if capture.has(n))
 
 
-def pair_signals(capture: Capture, pair: str, *others: str) -> dict[str, Array]:
-    """`t_s`, `v_v` and `i_a` [n] of one terminal pair, and `others` that the capture holds.
+def pair_signals(capture: Capture, pair: str, *further: str) -> dict[str, Array]:
+    """`t_s`, `v_v` and `i_a` [n] of one terminal pair, and `further` that the capture holds.
 
     The current is positive into the pair's first terminal; where both line currents are there,
     i = (i_first - i_second) / 2. Rows with a missing value in any of t, v, i are left out.
@@ -77,7 +77,7 @@ def pair_signals(capture: Capture, pair: str, *others: str) -> dict[str, Array]:
         Of one terminal pair, or of all three phases.
     pair
         `ab`, `bc` or `ca`.
-    others
+    further
         Further columns, where they are there.
 
     Returns
@@ -94,7 +94,7 @@ def pair_signals(capture: Capture, pair: str, *others: str) -> dict[str, Array]:
     volts, amps = voltage_columns(capture, pair), current_columns(capture, pair)
     if not volts or not amps or not capture.has("t_s"):
         raise KeyError(f"{capture.path} holds no voltage and current of pair {pair}")
-    extra = tuple(name for name in others if capture.has(name))
+    extra = tuple(name for name in further if capture.has(name))
     data = capture.arrays("t_s", *volts, *amps, *extra)
     v = data[volts[0]] if len(volts) == 1 else data[volts[0]] - data[volts[1]]
     signs = [1.0 if name == f"i{pair[0]}_a" else -1.0 for name in amps]
@@ -146,7 +146,7 @@ def bridged(t_s: Array, values: Array) -> Array:
         In the unit of `values`.
 
     """
-    there = np.isfinite(values)
-    if not there.any():
+    finite = np.isfinite(values)
+    if not finite.any():
         return values
-    return np.interp(t_s, t_s[there], values[there])
+    return np.interp(t_s, t_s[finite], values[finite])

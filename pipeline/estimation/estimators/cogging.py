@@ -65,8 +65,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     turns: list[Turn] = []
     for capture in captures:
         data = capture.arrays("theta_mech_rad", "torque_shaft_nm")
-        there = np.isfinite(data["theta_mech_rad"])
-        turns += whole_turns(data["theta_mech_rad"][there], data["torque_shaft_nm"][there])
+        finite = np.isfinite(data["theta_mech_rad"])
+        turns += whole_turns(data["theta_mech_rad"][finite], data["torque_shaft_nm"][finite])
     if len(turns) < 2:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
@@ -101,8 +101,8 @@ def part_orders(
     """
     pairs = known.best("pole_pairs")
     poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
-    own = {n for n in (poles, campaign.nameplate("slots")) if isinstance(n, int)}
-    slow = [line for line in lines if line.order <= 2 and not own & {1, line.order}]
+    slots_and_poles = {n for n in (poles, campaign.nameplate("slots")) if isinstance(n, int)}
+    slow = [line for line in lines if line.order <= 2 and not slots_and_poles & {1, line.order}]
     return [line for line in lines if line not in slow], slow
 
 
@@ -138,21 +138,21 @@ def peak_orders(
     """
     leading = lines[0].order
     known = [leading, *teeth]
-    kept = [
+    selected = [
         line
         for line in lines
         if line in sides
         or line.p_value < policy().cogging.stranger_level
         or any(line.order % order == 0 for order in known)
     ]
-    there = {line.order for line in kept}
+    orders = {line.order for line in selected}
     local, _, dof = noise_power(spec)
     for order in (2 * leading, 3 * leading):
-        if order not in there and order <= int(spec.orders[-1]):
+        if order not in orders and order <= int(spec.orders[-1]):
             mean = complex(spec.coefficients[:, order - 1].mean())
             u = float(np.sqrt(local[order - 1] / (2.0 * spec.turns)))
-            kept.append(OrderLine(order, mean, u, dof, 1.0))
-    return kept
+            selected.append(OrderLine(order, mean, u, dof, 1.0))
+    return selected
 
 
 def _teeth(known: Constants, campaign: Campaign) -> list[int]:
@@ -290,9 +290,12 @@ def _variance_of_mean(
         squares = np.sum((forward - forward.mean()) ** 2) + np.sum(
             (backward - backward.mean()) ** 2
         )
-        seen = float(squares) / free
-        if predicted == 0.0 or fdtrc(free, dof, seen / predicted) < policy().cogging.friction_level:
-            return seen, float(free)
+        observed = float(squares) / free
+        if (
+            predicted == 0.0
+            or fdtrc(free, dof, observed / predicted) < policy().cogging.friction_level
+        ):
+            return observed, float(free)
     return predicted, dof
 
 
@@ -307,8 +310,8 @@ def _speed(captures: Sequence[Capture]) -> float | None:
         if not capture.has("t_s", "theta_mech_rad"):
             continue
         data = capture.arrays("t_s", "theta_mech_rad")
-        there = np.isfinite(data["t_s"]) & np.isfinite(data["theta_mech_rad"])
-        t, theta = data["t_s"][there], data["theta_mech_rad"][there]
+        finite = np.isfinite(data["t_s"]) & np.isfinite(data["theta_mech_rad"])
+        t, theta = data["t_s"][finite], data["theta_mech_rad"][finite]
         every = max(1, t.size // 500)
         t, theta = t[::every], theta[::every]
         if t.size > 1:

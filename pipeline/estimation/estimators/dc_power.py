@@ -122,13 +122,13 @@ def losses(blocks: Blocks, at: Array) -> tuple[Array, Array]:
 
     """
     sense, speed = np.sign(blocks.speed_rad_s), blocks.speed_rad_s
-    own = at[1] * sense + at[2] * speed
-    squared = blocks.warm * (blocks.torque2_nm2 + 2.0 * own * blocks.torque_nm + own**2)
-    heating = 2.0 * at[0] * blocks.warm * (blocks.torque_nm + own)
+    drag_nm = at[1] * sense + at[2] * speed
+    squared = blocks.warm * (blocks.torque2_nm2 + 2.0 * drag_nm * blocks.torque_nm + drag_nm**2)
+    heating = 2.0 * at[0] * blocks.warm * (blocks.torque_nm + drag_nm)
     pace, power = np.abs(speed), blocks.speed2_rad2_s2
-    lost = at[0] * squared + at[1] * pace + at[2] * power + at[3]
+    loss_w = at[0] * squared + at[1] * pace + at[2] * power + at[3]
     by_drag = [pace + heating * sense, power + heating * speed]
-    return lost, np.column_stack([squared, *by_drag, np.ones(speed.size)])
+    return loss_w, np.column_stack([squared, *by_drag, np.ones(speed.size)])
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
@@ -168,16 +168,16 @@ def _blocks(capture: Capture, number: int) -> Blocks | None:
     motion = _motion(capture)
     warm = first_temperature(capture, "winding")
     data = capture.arrays(*COLUMNS, motion, *([warm] if warm else []))
-    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    t_s = data["t_s"][fine]
+    finite = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    t_s = data["t_s"][finite]
     if t_s.size < 20:
         return None
     size = max(10, round(1.0 / float(np.median(np.diff(t_s)))))
-    omega = data[motion][fine]
+    omega = data[motion][finite]
     omega = np.gradient(omega, t_s) if motion == "theta_mech_rad" else omega
-    torque = data["torque_shaft_nm"][fine]
-    degc = data[warm][fine] if warm else np.full(t_s.size, REFERENCE_DEGC)
-    power = data["vdc_v"][fine] * data["idc_a"][fine]
+    torque = data["torque_shaft_nm"][finite]
+    degc = data[warm][finite] if warm else np.full(t_s.size, REFERENCE_DEGC)
+    power = data["vdc_v"][finite] * data["idc_a"][finite]
     count = t_s.size // size
     if count < 1:
         return None
@@ -207,15 +207,15 @@ def _pool(blocks: Blocks) -> dict[str, Array]:
 
 def _chosen(blocks: Blocks, level: float) -> list[str]:
     """Which of `_pool` the losses ask for."""
-    plain, base = _solve(blocks, ())
-    if plain is None:
+    base_fit, base = _solve(blocks, ())
+    if base_fit is None:
         return []
-    lost = base @ plain.coefficients[:4] + plain.residuals
+    loss_w = base @ base_fit.coefficients[:4] + base_fit.residuals
     pool = _pool(blocks)
     rich = np.column_stack([base, *pool.values()])
-    left = linear_fit(rich, lost).residuals
-    tau = autocorrelation_time(left, policy().evidence.memory_rows)
-    return needed_columns(base, pool, lost, np.ones(lost.size), level, len(pool), tau)
+    residuals = linear_fit(rich, loss_w).residuals
+    tau = autocorrelation_time(residuals, policy().evidence.memory_rows)
+    return needed_columns(base, pool, loss_w, np.ones(loss_w.size), level, len(pool), tau)
 
 
 def _solve(blocks: Blocks, chosen: Sequence[str]) -> tuple[LinearFit | None, Array]:
@@ -223,14 +223,14 @@ def _solve(blocks: Blocks, chosen: Sequence[str]) -> tuple[LinearFit | None, Arr
 
     The coefficients are those of `losses` and of the chosen columns, at which it is linearised.
     """
-    lost = blocks.dc_w - blocks.shaft_w
-    more = [_pool(blocks)[name] for name in chosen]
+    loss_w = blocks.dc_w - blocks.shaft_w
+    further = [_pool(blocks)[name] for name in chosen]
     at = np.zeros(4)
     for _ in range(12):
-        there, slopes = losses(blocks, at)
-        design = np.column_stack([slopes, *more])
+        modelled_w, slopes = losses(blocks, at)
+        design = np.column_stack([slopes, *further])
         # of a linearised equation: coefficients are the numbers themselves, not their steps
-        solution = linear_fit(design, lost - there + slopes @ at)
+        solution = linear_fit(design, loss_w - modelled_w + slopes @ at)
         if not solution.full_rank:
             return None, design
         at = solution.coefficients[:4]
@@ -260,8 +260,8 @@ def attenuation(blocks: Blocks, solution: LinearFit, design: Array) -> Array:
 
     """
     torque, speed = blocks.torque_nm, blocks.speed_rad_s
-    own = solution.coefficients[1] * np.sign(speed) + solution.coefficients[2] * speed
-    error = -speed - 2.0 * solution.coefficients[0] * blocks.warm * (torque + own)
+    drag_nm = solution.coefficients[1] * np.sign(speed) + solution.coefficients[2] * speed
+    error = -speed - 2.0 * solution.coefficients[0] * blocks.warm * (torque + drag_nm)
     moment = np.zeros(design.shape[1])
     moment[0] = float(np.sum(2.0 * torque * blocks.torque_noise_nm**2 * error))
     size = np.linalg.norm(design, axis=0)
@@ -310,10 +310,10 @@ def _estimates(
     level: float,
 ) -> tuple[Estimate, ...]:
     solution, design = solved
-    lost = blocks.dc_w - blocks.shaft_w
+    loss_w = blocks.dc_w - blocks.shaft_w
     linear = design @ solution.coefficients + solution.residuals
-    cluster = np.arange(lost.size) // 5
-    regression = Regression(design, linear, np.ones(lost.size), cluster)
+    cluster = np.arange(loss_w.size) // 5
+    regression = Regression(design, linear, np.ones(loss_w.size), cluster)
     deviation, dof = scatter(regression, solution, 0.0)
     bias = attenuation(blocks, solution, design)
     gains = instrument_uncertainties(captures, ("voltage", "current", "torque"))
@@ -334,8 +334,8 @@ def _estimates(
             parts.append(doubt.part(f"{METHOD.name}:{name}", relative * float(values[k])))
             words.append(doubt.words("the loss" if k == 0 else "the value"))
         u = math.sqrt(sum(part.u**2 for part in parts))
-        seen = values[k] > policy().evidence.sigmas * u
-        if not (seen or (name == STANDBY.name and u < abs(float(np.mean(lost))))):
+        significant = values[k] > policy().evidence.sigmas * u
+        if not (significant or (name == STANDBY.name and u < abs(float(np.mean(loss_w))))):
             note = f"no more than its uncertainty beside the rest of the losses; {EXPERIMENT}"
             estimates.append(METHOD.missing(name, note))
             continue
@@ -345,10 +345,10 @@ def _estimates(
 
 
 def _notes(captures: Sequence[Capture], blocks: Blocks, chosen: Sequence[str]) -> list[str]:
-    lost = blocks.dc_w - blocks.shaft_w
-    share = float(np.sum(lost)) / max(float(np.sum(blocks.dc_w)), 1e-300)
+    loss_w = blocks.dc_w - blocks.shaft_w
+    share = float(np.sum(loss_w)) / max(float(np.sum(blocks.dc_w)), 1e-300)
     return [
-        f"{lost.size} blocks, {100.0 * share:.2g} % of the power lost; iron loss counts as drag, "
+        f"{loss_w.size} blocks, {100.0 * share:.2g} % of the power lost; iron loss counts as drag, "
         "what the drive loses with its current as the winding's",
         allowed_for(chosen),
         unstated_note(captures, ("voltage", "current", "torque")),
@@ -371,12 +371,12 @@ def _partitions(blocks: Blocks, weights: Array) -> list[Partition]:
 def _plots(
     captures: Sequence[Capture], blocks: Blocks, solution: LinearFit
 ) -> tuple[Evidence, ...]:
-    lost = blocks.dc_w - blocks.shaft_w
+    loss_w = blocks.dc_w - blocks.shaft_w
     titles = ["Power that does not leave by the shaft, W"] * len(captures)
     number = np.concatenate(
         [np.arange(np.count_nonzero(blocks.capture == n)) for n in range(len(captures))]
     ).astype(float)
-    columns = blocks.capture, number, lost, lost - solution.residuals
+    columns = blocks.capture, number, loss_w, loss_w - solution.residuals
     return tuple(METHOD.traces(captures, titles, STANDBY.name, columns, "means over blocks"))
 
 

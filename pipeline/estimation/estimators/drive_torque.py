@@ -102,14 +102,14 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     pool = {name: rows.columns[name] for name in NUISANCES}
     pool = {name: column for name, column in pool.items() if np.ptp(column) > 0.0}
     pool |= {"offset": np.ones(rows.count)}
-    base, even = torque(rows, alpha), np.ones(rows.count)
+    base, sigma = torque(rows, alpha), np.ones(rows.count)
     chosen = _nuisances(rows, base, pool, options["level"])
     design = np.column_stack([base, *(pool[name] for name in chosen)])
     solution = linear_fit(design, rows.load_nm)
     if not solution.full_rank:
         return METHOD.nothing(GIVES, f"the load goes with speed and acceleration; {EXPERIMENT}")
     bias = attenuation(rows, solution, design)
-    regression = Regression(design, rows.load_nm, even, rows.cluster)
+    regression = Regression(design, rows.load_nm, sigma, rows.cluster)
     deviation, dof = scatter(regression, solution, policy().shaft_rows.overlap)
     if reason := _strange(solution.coefficients, deviation, bias):
         return METHOD.nothing(GIVES, f"{reason}; {EXPERIMENT}")
@@ -143,10 +143,10 @@ def _notes(rows: ShaftRows, chosen: Sequence[str], doubt: Disagreement | None) -
 
 def _nuisances(rows: ShaftRows, base: Array, pool: Mapping[str, Array], level: float) -> list[str]:
     """Columns of the pool that the load needs beside those of `base` [w, k]."""
-    rest = linear_fit(np.column_stack([base, *pool.values()]), rows.load_nm).residuals
-    tau = autocorrelation_time(rest, policy().evidence.memory_rows)
-    most, even = policy().drag.most_nuisances, np.ones(rows.count)
-    return needed_columns(base, pool, rows.load_nm, even, level, most, tau)
+    residuals = linear_fit(np.column_stack([base, *pool.values()]), rows.load_nm).residuals
+    tau = autocorrelation_time(residuals, policy().evidence.memory_rows)
+    most, sigma = policy().drag.most_nuisances, np.ones(rows.count)
+    return needed_columns(base, pool, rows.load_nm, sigma, level, most, tau)
 
 
 def _usable(capture: Capture) -> bool:

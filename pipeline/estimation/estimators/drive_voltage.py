@@ -102,9 +102,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     solution = linear_fit(design, rows.voltage_v)
     if not solution.full_rank:
         return METHOD.nothing(GIVES, f"speed and current of the log go together; {EXPERIMENT}")
-    ones = np.ones(rows.voltage_v.size)
-    covariance, dof = cluster_covariance(design, solution.residuals, ones, rows.cluster)
-    regression = Regression(design, rows.voltage_v, ones, rows.cluster)
+    sigma = np.ones(rows.voltage_v.size)
+    covariance, dof = cluster_covariance(design, solution.residuals, sigma, rows.cluster)
+    regression = Regression(design, rows.voltage_v, sigma, rows.cluster)
     split = partial(_partitions, rows)
     doubts = [disagreement(regression, k, split, options["level"]) for k in range(len(GIVES))]
     moved = _moved(rows, solution.coefficients, magnet, chosen, pole_pairs or 1)
@@ -197,8 +197,8 @@ def _finite(capture: Capture, angle: str) -> dict[str, Array]:
     optional = ("id_a", "vd_v", "temp_winding_degc", "temp_magnet_degc")
     names = ["t_s", "vq_v", "iq_a", angle, *(n for n in optional if capture.has(n))]
     data = capture.arrays(*names)
-    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    return {name: column[fine] for name, column in data.items()}
+    finite = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    return {name: column[finite] for name, column in data.items()}
 
 
 def _integrals(

@@ -199,8 +199,8 @@ def _part(capture: Capture) -> Part | None:
     if not capture.has("t_s", "vq_v", angle) or capture.has("iq_a"):
         return None
     data = capture.arrays("t_s", "vq_v", angle)
-    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    t, volts, theta = (data[name][fine] for name in ("t_s", "vq_v", angle))
+    finite = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    t, volts, theta = (data[name][finite] for name in ("t_s", "vq_v", angle))
     if t.size < 3 * LEAST_SAMPLES:
         return None
     if angle == "omega_mech_rad_s":
@@ -252,10 +252,10 @@ def _noise_v(rows: Rows) -> Array:
     sigma = np.ones(rows.voltage_v.size)
     floor = max(1e-6 * float(np.std(rows.voltage_v)), 1e-300)
     for _ in range(3):
-        left = linear_fit(rows.design, rows.voltage_v, sigma).residuals
+        residuals = linear_fit(rows.design, rows.voltage_v, sigma).residuals
         for index in np.unique(rows.capture):
-            own = rows.capture == index
-            sigma[own] = max(float(np.sqrt(np.mean(left[own] ** 2))), floor)
+            in_capture = rows.capture == index
+            sigma[in_capture] = max(float(np.sqrt(np.mean(residuals[in_capture] ** 2))), floor)
     return sigma
 
 
@@ -285,11 +285,11 @@ def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Esti
         unstated_note(used, ("voltage",)),
     ]
     at = {"omega_mech_rad_s": float(np.max(np.abs(rows.design[:, 1])))}
-    seen = solution.coefficients[:3] > policy().evidence.sigmas * deviation[:3]
-    if not seen[1]:
+    significant = solution.coefficients[:3] > policy().evidence.sigmas * deviation[:3]
+    if not significant[1]:
         why = f"voltage and speed do not go together; {EXPERIMENT}"
         return [METHOD.missing(name, why) for name in GIVES]
-    clear = seen[2] and _resolved(parts, values) and all(p.quiet for p in parts)
+    clear = significant[2] and _resolved(parts, values) and all(p.quiet for p in parts)
     missing = {} if clear else _hidden(parts)
     estimates = []
     for k, (name, value) in enumerate(zip(GIVES, values, strict=True)):
@@ -351,8 +351,8 @@ def _hidden(parts: Sequence[Part]) -> dict[str, str]:
     the time constant kA / kV and the delay is determined.
     """
     late = _solve(parts, WITHOUT_ACCELERATION)
-    seen = "" if isinstance(late, str) else f" = about {late.delay_s:.2g} s"
-    note = f"only ka_v_s2_rad / kv_v_s_rad + voltage_delay_s{seen} is seen; {EXPERIMENT}"
+    value = "" if isinstance(late, str) else f" = about {late.delay_s:.2g} s"
+    note = f"only ka_v_s2_rad / kv_v_s_rad + voltage_delay_s{value} is seen; {EXPERIMENT}"
     return dict.fromkeys(("ka_v_s2_rad", "voltage_delay_s"), note)
 
 

@@ -109,11 +109,11 @@ def _flux(
     weights = [1.0 / max(turn.u_psi_wb, 1e-12) ** 2 for _, turn in turns]
     share = np.array(weights) / np.sum(weights)
     value = float(share @ np.array(values))
-    own = tuple(
+    scatter = tuple(
         Contribution(f"{k}", float(w) * turn.u_psi_wb, "A", turn.dof)
         for k, (w, (_, turn)) in enumerate(zip(share, turns, strict=True))
     )
-    u, dof = standard_uncertainty(own), effective_dof(own)
+    u, dof = standard_uncertainty(scatter), effective_dof(scatter)
     if len(values) > 1:
         spread = math.sqrt(float(share @ (np.array(values) - value) ** 2) / (len(values) - 1))
         u, dof = max((u, dof), (spread, len(values) - 1.0))
@@ -123,11 +123,13 @@ def _flux(
     parts = [METHOD.scatter("psi", u, dof)]
     parts += propagate([(-value * excess, of_alpha)])
     for source, gain in instrument_uncertainties(captures, ("voltage",)).items():
-        mine = [voltage_source(c.meta) == source for c, _ in turns]
-        parts.append(Contribution(source, value * gain * float(share[mine].sum()), "B"))
+        of_source = [voltage_source(c.meta) == source for c, _ in turns]
+        parts.append(Contribution(source, value * gain * float(share[of_source].sum()), "B"))
     for source, offset in magnet_uncertainties(captures).items():
-        mine = [magnet_source(c) == source for c, _ in turns]
-        parts.append(Contribution(source, -value * alpha * offset * float(share[mine].sum()), "B"))
+        of_source = [magnet_source(c) == source for c, _ in turns]
+        parts.append(
+            Contribution(source, -value * alpha * offset * float(share[of_source].sum()), "B")
+        )
     notes = [unlogged_note(captures), unstated_note(captures, ("voltage", "temperature"))]
     at = {"temp_magnet_degc": 25.0, "temp_measured_degc": round(excess + 25.0, 2)}
     return METHOD.measured("psi_pm_wb", value, parts, captures, at, notes)

@@ -193,11 +193,11 @@ def _alpha_alone(
     alpha = slope / r25
     gradient = np.array([-alpha / r25, 1.0 / r25])
     u = math.sqrt(float(gradient @ line.covariance @ gradient))
-    others = [p for p in resistance.budget if p.kind == "B"]
+    systematic = [p for p in resistance.budget if p.kind == "B"]
     budget = propagate(
         [
             (1.0 / r25, tuple(p for p in _slope_budget(line, options) if p.kind == "B")),
-            (-alpha / r25, budget_of(others)),
+            (-alpha / r25, budget_of(systematic)),
             (1.0, (METHOD.scatter("alpha", u, line.dof),)),
         ]
     )

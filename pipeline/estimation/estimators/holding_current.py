@@ -92,8 +92,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     turns: list[Turn] = []
     for capture in captures:
         data = capture.arrays("theta_mech_rad", "iq_a")
-        there = np.isfinite(data["theta_mech_rad"])
-        turns += whole_turns(data["theta_mech_rad"][there], data["iq_a"][there])
+        finite = np.isfinite(data["theta_mech_rad"])
+        turns += whole_turns(data["theta_mech_rad"][finite], data["iq_a"][finite])
     highest = largest_order(turns, int(options["highest_order"]))
     if len(turns) < 2 or highest < 1:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
@@ -101,16 +101,16 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     spec, present = find_orders(turns, highest, options["level"])
     lines, slow = part_orders(present, known, campaign)
     positions = even_positions(turns)
-    left = held_out_residual(turns, [line.order for line in [*lines, *slow]])
-    rms_a = None if left is None else float(np.sqrt(np.mean(left**2)))
+    residuals = held_out_residual(turns, [line.order for line in [*lines, *slow]])
+    rms_a = None if residuals is None else float(np.sqrt(np.mean(residuals**2)))
     estimates = _cogging(captures, spec, lines, rms_a, positions, known, campaign)
-    if left is None or rms_a is None:
+    if residuals is None or rms_a is None:
         note = f"angles do not cover the turn densely enough to hold sectors out; {EXPERIMENT}"
         residual = METHOD.missing(RESIDUAL.name, note)
     else:
         before = float(np.std(np.concatenate([turn.value for turn in turns])))
         note = f"{before:.3g} A before any order is taken off; half of the turn's sectors held out"
-        parts = [METHOD.scatter(RESIDUAL.name, _u_rms(left)), *_gains(captures, rms_a)]
+        parts = [METHOD.scatter(RESIDUAL.name, _u_rms(residuals)), *_gains(captures, rms_a)]
         notes = (note, unstated_note(captures, ("current",)))
         residual = METHOD.measured(RESIDUAL.name, rms_a, parts, captures, notes=notes)
     friction = _friction(captures, turns, spec, [*lines, *slow], known)
@@ -164,8 +164,8 @@ def _mean_of(
     places = [n for n, turn in enumerate(turns) if turn.sense == sense]
     means, within = spec.means[places], []
     for n in places:
-        rest = turns[n].value - spec.means[n] - waveform(lines, turns[n].theta_rad)
-        within.append(float(np.var(rest)) * autocorrelation_time(rest) / rest.size)
+        residuals = turns[n].value - spec.means[n] - waveform(lines, turns[n].theta_rad)
+        within.append(float(np.var(residuals)) * autocorrelation_time(residuals) / residuals.size)
     u = float(np.sqrt(np.sum(within))) / len(places)
     if len(places) > 1:
         u = max(u, float(np.std(means, ddof=1)) / float(np.sqrt(len(places))))
@@ -217,14 +217,14 @@ def held_out_residual(turns: Sequence[Turn], orders: Sequence[int]) -> Array | N
     squared = np.isin(np.arange(sectors), np.arange(sectors) ** 2 % sectors).astype(np.int64)
     number = np.floor(np.mod(angle, TURN_RAD) * (sectors / TURN_RAD)).astype(np.int64)
     sector = squared[np.minimum(number, sectors - 1)]
-    left = np.zeros(value.size)
+    residuals = np.zeros(value.size)
     for part in (0, 1):
-        seen, unseen = sector == part, sector != part
-        if np.count_nonzero(seen) < 4 * design.shape[1]:
+        fitted, held_out = sector == part, sector != part
+        if np.count_nonzero(fitted) < 4 * design.shape[1]:
             return None
-        model = linear_fit(design[seen], value[seen])
-        left[unseen] = value[unseen] - design[unseen] @ model.coefficients
-    return left
+        model = linear_fit(design[fitted], value[fitted])
+        residuals[held_out] = value[held_out] - design[held_out] @ model.coefficients
+    return residuals
 
 
 def _cogging(
@@ -268,7 +268,7 @@ def _cogging(
 
 
 def _true_order(
-    seen: int, positions: int | None, known: Constants, campaign: Campaign
+    observed: int, positions: int | None, known: Constants, campaign: Campaign
 ) -> tuple[int, str]:
     """The order behind one seen on even positions, and a note where it could be another.
 
@@ -278,13 +278,15 @@ def _true_order(
     slots, pairs = campaign.nameplate("slots"), known.best("pole_pairs")
     poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
     if positions is None or not isinstance(slots, int) or not isinstance(poles, int):
-        return seen, ""
-    own = cogging_order(slots, poles)
-    alike = [seen, *(m * positions + s * seen for m in (1, 2, 3) for s in (-1, 1))]
-    made = [k for k in alike if k % own == 0]
-    if seen % own == 0 or len(made) != 1:
-        return seen, ""
-    return made[0], f"; {positions} even positions show order {made[0]} as {seen}: hold at more"
+        return observed, ""
+    fundamental = cogging_order(slots, poles)
+    alike = [observed, *(m * positions + s * observed for m in (1, 2, 3) for s in (-1, 1))]
+    possible = [k for k in alike if k % fundamental == 0]
+    if observed % fundamental == 0 or len(possible) != 1:
+        return observed, ""
+    return possible[
+        0
+    ], f"; {positions} even positions show order {possible[0]} as {observed}: hold at more"
 
 
 def _evidence(

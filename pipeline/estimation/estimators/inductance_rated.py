@@ -83,17 +83,17 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     points = _without_ripple(points, pairs, magnet, known.best("r_phase_ohm"))
     look = _Look(points, pairs, magnet, captures, *frame_of(points, pairs))
     fluxes = flux_pairs(points, pairs)
-    own = _direct(fluxes, magnet), _quadrature(fluxes, magnet)
+    of_axes = _direct(fluxes, magnet), _quadrature(fluxes, magnet)
     turned_rad = round(look.angle_rad, 3) + 0.0
     words = (
         f"{table.note()}; {_timing_words(captures)}; frame turned by {turned_rad:g} rad, "
         f"currents {1e6 * look.behind_s:.3g} µs late, taken out"
     )
     estimates = (
-        _estimate("ld_rated_h", _direct, *own, look, words),
-        _estimate("lq_rated_h", _quadrature, *own[::-1], look, words),
+        _estimate("ld_rated_h", _direct, *of_axes, look, words),
+        _estimate("lq_rated_h", _quadrature, *of_axes[::-1], look, words),
     )
-    return Fit(estimates, _evidence(fluxes, *own))
+    return Fit(estimates, _evidence(fluxes, *of_axes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,13 +177,13 @@ def _without_ripple(
 def _quadrature(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     """psi_q over i_q at the largest q current without d current."""
     del magnet
-    same = policy().flux_pairs.same_current
+    tolerance = policy().flux_pairs.same_current
     largest = max((f.iq_a for f in fluxes), default=0.0)
-    near = [f for f in fluxes if abs(f.id_a) < same * max(largest, 1e-300)]
-    rated = max((f.iq_a for f in near), default=0.0)
+    without_d = [f for f in fluxes if abs(f.id_a) < tolerance * max(largest, 1e-300)]
+    rated = max((f.iq_a for f in without_d), default=0.0)
     if rated <= 0.0:
         return None
-    used = [f for f in near if f.iq_a > (1.0 - same) * rated]
+    used = [f for f in without_d if f.iq_a > (1.0 - tolerance) * rated]
     weights = np.array([1.0 / max(f.u_q_wb, 1e-150) ** 2 for f in used])
     weights /= weights.sum()
     value = float(sum(w * f.psi_q_wb / f.iq_a for w, f in zip(weights, used, strict=True)))
@@ -199,24 +199,24 @@ def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     Of two d currents of one size the negative, which a drive uses: iron saturates on the other.
     Some q current is preferred: with none at all the inverter's dead time has no sign to cancel.
     """
-    same = policy().flux_pairs.same_current
+    tolerance = policy().flux_pairs.same_current
     reach = max((max(abs(f.id_a), f.iq_a) for f in fluxes), default=0.0)
-    both = [
+    pairs = [
         (f, zero)
         for f in fluxes
         for zero in fluxes
         if f.group == zero.group
-        and abs(zero.id_a) < same * reach < abs(f.id_a)
-        and abs(f.iq_a - zero.iq_a) < same * reach
+        and abs(zero.id_a) < tolerance * reach < abs(f.id_a)
+        and abs(f.iq_a - zero.iq_a) < tolerance * reach
     ]
-    if not both:
+    if not pairs:
         return None
-    rated = max(abs(f.id_a) for f, _ in both)
-    side = 1.0 if min(f.id_a for f, _ in both) > -(1.0 - same) * rated else -1.0
-    at_rated = [(f, zero) for f, zero in both if side * f.id_a > (1.0 - same) * rated]
-    driven = [f.iq_a for f, _ in at_rated if f.iq_a > same * reach]
+    rated = max(abs(f.id_a) for f, _ in pairs)
+    side = 1.0 if min(f.id_a for f, _ in pairs) > -(1.0 - tolerance) * rated else -1.0
+    at_rated = [(f, zero) for f, zero in pairs if side * f.id_a > (1.0 - tolerance) * rated]
+    driven = [f.iq_a for f, _ in at_rated if f.iq_a > tolerance * reach]
     smallest = min(driven, default=0.0)
-    used = [(f, zero) for f, zero in at_rated if abs(f.iq_a - smallest) < same * reach]
+    used = [(f, zero) for f, zero in at_rated if abs(f.iq_a - smallest) < tolerance * reach]
     values, variances = [], []
     for f, zero in used:
         warm = magnet * (f.temp_magnet_degc - zero.temp_magnet_degc) * zero.psi_d_wb
@@ -239,10 +239,10 @@ def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
 def _other_side(fluxes: Sequence[Flux], magnet: float, result: Result) -> str:
     """L_d at the largest d current of the other sign in words, empty where there is none."""
     across = [f for f in fluxes if f.id_a * result.id_a <= 0.0]
-    same = policy().flux_pairs.same_current
+    tolerance = policy().flux_pairs.same_current
     reach = max((max(abs(f.id_a), f.iq_a) for f in fluxes), default=0.0)
-    near = [f for f in fluxes if abs(f.id_a) < same * reach and f not in across]
-    other = _direct([*across, *near], magnet)
+    without_q = [f for f in fluxes if abs(f.id_a) < tolerance * reach and f not in across]
+    other = _direct([*across, *without_q], magnet)
     if other is None:
         return ""
     return f"{1e6 * other.value_h:.4g} µH at {other.id_a:.3g} A of d current"
@@ -275,7 +275,7 @@ def _evidence(
     """Flux linkages with the line of the published inductance through the flux at no current."""
     if not fluxes:
         return ()
-    same = policy().flux_pairs.same_current
+    tolerance = policy().flux_pairs.same_current
     reach = max(max(abs(f.id_a), f.iq_a) for f in fluxes)
     plots = []
     for axis, current, flux, result in (
@@ -284,21 +284,25 @@ def _evidence(
     ):
         other = "id_a" if axis == "q" else "iq_a"
         series = []
-        levels = sorted({round(getattr(f, other) / (same * reach)) for f in fluxes})
+        levels = sorted({round(getattr(f, other) / (tolerance * reach)) for f in fluxes})
         for level in levels:
-            mine = [f for f in fluxes if round(getattr(f, other) / (same * reach)) == level]
-            mine.sort(key=lambda f: (getattr(f, current), f.group))
-            x = np.array([getattr(f, current) for f in mine])
-            y = np.array([getattr(f, flux) for f in mine])
-            amps = float(np.mean([getattr(f, other) for f in mine])) if level else 0.0
+            of_level = [
+                f for f in fluxes if round(getattr(f, other) / (tolerance * reach)) == level
+            ]
+            of_level.sort(key=lambda f: (getattr(f, current), f.group))
+            x = np.array([getattr(f, current) for f in of_level])
+            y = np.array([getattr(f, flux) for f in of_level])
+            amps = float(np.mean([getattr(f, other) for f in of_level])) if level else 0.0
             label = f"{other} {amps:.3g} A"
             line = np.array([])
             if result is not None:
-                still = x[np.abs(x) < same * reach], y[np.abs(x) < same * reach]
+                at_zero = x[np.abs(x) < tolerance * reach], y[np.abs(x) < tolerance * reach]
                 start = (
-                    float(np.mean(still[1] - result.value_h * still[0])) if still[0].size else 0.0
+                    float(np.mean(at_zero[1] - result.value_h * at_zero[0]))
+                    if at_zero[0].size
+                    else 0.0
                 )
-                line = start + result.value_h * x if axis == "q" or still[0].size else line
+                line = start + result.value_h * x if axis == "q" or at_zero[0].size else line
             series.append(Series(label, x, y, line))
         title = f"Flux linkage of the {axis} axis at constant speed"
         caption = "line: the published apparent inductance"

@@ -203,12 +203,12 @@ def _at_unknown_angle(table: Table) -> Found | None:
     """
     first, second, has_angle = [], [], []
     for row in np.unique(table.row):
-        mine = np.flatnonzero(table.row == row)
-        read = {float(table.axis_rad[k]): float(table.l_h[k]) for k in mine}
+        rows = np.flatnonzero(table.row == row)
+        read = {float(table.axis_rad[k]): float(table.l_h[k]) for k in rows}
         if len(read) < 3:
             continue
         low, high, place = unaligned_inductances_h(*(read[PAIR_AXES_RAD[p]] for p in PAIRS))
-        theta = float(table.theta_rad[mine[0]])
+        theta = float(table.theta_rad[rows[0]])
         exchanged = math.isfinite(theta) and math.cos(2.0 * (theta - place)) < 0.0
         first.append(high if exchanged else low)
         second.append(low if exchanged else high)
@@ -308,12 +308,12 @@ def _evidence(table: Table, result: Found) -> tuple[Evidence, ...]:
         return ()
     series = []
     for pair in PAIRS:
-        mine = (table.axis_rad == PAIR_AXES_RAD[pair]) & np.isfinite(table.theta_rad)
-        if not mine.any():
+        rows = (table.axis_rad == PAIR_AXES_RAD[pair]) & np.isfinite(table.theta_rad)
+        if not rows.any():
             continue
-        theta = table.theta_rad[mine]
-        fitted = inductance(theta, table.axis_rad[mine]) @ result.model
-        series.append(over_x(pair, np.degrees(theta), table.l_h[mine], fitted))
+        theta = table.theta_rad[rows]
+        fitted = inductance(theta, table.axis_rad[rows]) @ result.model
+        series.append(over_x(pair, np.degrees(theta), table.l_h[rows], fitted))
     title = "Inductance between the terminals against rotor angle"
     axes, caption = ("theta_elec_deg", "inductance_ll_h"), "Mean is Ld + Lq, swing Ld - Lq."
     return (METHOD.plot(title, axes, "scatter", series, caption),)

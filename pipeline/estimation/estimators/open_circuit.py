@@ -239,11 +239,11 @@ def _instrument_shares(
     weights = weights / weights.sum()
     shares: dict[str, list[tuple[str, float]]] = {"voltage": [], "temperature": []}
     for source, u in instrument_uncertainties(used, ("voltage",)).items():
-        own = [voltage_source(g.capture.meta) == source for g in groups]
-        shares["voltage"].append((source, u * float(weights[own].sum())))
+        of_source = [voltage_source(g.capture.meta) == source for g in groups]
+        shares["voltage"].append((source, u * float(weights[of_source].sum())))
     for source, u in magnet_uncertainties(used).items():
-        own = [magnet_source(g.capture) == source for g in groups]
-        shares["temperature"].append((source, u * float(weights[own].sum())))
+        of_source = [magnet_source(g.capture) == source for g in groups]
+        shares["temperature"].append((source, u * float(weights[of_source].sum())))
     return shares
 
 
@@ -269,16 +269,16 @@ def _harmonics(groups: Sequence[Group], used: Sequence[Capture]) -> dict[str, Es
     estimates = {}
     for order in ORDERS:
         name = f"bemf_harmonic_{order}"
-        own = [g for g in groups if order in g.flux.harmonics]
-        if not own:
+        with_order = [g for g in groups if order in g.flux.harmonics]
+        if not with_order:
             note = f"repeat the open_circuit at a rate above {3 * order} samples a cycle"
             estimates[name] = METHOD.missing(name, note)
             continue
-        ratios = np.array([g.flux.harmonics[order] for g in own])
-        weights = np.array([g.flux.u_harmonic**-2 for g in own])
+        ratios = np.array([g.flux.harmonics[order] for g in with_order])
+        weights = np.array([g.flux.u_harmonic**-2 for g in with_order])
         mean = complex(np.sum(weights * ratios) / weights.sum())
         spread = np.abs(ratios - mean) ** 2 * weights
-        free = 2 * len(own) - 2
+        free = 2 * len(with_order) - 2
         excess = float(spread.sum()) / max(free, 1)
         u = math.sqrt(max(1.0, excess) / float(weights.sum()))
         dof = float(free) if _beyond_chance(excess, free) else math.inf
@@ -297,13 +297,13 @@ def _evidence(groups: Sequence[Group], psi: Estimate) -> list[Evidence]:
         alpha = float(linear_fit(flux_linkage(temps), psis / psi.number).coefficients[1])
     amplitude, flux = [], []
     for path in dict.fromkeys(g.capture.path for g in groups):
-        own = [g for g in groups if g.capture.path == path]
-        own.sort(key=lambda g: g.flux.speed_elec_rad_s)
-        speed = np.array([g.flux.speed_elec_rad_s for g in own])
-        volts = np.array([g.flux.amplitude_v for g in own])
-        model = np.array([psi.number * (1.0 + alpha * (g.temp_degc - 25.0)) for g in own])
+        of_capture = [g for g in groups if g.capture.path == path]
+        of_capture.sort(key=lambda g: g.flux.speed_elec_rad_s)
+        speed = np.array([g.flux.speed_elec_rad_s for g in of_capture])
+        volts = np.array([g.flux.amplitude_v for g in of_capture])
+        model = np.array([psi.number * (1.0 + alpha * (g.temp_degc - 25.0)) for g in of_capture])
         amplitude.append(Series(path, speed, volts, model * np.abs(speed)))
-        flux.append(Series(path, speed, np.array([g.flux.psi_wb for g in own]), model))
+        flux.append(Series(path, speed, np.array([g.flux.psi_wb for g in of_capture]), model))
     return [
         METHOD.plot(
             "Back-EMF amplitude against speed", ("omega_elec_rad_s", "back_emf_phase_peak_v"),

@@ -88,13 +88,13 @@ def columns_of(points: Sequence[Point]) -> Columns:
     pairs = tuple(p for p in PAIRS if any(point.pair == p for point in points))
     offsets, drops = [], set()
     for index in sorted({p.capture for p in points}):
-        own = [p for p in points if p.capture == index]
-        signs = {math.copysign(1.0, p.i_a) for p in own}
-        levels = sorted(abs(p.i_a) for p in own)
+        of_capture = [p for p in points if p.capture == index]
+        signs = {math.copysign(1.0, p.i_a) for p in of_capture}
+        levels = sorted(abs(p.i_a) for p in of_capture)
         if len(signs) == 2:
             offsets.append(index)
         if len(levels) > len(signs) and levels[-1] > 1.2 * levels[0]:
-            drops.add(voltage_source(own[0].meta))
+            drops.add(voltage_source(of_capture[0].meta))
     return Columns(pairs, tuple(offsets), tuple(sorted(drops)))
 
 
@@ -314,13 +314,13 @@ def _unknown_drop_ohm(
     points: Sequence[Point], columns: Columns, pair: str, options: Mapping[str, float]
 ) -> float:
     """What a V0 that was not fitted may add to the resistance of a pair, 0 where it was."""
-    own = [p for p in points if p.pair == pair]
-    blind = [p for p in own if voltage_source(p.meta) not in columns.drops]
+    of_pair = [p for p in points if p.pair == pair]
+    blind = [p for p in of_pair if voltage_source(p.meta) not in columns.drops]
     if not blind:
         return 0.0
     commanded = any(p.meta.voltage_kind == "commanded" for p in blind)
     drop_v = options["drop_commanded_v" if commanded else "drop_measured_v"]
-    return drop_v / max(abs(p.i_a) for p in own)
+    return drop_v / max(abs(p.i_a) for p in of_pair)
 
 
 def _conditions(points: Sequence[Point]) -> Conditions:

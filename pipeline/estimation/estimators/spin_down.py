@@ -109,18 +109,18 @@ class Motion:
     def of_coast(self, index: int, parameters: Array) -> tuple[Array, Array]:
         """Drag parameters and those of one coast."""
         shared = len(SHARED) + len(self.extras)
-        own = 2 + len(self.ripples)
-        return parameters[:shared], parameters[shared + index * own : shared + (index + 1) * own]
+        size = 2 + len(self.ripples)
+        return parameters[:shared], parameters[shared + index * size : shared + (index + 1) * size]
 
     def predict(self, index: int, coast: Coast, parameters: Array) -> Array:
         """What the encoder (or tachometer) should read [n]."""
-        drag, own = self.of_coast(index, parameters)
+        drag, of_coast = self.of_coast(index, parameters)
         fast = self.fastest_rad_s
         slowing = partial(deceleration, drag=drag, extras=self.extras, fastest_rad_s=fast)
-        theta, speed = coast_down(coast.t_s, max(float(own[1]), 1e-6 * fast), slowing)
+        theta, speed = coast_down(coast.t_s, max(float(of_coast[1]), 1e-6 * fast), slowing)
         # A tachometer's zero error looks as T_c/B does, so it is taken as none.
-        out = own[0] + theta if coast.of_angle else speed
-        for value, name in zip(own[2:], self.ripples, strict=True):
+        out = of_coast[0] + theta if coast.of_angle else speed
+        for value, name in zip(of_coast[2:], self.ripples, strict=True):
             out = out + value * _ripple(name, coast.theta_rad)
         return out
 
@@ -135,8 +135,8 @@ class Motion:
         Start angle and ripple are linear; drag and start speed take central differences.
         """
         shared = len(SHARED) + len(self.extras)
-        own = shared + index * (2 + len(self.ripples))
-        integrated = [*range(shared), own + 1]
+        first = shared + index * (2 + len(self.ripples))
+        integrated = [*range(shared), first + 1]
 
         def moved(values: Array) -> Array:
             changed = parameters.copy()
@@ -145,8 +145,8 @@ class Motion:
 
         rows = np.zeros((coast.t_s.size, parameters.size))
         rows[:, integrated] = central_jacobian(moved, parameters[integrated], width[integrated])
-        rows[:, own] = float(coast.of_angle)
-        for place, name in enumerate(self.ripples, own + 2):
+        rows[:, first] = float(coast.of_angle)
+        for place, name in enumerate(self.ripples, first + 2):
             rows[:, place] = _ripple(name, coast.theta_rad)
         return rows
 
@@ -212,8 +212,8 @@ def _coasts(capture: Capture) -> list[Coast]:
     if not capture.has("t_s", column):
         return []
     data = capture.arrays("t_s", column)
-    fine = np.isfinite(data["t_s"]) & np.isfinite(data[column])
-    t, y = data["t_s"][fine], data[column][fine]
+    finite = np.isfinite(data["t_s"]) & np.isfinite(data[column])
+    t, y = data["t_s"][finite], data[column][finite]
     if t.size < 3 * LEAST_SAMPLES:
         return []
     angle = y if of_angle else trapezoid(t, y)
@@ -278,8 +278,8 @@ def _widths(motion: Motion, coasts: Sequence[Coast], start: Array) -> Array:
     """Steps of the finite differences: a ten-thousandth of what matters over the record."""
     drag = 1e-4 * max(abs(start[0]), abs(start[1]) * motion.fastest_rad_s)
     shared = [drag, drag / motion.fastest_rad_s, *([drag] * len(motion.extras))]
-    own = [1e-3, 1e-5 * motion.fastest_rad_s, *([1e-3] * len(motion.ripples))]
-    return np.array(shared + own * len(coasts))
+    of_coast = [1e-3, 1e-5 * motion.fastest_rad_s, *([1e-3] * len(motion.ripples))]
+    return np.array(shared + of_coast * len(coasts))
 
 
 def _wider(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit, level: float) -> Motion:
@@ -318,8 +318,8 @@ def _transferred(old: Motion, new: Motion, parameters: Array, coasts: int) -> Ar
     drag = parameters[: len(SHARED) + len(old.extras)]
     parts = [drag, np.zeros(len(new.extras) - len(old.extras))]
     for index in range(coasts):
-        own = old.of_coast(index, parameters)[1]
-        parts += [own, np.zeros(len(new.ripples) - len(old.ripples))]
+        of_coast = old.of_coast(index, parameters)[1]
+        parts += [of_coast, np.zeros(len(new.ripples) - len(old.ripples))]
     return np.concatenate(parts)
 
 
@@ -351,7 +351,7 @@ def _estimates(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> tu
 def _form(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> Array:
     """How far the halves of the coasts disagree on the two ratios, each fitted by itself."""
     values = []
-    plain = Motion((), motion.ripples, motion.fastest_rad_s)
+    without_extras = Motion((), motion.ripples, motion.fastest_rad_s)
     for late in (False, True):
         halves = []
         for i, coast in enumerate(coasts):
@@ -367,9 +367,11 @@ def _form(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> Array:
                     coast.of_angle, coast.sigma,
                 )
             )  # fmt: skip
-        first = _initial_values(plain, halves)
-        start = _transferred(Motion((), (), plain.fastest_rad_s), plain, first, len(halves))
-        values.append(_solve(plain, halves, start).parameters[:2])
+        first = _initial_values(without_extras, halves)
+        start = _transferred(
+            Motion((), (), without_extras.fastest_rad_s), without_extras, first, len(halves)
+        )
+        values.append(_solve(without_extras, halves, start).parameters[:2])
     apart = np.abs(values[1] - values[0])
     beside = np.abs(0.5 * (values[0] + values[1]) - fit.parameters[:2])
     return np.maximum(apart, beside)
@@ -383,11 +385,11 @@ def _evidence(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> tup
         t = coast.t_s[keep] + coast.start_s
         word = "forward" if coast.sense > 0 else "backward"
         if coast.of_angle:
-            seen = np.gradient(coast.measured, coast.t_s)[keep]
+            measured = np.gradient(coast.measured, coast.t_s)[keep]
             modelled = np.gradient(fitted, coast.t_s)[keep]
         else:
-            seen, modelled = coast.measured[keep], fitted[keep]
-        speed = Series(word, t, seen * coast.sense, modelled * coast.sense)
+            measured, modelled = coast.measured[keep], fitted[keep]
+        speed = Series(word, t, measured * coast.sense, modelled * coast.sense)
         caption = "speed for the eye only; the fit is to the angle"
         axes = "t_s", "omega_mech_rad_s"
         plots.append(METHOD.plot(f"Coast-down {word}", axes, "line", (speed,), caption, coast.path))

@@ -161,9 +161,11 @@ def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | N
     if record.temp_second_degc is not None and np.isfinite(record.temp_second_degc).all():
         second = record.temp_second_degc
         across = -trapezoid(t, winding - second)
-        ones = balanced[:, 0]
+        constant = balanced[:, 0]
         double = _winding_fit(np.column_stack([*balanced[:, :2].T, across, outward]), winding)
-        body = linear_fit(np.column_stack([ones, -across, -trapezoid(t, second - ambient)]), second)
+        body = linear_fit(
+            np.column_stack([constant, -across, -trapezoid(t, second - ambient)]), second
+        )
         start, direct = _start(double, body)
         if start is not None and (
             two_nodes := _two_nodes(record, losses_w, ambient, start, direct)
@@ -397,8 +399,8 @@ def _estimates(
         volts = type_b(voltage_source(meta), meta.instrument_u("u_rel_voltage"))
         loss = propagate([(-1.0, volts), (-1.0, current)])
     else:
-        others = tuple(part for part in resistance.budget if part.source != thermometer)
-        loss = propagate([(-2.0, current), (-1.0 / resistance.number, others)])
+        budget = tuple(part for part in resistance.budget if part.source != thermometer)
+        loss = propagate([(-2.0, current), (-1.0 / resistance.number, budget)])
     offsets = np.zeros(len(GIVES))
     if record.temp_ambient_degc is None:
         u_degc = meta.instrument_u("u_temp_degc")

@@ -253,9 +253,9 @@ def _values(
 ) -> Array:
     """K, K_rel and both drags [4] with gains and the magnet's coefficient shifted by so much."""
     shifted, alpha = [p.shifted(shift) for p in points], alpha + shift.get(SOURCE, 0.0)
-    again = _regress(shifted, alpha, chosen)
-    bent = _slope(shifted, alpha, chosen, again)
-    return np.array([bent.kt_nm_a, _reluctance(again), *_drag(points, again)[0]])
+    refitted = _regress(shifted, alpha, chosen)
+    bent = _slope(shifted, alpha, chosen, refitted)
+    return np.array([bent.kt_nm_a, _reluctance(refitted), *_drag(points, refitted)[0]])
 
 
 def _type_b(
@@ -347,8 +347,8 @@ def _form_doubt(points: Sequence[Point], alpha: float, chosen: Sequence[str]) ->
         return 0.0
     full = _regress(points, alpha, chosen).kt_nm_a
     shorter = [
-        _regress(points, alpha, [name for name in chosen if name != left]).kt_nm_a
-        for left in bent[-2:]
+        _regress(points, alpha, [name for name in chosen if name != omitted]).kt_nm_a
+        for omitted in bent[-2:]
     ]
     return max(abs(full - value) for value in shorter) / 2.0
 
@@ -394,8 +394,8 @@ def _evidence(
     series = []
     for number in sorted({p.group for p in points}):
         rows = np.flatnonzero(group == number)
-        own = [points[int(k)] for k in rows[np.argsort(i_q[rows], kind="stable")]]
-        speed = float(np.mean([p.omega_mech_rad_s for p in own]))
+        of_group = [points[int(k)] for k in rows[np.argsort(i_q[rows], kind="stable")]]
+        speed = float(np.mean([p.omega_mech_rad_s for p in of_group]))
         label = f"{speed:.0f} rad/s" if speed else f"standstill, angle {number}"
         series.append(over_x(label, i_q[rows], torque[rows], fitted[rows]))
     extra = f", {', '.join(chosen)}" if chosen else ""

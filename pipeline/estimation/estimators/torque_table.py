@@ -172,10 +172,10 @@ class _Rows:
 def _table(capture: Capture) -> dict[str, Array]:
     names = ("iq_a", "torque_shaft_nm", "id_a", "temp_magnet_degc", "theta_mech_rad")
     data = capture.arrays(*(name for name in names if capture.has(name)))
-    fine = np.isfinite(data["iq_a"]) & np.isfinite(data["torque_shaft_nm"])
+    finite = np.isfinite(data["iq_a"]) & np.isfinite(data["torque_shaft_nm"])
     warm = assumed_temperature(capture, REFERENCE_DEGC)
     usual = {"id_a": 0.0, "temp_magnet_degc": warm, "theta_mech_rad": np.nan}
-    data = {n: data.get(n, np.full(fine.size, usual.get(n, np.nan)))[fine] for n in names}
+    data = {n: data.get(n, np.full(finite.size, usual.get(n, np.nan)))[finite] for n in names}
     return {
         "iq_a": data["iq_a"],
         "id_a": np.nan_to_num(data["id_a"]),
@@ -218,8 +218,10 @@ def _instruments(
 def _evidence(captures: Sequence[Capture], rows: _Rows, fitted_nm: Array) -> tuple[Evidence, ...]:
     series = []
     for number, capture in enumerate(captures):
-        mine = np.flatnonzero(rows.table == number)
-        series.append(over_x(capture.path, rows.iq_a[mine], rows.torque_nm[mine], fitted_nm[mine]))
+        in_table = np.flatnonzero(rows.table == number)
+        series.append(
+            over_x(capture.path, rows.iq_a[in_table], rows.torque_nm[in_table], fitted_nm[in_table])
+        )
     title = "Torque of the clamped shaft against q current"
     return (METHOD.plot(title, ("iq_a", "torque_shaft_nm"), "scatter", series),)
 

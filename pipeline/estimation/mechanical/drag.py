@@ -224,9 +224,9 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
     design = np.column_stack([base, *(candidates[n] for n in chosen)])
     names = ("torque", "coulomb", "viscous", *chosen)
     sigma = _balanced(rows, design, y)
-    plain = [n for n in chosen if n not in FORMS]
-    curve = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in plain)])
-    curve_names = ("torque", *CURVE, *plain)
+    without_forms = [n for n in chosen if n not in FORMS]
+    curve = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in without_forms)])
+    curve_names = ("torque", *CURVE, *without_forms)
     free = _form_fails(rows, design, names, curve, curve_names, y, level) or _implausible(
         rows, design, names, y, sigma
     )
@@ -336,8 +336,8 @@ def torque_is_separable(design: Array, sigma: Array) -> bool:
     scaled = design / sigma[:, None]
     norm = np.linalg.norm(scaled, axis=0)
     scaled = scaled / np.where(norm > 0.0, norm, 1.0)
-    others = scaled[:, 1:]
-    ranks = [int(np.linalg.matrix_rank(m, tol=1e-8)) for m in (scaled, others)]
+    drags = scaled[:, 1:]
+    ranks = [int(np.linalg.matrix_rank(m, tol=1e-8)) for m in (scaled, drags)]
     return ranks[0] > ranks[1]
 
 
@@ -365,14 +365,14 @@ def _balanced(rows: ShaftRows, design: Array, y: Array) -> Array:
     """
     sigma = np.ones(y.size)
     floor = max(1e-6 * float(np.std(y)), 1e-300)
-    kinds = [mine for mine in (rows.kind == DRIVE, rows.kind == COAST) if np.any(mine)]
-    for mine in kinds:
-        residuals = linear_fit(design[mine], y[mine]).residuals
-        sigma[mine] = max(float(np.sqrt(np.mean(residuals**2))), floor)
+    kinds = [of_kind for of_kind in (rows.kind == DRIVE, rows.kind == COAST) if np.any(of_kind)]
+    for of_kind in kinds:
+        residuals = linear_fit(design[of_kind], y[of_kind]).residuals
+        sigma[of_kind] = max(float(np.sqrt(np.mean(residuals**2))), floor)
     for _ in range(3):
         residuals = linear_fit(design, y, sigma).residuals
-        for mine in kinds:
-            sigma[mine] = max(float(np.sqrt(np.mean(residuals[mine] ** 2))), floor)
+        for of_kind in kinds:
+            sigma[of_kind] = max(float(np.sqrt(np.mean(residuals[of_kind] ** 2))), floor)
     return sigma
 
 
@@ -395,8 +395,8 @@ def _form_fails(
     coasting = rows.kind == COAST
     if coasts_decide(rows):
         straight_fit = linear_fit(design, y, _balanced(rows, design, y))
-        left = np.sqrt(np.mean(straight_fit.residuals[coasting] ** 2))
-        return bool(left > policy().drag.material_share * np.sqrt(np.mean(y[coasting] ** 2)))
+        rms = np.sqrt(np.mean(straight_fit.residuals[coasting] ** 2))
+        return bool(rms > policy().drag.material_share * np.sqrt(np.mean(y[coasting] ** 2)))
     sigma = _balanced(rows, curve, y)
     loose, strict = linear_fit(curve, y, sigma), linear_fit(design, y, sigma)
     costs = [float(np.sum((f.residuals / sigma) ** 2)) for f in (loose, strict)]
@@ -436,8 +436,10 @@ def _shape_doubt(
     if not bumps:
         return np.zeros(3)
     used = bumps[0].split()[1]
-    plain = np.column_stack([base, *(candidates[n] for n in chosen if n not in STRIBECK)])
-    others = [np.column_stack([plain, candidates[n]]) for n in STRIBECK if n.split()[1] != used]
+    without_bump = np.column_stack([base, *(candidates[n] for n in chosen if n not in STRIBECK)])
+    others = [
+        np.column_stack([without_bump, candidates[n]]) for n in STRIBECK if n.split()[1] != used
+    ]
     fits = [linear_fit(design, y, sigma) for design in others]
     second = min(fits, key=lambda f: f.chi2_dof).coefficients
     apart = [
@@ -459,8 +461,8 @@ def _implausible(
 
 def _drag_part(design: Array, fit: LinearFit, names: Sequence[str]) -> Array:
     """Drag [w] in torque that a fit gives each row: its drag columns over g."""
-    mine = [k for k, name in enumerate(names) if name in _DRAG_NAMES]
-    return design[:, mine] @ fit.coefficients[mine] / fit.coefficients[0]
+    places = [k for k, name in enumerate(names) if name in _DRAG_NAMES]
+    return design[:, places] @ fit.coefficients[places] / fit.coefficients[0]
 
 
 def _low_end(curve: Array, fastest: float) -> tuple[float, float]:

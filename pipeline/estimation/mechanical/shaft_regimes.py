@@ -45,9 +45,9 @@ def shaft_partitions(rows: ShaftRows, information: Array) -> list[Partition]:
     every, drives = np.ones(rows.count, dtype=bool), rows.kind == DRIVE
     late = np.zeros(rows.count)
     for k in range(len(rows.captures)):
-        own = rows.capture == k
-        if own.any():
-            late[own] = rows.time_s[own] - np.median(rows.time_s[own])
+        in_capture = rows.capture == k
+        if in_capture.any():
+            late[in_capture] = rows.time_s[in_capture] - np.median(rows.time_s[in_capture])
     files = tuple(f"in {capture.path}" for capture in rows.captures)
     return [
         halves("speed", np.abs(speed), "slow", "fast", information, every),

@@ -178,15 +178,15 @@ def _part(capture: Capture) -> _Part | None:
     angle = "theta_mech_rad" if capture.has("theta_mech_rad") else "omega_mech_rad_s"
     if not capture.has("t_s", angle) or (kind == DRIVE and not capture.has("iq_a")):
         return None
-    wanted = ["t_s", angle]
+    required = ["t_s", angle]
     optional = ["iq_a", "id_a", "torque_shaft_nm", "temp_magnet_degc"] if kind == DRIVE else []
-    data = capture.arrays(*wanted, *(name for name in optional if capture.has(name)))
+    data = capture.arrays(*required, *(name for name in optional if capture.has(name)))
     zero = np.zeros(data["t_s"].size)
-    data = {name: data.get(name, zero) for name in (*wanted, *optional)}
+    data = {name: data.get(name, zero) for name in (*required, *optional)}
     if kind == DRIVE and not capture.has("temp_magnet_degc"):
         data["temp_magnet_degc"] = zero + assumed_temperature(capture)
-    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    data = {name: column[fine] for name, column in data.items()}
+    finite = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    data = {name: column[finite] for name, column in data.items()}
     t, theta = data["t_s"], data[angle]
     if t.size < LEAST_SAMPLES:
         return None
@@ -314,8 +314,8 @@ def _nuisances(part: _Part) -> dict[str, Array]:
 def _noise(part: _Part) -> dict[str, Array]:
     """Standard deviation [w] that the noise of angle and current makes in means of a window."""
     clock, weak = part.capture.arrays("t_s")["t_s"], part.weak
-    even = clock if clock.size == part.theta.size else np.arange(part.theta.size, dtype=float)
-    angle, current = (noise_about_cubics(even, one) for one in (part.theta, part.current))
+    uniform = clock if clock.size == part.theta.size else np.arange(part.theta.size, dtype=float)
+    angle, current = (noise_about_cubics(uniform, one) for one in (part.theta, part.current))
     return {
         ACCELERATION_NOISE: np.full(weak.count, angle * weak.noise_gain(2)),
         CURRENT_NOISE: np.full(weak.count, current * weak.noise_gain(0)),

@@ -96,13 +96,13 @@ def read_heat(capture: Capture, known: Constants) -> HeatRecord | None:
         raise KeyError(f"{capture.path}: no temp_winding_degc")
     second = first_temperature(capture, "case", "magnet")
     ambient = first_temperature(capture, "ambient")
-    others = ["temp_winding_degc", *(n for n in (second, ambient) if n is not None)]
+    columns = ["temp_winding_degc", *(n for n in (second, ambient) if n is not None)]
     turning = False
     if capture.has(*DQ, "t_s"):
-        data, turning = _rotor_frame(capture, others, known)
+        data, turning = _rotor_frame(capture, columns, known)
         shares = _phase_shares(capture, known)
     else:
-        data = _terminal_frame(capture, others)
+        data = _terminal_frame(capture, columns)
         pair = pair_of(capture) or ""
         a, b, c = (0.5 * (phase in pair) for phase in "abc")
         shares = (a, b, c)
@@ -127,11 +127,11 @@ def _phase_shares(capture: Capture, known: Constants) -> tuple[float, float, flo
         return None
     angle = theta + np.arctan2(data["iq_a"], data["id_a"])
     weight = data["id_a"] ** 2 + data["iq_a"] ** 2
-    good = np.isfinite(angle) & (weight > 0.0)
-    if not good.any():
+    finite = np.isfinite(angle) & (weight > 0.0)
+    if not finite.any():
         return None
     a, b, c = (
-        2.0 / 3.0 * float(np.average(np.cos(angle[good] - place) ** 2, weights=weight[good]))
+        2.0 / 3.0 * float(np.average(np.cos(angle[finite] - place) ** 2, weights=weight[finite]))
         for place in (0.0, 2.0 * math.pi / 3.0, -2.0 * math.pi / 3.0)
     )
     return a, b, c
@@ -165,11 +165,11 @@ def reference_resistance(record: HeatRecord, known: Constants) -> Estimate | Non
 
 
 def _rotor_frame(
-    capture: Capture, others: list[str], known: Constants
+    capture: Capture, columns: list[str], known: Constants
 ) -> tuple[dict[str, Array], bool]:
     speed = [n for n in ("omega_mech_rad_s",) if capture.has(n)]
-    magnet = [n for n in ("temp_magnet_degc",) if capture.has(n) and n not in others]
-    data = capture.arrays("t_s", *DQ, *others, *speed, *magnet)
+    magnet = [n for n in ("temp_magnet_degc",) if capture.has(n) and n not in columns]
+    data = capture.arrays("t_s", *DQ, *columns, *speed, *magnet)
     along = data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"]
     turning = False
     if speed and np.nanmax(np.abs(data[speed[0]])) > 0.0:
@@ -207,12 +207,12 @@ def _motional(capture: Capture, data: dict[str, Array], known: Constants) -> tup
     return (power if matters else np.zeros(omega.size)), matters
 
 
-def _terminal_frame(capture: Capture, others: list[str]) -> dict[str, Array]:
+def _terminal_frame(capture: Capture, columns: list[str]) -> dict[str, Array]:
     """Current through one pair: i_d² + i_q² is 4/3 I² and the loss 2 R I²."""
     pair = pair_of(capture)
     if pair is None:
         raise KeyError(f"{capture.path}: neither dq nor one pair's voltage and current")
-    data = pair_signals(capture, pair, *others)
+    data = pair_signals(capture, pair, *columns)
     data["square_a2"] = data["i_a"] ** 2 * (4.0 / 3.0)
     data["along_va"] = phase_from_line(1.0) * data["v_v"] * data["i_a"] * (4.0 / 3.0)
     return data
@@ -231,25 +231,27 @@ def _blocks(
     block over a gap in time is left out: its mean is of no one moment.
     """
     needed = ("t_s", "along_va", "square_a2", "temp_winding_degc")
-    good = np.all([np.isfinite(data[n]) for n in needed], axis=0)
-    data = {name: values[good] for name, values in data.items()}
+    finite = np.all([np.isfinite(data[n]) for n in needed], axis=0)
+    data = {name: values[finite] for name, values in data.items()}
     second, ambient = (
         name if name is not None and _bridged(data, name) else None for name in others
     )
     current = np.sqrt(data["square_a2"])
-    most = float(current.max(initial=0.0))
+    largest_a = float(current.max(initial=0.0))
     plateaus = find_plateaus(
-        current, least=50, tolerance=policy().heat_record.steady_share, least_span=most
+        current, least=50, tolerance=policy().heat_record.steady_share, least_span=largest_a
     )
     flowing = [
-        p for p in plateaus if current[p.rows].mean() > policy().heat_record.flowing_share * most
+        p
+        for p in plateaus
+        if current[p.rows].mean() > policy().heat_record.flowing_share * largest_a
     ]
     if not flowing:
         return None
     longest = max(flowing, key=lambda p: p.size)
     size = max(1, longest.size // policy().heat_record.blocks)
-    whole = _unbroken(data["t_s"][longest.rows], size)
-    mean = {n: block_means(v[longest.rows], size)[whole] for n, v in data.items()}
+    unbroken = _unbroken(data["t_s"][longest.rows], size)
+    mean = {n: block_means(v[longest.rows], size)[unbroken] for n, v in data.items()}
     return HeatRecord(
         capture,
         mean["t_s"],

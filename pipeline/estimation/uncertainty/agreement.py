@@ -59,13 +59,13 @@ def judges(constants: Constants, estimate: Estimate) -> list[Estimate]:
 
     """
     names = (estimate.name, *SAME.get(estimate.name, ()))
-    others: list[Estimate] = []
+    judging: list[Estimate] = []
     for one in (e for name in names for e in constants.all_of(name)):
-        new = one.method not in {estimate.method, *(e.method for e in others)}
+        new = one.method not in {estimate.method, *(e.method for e in judging)}
         if one.known and one.status in ("measured", "derived") and new and _alike(one, estimate):
-            others.append(one)
-    limit = policy().agreement.precise * np.sqrt(len(others) + 1.0) * estimate.u
-    return [e for e in others if e.u <= limit or _contradicts(e, estimate)]
+            judging.append(one)
+    limit = policy().agreement.precise * np.sqrt(len(judging) + 1.0) * estimate.u
+    return [e for e in judging if e.u <= limit or _contradicts(e, estimate)]
 
 
 def _contradicts(rough: Estimate, estimate: Estimate) -> bool:
@@ -91,9 +91,9 @@ def _between(methods: Sequence[Estimate]) -> Between:
     return between(values, matrix, float(power.sum()) ** 2 / total if total > 0.0 else np.inf)
 
 
-def _widened(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
-    methods = [estimate, *others]
-    if estimate.u == 0.0 or not others:
+def _widened(estimate: Estimate, judging: Sequence[Estimate]) -> Estimate:
+    methods = [estimate, *judging]
+    if estimate.u == 0.0 or not judging:
         return estimate
     spread = _between(methods)
     if spread.p_value >= policy().agreement.level or spread.sd == 0.0:

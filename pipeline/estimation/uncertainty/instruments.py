@@ -125,11 +125,11 @@ def instrument_uncertainties(
         By source, sorted.
 
     """
-    wanted = tuple(kinds)
+    requested = tuple(kinds)
     stated: dict[str, float] = {}
     usual: dict[str, float] = {}
     for capture in captures:
-        for kind in wanted:
+        for kind in requested:
             source_of, key = SOURCES[kind]
             source, u = source_of(capture.meta), getattr(capture.meta, key)
             usual[source] = UNSTATED_U[key]

@@ -103,12 +103,12 @@ class Disagreement:
         """
         return Contribution(f"{BETWEEN}{source}", self.between.sd * value, "A", self.between.dof)
 
-    def words(self, what: str) -> str:
+    def words(self, subject: str) -> str:
         """Which regimes differ, and by how much.
 
         Parameters
         ----------
-        what
+        subject
             Name of the constant in the sentence.
 
         """
@@ -116,7 +116,7 @@ class Disagreement:
             f"{100.0 * (r - 1.0):+.2g} % {n}"
             for r, n in zip(self.relative, self.partition.names, strict=True)
         )
-        return f"{what} disagrees with itself by {self.partition.name} beyond chance ({each})"
+        return f"{subject} disagrees with itself by {self.partition.name} beyond chance ({each})"
 
 
 def halves(
@@ -191,9 +191,9 @@ def information(regression: Regression, column: int) -> Array:
     The column's residual on the other columns, over sigma, squared (Frisch and Waugh).
 
     """
-    others = np.delete(regression.design, column, axis=1)
-    own = linear_fit(others, regression.design[:, column], regression.sigma).residuals
-    weights: Array = (own / regression.sigma) ** 2
+    further = np.delete(regression.design, column, axis=1)
+    residuals = linear_fit(further, regression.design[:, column], regression.sigma).residuals
+    weights: Array = (residuals / regression.sigma) ** 2
     return weights / max(float(weights.sum()), 1e-300)
 
 
@@ -246,8 +246,8 @@ def _of_partition(
     if len(present) < 2:
         return None
     split = [design[:, column] * (labels == k) for k in present]
-    rest = design[:, column] * ~np.isin(labels, present)
-    wide = np.column_stack([np.delete(design, column, axis=1), rest, *split])
+    remaining = design[:, column] * ~np.isin(labels, present)
+    wide = np.column_stack([np.delete(design, column, axis=1), remaining, *split])
     wide = wide[:, np.any(wide != 0.0, axis=0)]
     fit, common = linear_fit(wide, y, sigma), linear_fit(design, y, sigma).coefficients[column]
     if not fit.full_rank or common == 0.0 or fit.dof < policy().evidence.rows:
@@ -260,9 +260,9 @@ def _of_partition(
         covariance, dof = robust, float(sum(clusters) - len(clusters))
     count = len(present)
     values = fit.coefficients[-count:] / common
-    own = covariance[-count:, -count:] / common**2
+    value_covariance = covariance[-count:, -count:] / common**2
     shown = replace(partition, names=tuple(partition.names[k] for k in present))
-    return Disagreement(shown, values, between(values, own, dof))
+    return Disagreement(shown, values, between(values, value_covariance, dof))
 
 
 def scatter(regression: Regression, fit: LinearFit, overlap: float) -> tuple[Array, Array]:
@@ -295,12 +295,12 @@ def scatter(regression: Regression, fit: LinearFit, overlap: float) -> tuple[Arr
     """
     tau = autocorrelation_time(fit.residuals / regression.sigma, policy().evidence.memory_rows)
     tau = max(tau, 1.0 / (1.0 - overlap))
-    plain = np.sqrt(np.diag(fit.covariance) * fit.chi2_dof * tau)
+    by_windows = np.sqrt(np.diag(fit.covariance) * fit.chi2_dof * tau)
     _, cluster = np.unique(regression.cluster, return_inverse=True)
-    shares = [np.bincount(cluster, information(regression, k)) for k in range(plain.size)]
+    shares = [np.bincount(cluster, information(regression, k)) for k in range(by_windows.size)]
     groups = np.maximum([1.0 / float(share @ share) for share in shares], 2.0)
     covariance, _ = cluster_covariance(
         regression.design, fit.residuals, regression.sigma, regression.cluster
     )
     robust = np.sqrt(np.diag(covariance) * groups / (groups - 1.0))
-    return np.maximum(plain, robust), np.minimum(max(fit.dof / tau, 1.0), groups - 1.0)
+    return np.maximum(by_windows, robust), np.minimum(max(fit.dof / tau, 1.0), groups - 1.0)

@@ -64,7 +64,9 @@ def test_whole_logs_give_the_far_inertia_without_a_fit(gap, name):
         seen = shown([replace(log, x=replace(log.x, base=base))] * 2)
         assert seen is not None and seen.discrimination.name == name
         assert seen.base["j_kgm2"] == pytest.approx((near + SHARE) * J, rel=0.02)
-        assert seen.discrimination.values["share"][0] == pytest.approx(SHARE / (near + SHARE), rel=0.02)
+        assert seen.discrimination.values["share"][0] == pytest.approx(
+            SHARE / (near + SHARE), rel=0.02
+        )
 
 
 def test_a_load_shows_no_far_part():
