@@ -91,8 +91,8 @@ def _frame(table: RawTable, source: SourceMap | None, meta: CaptureMeta) -> pl.D
 
 def _with_columns(frames: list[pl.DataFrame], stated: Mapping[str, float]) -> list[pl.DataFrame]:
     """The frames, with columns of one number that none of them has beside the first."""
-    there = {name for frame in frames for name in frame.columns}
-    more = [pl.lit(value).alias(name) for name, value in stated.items() if name not in there]
+    present = {name for frame in frames for name in frame.columns}
+    more = [pl.lit(value).alias(name) for name, value in stated.items() if name not in present]
     return [frames[0].with_columns(more), *frames[1:]] if frames and more else frames
 
 

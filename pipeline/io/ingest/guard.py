@@ -228,10 +228,10 @@ def _memory(most_bytes: int) -> Iterator[None]:
     _begin_libraries()
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     pages = int(Path("/proc/self/statm").read_bytes().split()[5])
-    wanted = pages * resource.getpagesize() + most_bytes
+    limit = pages * resource.getpagesize() + most_bytes
     for stated in (soft, hard):
-        wanted = wanted if stated == resource.RLIM_INFINITY else min(wanted, stated)
-    resource.setrlimit(resource.RLIMIT_DATA, (wanted, hard))
+        limit = limit if stated == resource.RLIM_INFINITY else min(limit, stated)
+    resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))
     try:
         yield
     finally:

@@ -169,9 +169,9 @@ def survey(
     listing = list_files(folder)
     findings = list(listing.findings)
     manifests = _manifests(folder, listing.paths, findings)
-    there = frozenset(listing.paths)
+    listed = frozenset(listing.paths)
     questions = [
-        Question(path, _sidecar(path, there), tuple(manifests.get(path, {}).items()))
+        Question(path, _sidecar(path, listed), tuple(manifests.get(path, {}).items()))
         for path in listing.paths
         if PurePosixPath(path).name != MANIFEST and not path.endswith(SIDECAR_SUFFIX)
     ]
@@ -180,24 +180,24 @@ def survey(
     else:
         answers = ask(questions)
     entries: dict[str, Entry] = {}
-    others: list[str] = []
+    not_captures: list[str] = []
     for answer in answers:
         findings += answer.findings
         entry = answer.entry
         if any(finding.severity == "refused" for finding in answer.findings):
             continue
         if entry is None:
-            others.append(answer.path)
+            not_captures.append(answer.path)
         else:
             first = entries.setdefault(entry.sha256, entry)
             if first is not entry:
-                kept, other = _preferred(folder, first, entry)
-                entries[entry.sha256] = kept
-                findings.append(_duplicate(other.path, kept.path))
-    findings += [_absent(path) for path in sorted(set(manifests) - there)]
+                preferred, other = _preferred(folder, first, entry)
+                entries[entry.sha256] = preferred
+                findings.append(_duplicate(other.path, preferred.path))
+    findings += [_absent(path) for path in sorted(set(manifests) - listed)]
     parts = [part for entry in entries.values() for part in _parts(entry)]
     captures = tuple(sorted(parts, key=lambda entry: entry.capture_path))
-    return Survey(captures, tuple(sorted(findings, key=_order)), tuple(others))
+    return Survey(captures, tuple(sorted(findings, key=_order)), tuple(not_captures))
 
 
 def _parts(entry: Entry) -> list[Entry]:
@@ -206,7 +206,9 @@ def _parts(entry: Entry) -> list[Entry]:
     if not parts:
         return [entry]
     stated = [tuple(sorted((entry.stated | dict(part.metadata)).items())) for part in parts]
-    return [replace(entry, part=p, metadata=own) for p, own in zip(parts, stated, strict=True)]
+    return [
+        replace(entry, part=p, metadata=metadata) for p, metadata in zip(parts, stated, strict=True)
+    ]
 
 
 def _preferred(folder: Path, first: Entry, second: Entry) -> tuple[Entry, Entry]:
@@ -225,9 +227,9 @@ def question_of(path: Path) -> Question:
         The file.
 
     """
-    there = frozenset(other.name for other in path.parent.iterdir() if other.is_file())
-    listed = _manifests(path.parent, sorted(there & {MANIFEST}), []).get(path.name, {})
-    return Question(path.name, _sidecar(path.name, there), tuple(listed.items()))
+    siblings = frozenset(other.name for other in path.parent.iterdir() if other.is_file())
+    listed = _manifests(path.parent, sorted(siblings & {MANIFEST}), []).get(path.name, {})
+    return Question(path.name, _sidecar(path.name, siblings), tuple(listed.items()))
 
 
 def settled(folder: Path, question: Question, sources: Mapping[str, SourceMap]) -> Answer | None:
@@ -389,14 +391,14 @@ def _entry(
     if not known:
         _not_lost(path, data)
         return None
-    form, own = content.form, content.own
+    form, metadata = content.form, content.own
     if source is not None and source.reader is not None:
-        form, own = "foreign", dict(find_reader(source.reader).metadata(data))
+        form, metadata = "foreign", dict(find_reader(source.reader).metadata(data))
     fixed = {} if source is None else source.metadata_for(path)
     if source is not None:
-        own = {key: value for key, value in own.items() if key in METADATA}
+        metadata = {key: value for key, value in metadata.items() if key in METADATA}
     statements = [
-        ("the file", own),
+        ("the file", metadata),
         (f"NAME{SIDECAR_SUFFIX}", file.beside),
         (MANIFEST, file.listed),
     ]
@@ -413,12 +415,12 @@ def _content(
 ) -> _Content:
     if data.startswith(MAGIC) or file.path.lower().endswith(_MCAP_SUFFIX):
         layout = scan(data, recover=recover)
-        own = layout.metadata_named(METADATA_RECORD)
-        return _Content("mcap", own, None, _topics(layout), layout)
+        metadata = layout.metadata_named(METADATA_RECORD)
+        return _Content("mcap", metadata, None, _topics(layout), layout)
     form_known = any(s.reader and _may_read(s, file) for s in sources.values())
-    own, head = _text_head(data, bool(file.listed or file.beside) and not form_known)
+    metadata, head = _text_head(data, bool(file.listed or file.beside) and not form_known)
     named = (s.reader for s in sources.values() if s.topics and s.recognises_name(file.path))
-    return _Content("csv", own, head, table_names(named, data))
+    return _Content("csv", metadata, head, table_names(named, data))
 
 
 def _may_read(source: SourceMap, file: _File) -> bool:
@@ -445,7 +447,7 @@ def _is_packed(path: str) -> bool:
 
 def _recovered(path: str, layout: Layout) -> Finding:
     """The mark on a file of which the good part is used; raises its CaptureError if it is empty."""
-    count, kept = count_messages(layout), layout.kept_bytes
+    count, kept_bytes = count_messages(layout), layout.kept_bytes
     if layout.cut is not None and not count:
         raise layout.cut
     reason = "" if layout.cut is None else layout.cut.message.split(";")[0]
@@ -453,7 +455,7 @@ def _recovered(path: str, layout: Layout) -> Finding:
         path,
         "warning",
         "recovered",
-        f"it is cut off ({reason}); the {count} messages in its first {kept} of "
+        f"it is cut off ({reason}); the {count} messages in its first {kept_bytes} of "
         f"{len(layout.data)} bytes are used, without proof that they are all",
         "copy the file again or record the test again; recover=false refuses such files",
         (0, count - 1),
@@ -480,18 +482,18 @@ def _text_head(data: bytes, named: bool) -> tuple[dict[str, str], str]:
     """
     try:
         check_text(data)
-        own, _ = split_comments(data)
+        metadata, _ = split_comments(data)
     except CaptureError:
         if named or b"contract" in data[:MAX_HEAD_BYTES].replace(b"\0", b""):
             raise
         return {}, ""
-    return own, data[:MAX_HEAD_BYTES].decode("latin-1").replace("\r\n", "\n")
+    return metadata, data[:MAX_HEAD_BYTES].decode("latin-1").replace("\r\n", "\n")
 
 
-def _sidecar(path: str, there: frozenset[str]) -> str | None:
+def _sidecar(path: str, siblings: frozenset[str]) -> str | None:
     """The sidecar of a file: NAME.meta.yaml for NAME.csv, or NAME.csv.meta.yaml."""
     stem = PurePosixPath(path).with_suffix("").as_posix()
-    return next((c for c in (path + SIDECAR_SUFFIX, stem + SIDECAR_SUFFIX) if c in there), None)
+    return next((c for c in (path + SIDECAR_SUFFIX, stem + SIDECAR_SUFFIX) if c in siblings), None)
 
 
 def _source(

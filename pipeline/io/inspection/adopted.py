@@ -36,9 +36,9 @@ def adopted_text(places: Sequence[Path], metadata: Mapping[str, str], proposed: 
     shapes = [shape for place in places for shape in _shapes(place.read_bytes(), metadata)]
     if proposed:
         shapes = [*_shapes(proposed.encode(), {}), *shapes]
-    whole = shapes[0] if len(shapes) == 1 else {"variants": shapes}
+    document = shapes[0] if len(shapes) == 1 else {"variants": shapes}
     names = ", ".join(place.stem for place in places)
-    return _HEAD.format(names) + yaml.safe_dump(whole, sort_keys=False, allow_unicode=True)
+    return _HEAD.format(names) + yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
 
 
 def _shapes(data: bytes, answered: Mapping[str, str]) -> list[dict[str, Any]]:

@@ -83,8 +83,8 @@ class _Look:
         needs = bool(shape.streams) and (foreign or lacks)
         starter = ""
         if needs:
-            seen = frozenset(field.column for field in shape.fields if field.column)
-            names = name_patterns([self.name], frozenset(self.answers), seen)
+            answered = frozenset(field.column for field in shape.fields if field.column)
+            names = name_patterns([self.name], frozenset(self.answers), answered)
             given = {key: value for key, value in self.answers.items() if "." not in key}
             starter = map_text([shape], names, given, by_name=foreign)
         return InspectReport(
@@ -329,12 +329,17 @@ def _stream(table: RawTable, encoding: str, answers: Mapping[str, str]) -> Strea
 def _in_si_units(table: RawTable, fields: Sequence[FieldSeen]) -> dict[str, NDArray[np.float64]]:
     """The columns [n] of a table whose unit is known."""
     columns = {}
-    for seen in fields:
-        if seen.column is None or seen.question is not None or seen.wraps or seen.times:
+    for described in fields:
+        if (
+            described.column is None
+            or described.question is not None
+            or described.wraps
+            or described.times
+        ):
             continue
-        scale = FOREIGN_UNITS[COLUMNS[seen.column].unit].get(seen.unit or "", Scale(1.0))
-        values = table.fields[seen.name].astype(np.float64)
-        columns[seen.column] = values * (seen.scale or scale.factor) + scale.shift
+        scale = FOREIGN_UNITS[COLUMNS[described.column].unit].get(described.unit or "", Scale(1.0))
+        values = table.fields[described.name].astype(np.float64)
+        columns[described.column] = values * (described.scale or scale.factor) + scale.shift
     time = _time_s(table, fields)
     return columns if time is None else {**columns, "t_s": time}
 
@@ -357,13 +362,17 @@ def _clock_words(steps: NDArray[np.float64], step: float) -> str:
 
 def _time_s(table: RawTable, fields: Sequence[FieldSeen]) -> NDArray[np.float64] | None:
     """Time [s] by the field that is t_s, its unit known, or by the log clock."""
-    seen = next((one for one in fields if one.column == "t_s" and not one.question), None)
-    if seen is not None:
-        values = table.fields[seen.name].astype(np.float64)
-        if seen.wraps:
-            values = values + seen.wraps * np.cumsum(np.diff(values, prepend=values[:1]) < 0)
-        factor = FOREIGN_UNITS["s"][seen.unit].factor if seen.unit and not seen.scale else 1.0
-        return values * factor * (seen.scale or 1.0)
+    time_field = next((one for one in fields if one.column == "t_s" and not one.question), None)
+    if time_field is not None:
+        values = table.fields[time_field.name].astype(np.float64)
+        if time_field.wraps:
+            values = values + time_field.wraps * np.cumsum(np.diff(values, prepend=values[:1]) < 0)
+        factor = (
+            FOREIGN_UNITS["s"][time_field.unit].factor
+            if time_field.unit and not time_field.scale
+            else 1.0
+        )
+        return values * factor * (time_field.scale or 1.0)
     if table.log_time_ns is None or table.blocks:
         return None
     time: NDArray[np.float64] = table.log_time_ns.astype(np.float64) / 1e9

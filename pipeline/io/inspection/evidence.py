@@ -180,8 +180,11 @@ def _multiples(numbers: Mapping[str, Array]) -> tuple[Relation, ...]:
         for other in names[:place]:
             one, two = numbers[name], numbers[other]
             factor = float(one @ two / (two @ two))
-            left = one - factor * two
-            if np.ptp(one) and float(left @ left) < (1.0 - _SAME) * float(np.var(one)) * one.size:
+            difference = one - factor * two
+            if (
+                np.ptp(one)
+                and float(difference @ difference) < (1.0 - _SAME) * float(np.var(one)) * one.size
+            ):
                 pairs.append(Relation(name, other, factor, integral=False))
     return tuple(pairs)
 

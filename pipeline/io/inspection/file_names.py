@@ -74,17 +74,17 @@ def name_patterns(
     # where names state a direction beside it, the sign of the speed is not in its figures
     if not columns & MOTION and not words_by_key["direction"] and all(map(_SPEED.search, paths)):
         patterns.append(_SPEED.pattern.replace("(-?", "(?P<omega_mech_rad_s__rpm>-?"))
-    for key, found in words_by_key.items():
-        if not found or key in stated:
+    for key, places_of_words in words_by_key.items():
+        if not places_of_words or key in stated:
             continue
-        words = sorted({text for text, _ in found.values()}, key=lambda w: (-len(w), w))
+        words = sorted({text for text, _ in places_of_words.values()}, key=lambda w: (-len(w), w))
         group = f"(?P<{key}>{'|'.join(map(re.escape, words))})"
         bound = key != "test" or any(len(word) < _LEAST_INSIDE for word in words)
         patterns.append(f"(?:^|{_BREAK}){group}(?={_BREAK}|$)" if bound else group)
-        meanings = {text: meaning for text, meaning in found.values() if meaning}
+        meanings = {text: meaning for text, meaning in places_of_words.values() if meaning}
         if meanings:
             values[key] = dict(sorted(meanings.items()))
-        if len(found) == len(paths):
+        if len(places_of_words) == len(paths):
             keys.add(key)
     return NamePatterns(tuple(patterns), values, frozenset(keys))
 

@@ -125,8 +125,8 @@ def _why(kind: str, time: Array, speed: Array, none: float) -> str:
         )
     if kind == "hold":
         return f"the speed is held at {np.median(speed):.4g} rad/s for {seconds}"
-    done = "neither current nor motion" if kind == "rest" else "driven"
-    return f"{done} for {seconds}"
+    state = "neither current nor motion" if kind == "rest" else "driven"
+    return f"{state} for {seconds}"
 
 
 def _zero_of(current: Array) -> float:

@@ -106,8 +106,8 @@ def propose(table: RawTable, answers: Mapping[str, str]) -> tuple[FieldSeen, ...
     columns = _columns(
         labels, evidence, answers, logged=table.log_ns is not None and not table.blocks
     )
-    seen = [_seen(name, numeric, labels, columns, evidence, answers) for name in numeric]
-    return tuple(_with_units(seen, labels, evidence, answers))
+    proposed = [_seen(name, numeric, labels, columns, evidence, answers) for name in numeric]
+    return tuple(_with_units(proposed, labels, evidence, answers))
 
 
 def _label(table: RawTable, name: str) -> Label:
@@ -116,8 +116,8 @@ def _label(table: RawTable, name: str) -> Label:
         known = JOINT_COLUMNS.get(name)
         return Label((known,), exact=True) if known else Label()
     groups = {field.rpartition("/")[0] for field in table.fields}
-    bare = name.rpartition("/")[2] if len(groups) == 1 and len(table.fields) > 1 else name
-    return read_label(bare, dict(table.units).get(name))
+    label = name.rpartition("/")[2] if len(groups) == 1 and len(table.fields) > 1 else name
+    return read_label(label, dict(table.units).get(name))
 
 
 def _columns(
@@ -158,19 +158,19 @@ def _from_relations(
 ) -> dict[str, tuple[str, ...]]:
     """Fields of no known name that integrate to an angle, or that a speed integrates to."""
     angle, speed = ("theta_mech_rad",), ("omega_mech_rad_s",)
-    taken = {one[0] for one in columns.values() if len(one) == 1}
+    used = {one[0] for one in columns.values() if len(one) == 1}
     for relation in evidence.relations:
         if not relation.integral:
             continue
         one, other = columns[relation.field], columns[relation.other]
         if {relation.field, relation.other} & answered:
             continue
-        if one == angle and not other and speed[0] not in taken:
+        if one == angle and not other and speed[0] not in used:
             columns[relation.other] = speed
-            taken.add(speed[0])
-        elif other == speed and not one and angle[0] not in taken:
+            used.add(speed[0])
+        elif other == speed and not one and angle[0] not in used:
             columns[relation.field] = angle
-            taken.add(angle[0])
+            used.add(angle[0])
     return columns
 
 
@@ -222,27 +222,27 @@ def _with_units(
     answers: Mapping[str, str],
 ) -> list[FieldSeen]:
     """The fields with their units: answered, written, or seen in the numbers; else a question."""
-    done: dict[str, FieldSeen] = {}
-    taken: set[str] = set()
+    finished: dict[str, FieldSeen] = {}
+    used: set[str] = set()
     for field in sorted(seen, key=lambda one: not one.certain):
-        if field.column in taken:
+        if field.column in used:
             words = f"{field.column} is another field already"
-            done[field.name] = replace(field, column=None, why=_joined(field.why, words))
+            finished[field.name] = replace(field, column=None, why=_joined(field.why, words))
             continue
         if field.column is not None:
-            taken.add(field.column)
-        done[field.name] = _stated(field, labels[field.name], answers)
+            used.add(field.column)
+        finished[field.name] = _stated(field, labels[field.name], answers)
     for field in seen:
-        one = done[field.name]
+        one = finished[field.name]
         if one.column is None or one.unit is not None or labels[one.name].exact:
             continue
-        factor = _factor_seen(one, done, evidence, labels)
+        factor = _factor_seen(one, finished, evidence, labels)
         unit = None if factor is None else _unit_of(factor, one.column)
         if unit is None and one.column == "t_s":
             unit = _since_1970(one.first)
         question = None if unit else _ask_unit(one, factor)
-        done[one.name] = replace(one, unit=unit, question=question)
-    return [done[field.name] for field in seen]
+        finished[one.name] = replace(one, unit=unit, question=question)
+    return [finished[field.name] for field in seen]
 
 
 def _joined(one: str, other: str) -> str:

@@ -65,10 +65,14 @@ class Shape:
 
 def _clearer(one: FieldSeen, other: FieldSeen) -> FieldSeen:
     """The field of two files that leaves less open, with the wrap that either shows."""
-    kept, rest = (other, one) if one.question and not other.question else (one, other)
-    if kept.wraps is None and kept.column == rest.column and rest.wraps is not None:
-        return replace(kept, wraps=rest.wraps, why=rest.why)
-    return kept
+    clearer, other_field = (other, one) if one.question and not other.question else (one, other)
+    if (
+        clearer.wraps is None
+        and clearer.column == other_field.column
+        and other_field.wraps is not None
+    ):
+        return replace(clearer, wraps=other_field.wraps, why=other_field.why)
+    return clearer
 
 
 def map_text(
@@ -116,8 +120,8 @@ def map_text(
     else:
         lines.append("variants:")
         for shape in shapes:
-            own = _shape_lines(shape, increment) + _capture_lines(shape, cut)
-            lines += [f"  - {own[0]}", *(f"    {line}" for line in own[1:])]
+            lines_of_shape = _shape_lines(shape, increment) + _capture_lines(shape, cut)
+            lines += [f"  - {lines_of_shape[0]}", *(f"    {line}" for line in lines_of_shape[1:])]
     return "\n".join(lines) + "\n"
 
 
@@ -145,8 +149,8 @@ def _shape_lines(shape: Shape, increment: str | None) -> list[str]:
         lines.append(f"reader: {shape.reader}")
     lines += _layout_lines(shape.dialect)
     lines.append("fields:")
-    lines += [f"  {_field_line(seen)}" for seen in shape.fields]
-    if not any(seen.column == "t_s" for seen in shape.fields):
+    lines += [f"  {_field_line(field)}" for field in shape.fields]
+    if not any(field.column == "t_s" for field in shape.fields):
         if shape.topics:
             lines += ["time:", "  from: log"]
         elif increment:
@@ -190,21 +194,21 @@ def header_pattern(header: str, encoding: str = "utf-8", *, marked: bool = False
 
     """
     text = header.strip()
-    whole = len(re.escape(text)) <= _LONGEST_HEADER
-    pattern = re.escape(text if whole else text[: _LONGEST_HEADER // 2])
+    fits = len(re.escape(text)) <= _LONGEST_HEADER
+    pattern = re.escape(text if fits else text[: _LONGEST_HEADER // 2])
     pattern = re.sub(r"(?:\\?[^\x00-\x7F])+", lambda _: r"[^\\x00-\\x7F]+", pattern)
     pattern = pattern.replace("[^\\\\x00-\\\\x7F]", "[^\\x00-\\x7F]").replace("\\\t", "\\t")
     if any(byte < 128 for c in text if not c.isascii() for byte in c.encode(encoding, "ignore")):
         pattern = pattern.replace("[^\\x00-\\x7F]+", ".+")
     begin = r"^[^\x00-\x7F]*" if marked else "^"
-    return begin + pattern + (r"\s*$" if whole else "")
+    return begin + pattern + (r"\s*$" if fits else "")
 
 
 def _field_line(seen: FieldSeen) -> str:
     why = f"; {seen.why}" if seen.why else ""
     if seen.column is None:
-        asked = f"asked: {seen.question[1]}" if seen.question else "not recognised"
-        return f"# {_quoted(seen.name)}: {{column: , unit: }}   # {asked}{why}"
+        remark = f"asked: {seen.question[1]}" if seen.question else "not recognised"
+        return f"# {_quoted(seen.name)}: {{column: , unit: }}   # {remark}{why}"
     parts = [f"column: {seen.column}"]
     if seen.question is not None:
         line = f"{_quoted(seen.name)}: {{{parts[0]}, unit: }}"

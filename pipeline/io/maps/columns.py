@@ -55,12 +55,12 @@ def foreign_unit(name: str) -> str | None:
         None where it means none.
 
     """
-    bare = last_part(name).lower()
-    bracket = _BRACKET.match(bare)
-    stem = bracket[1].strip() if bracket else bare.rpartition("_")[0]
+    unit = last_part(name).lower()
+    bracket = _BRACKET.match(unit)
+    stem = bracket[1].strip() if bracket else unit.rpartition("_")[0]
     for column in COLUMNS:
         suffix = suffix_of(column)
-        if stem and bare != column and stem in (column, column.removesuffix(f"_{suffix}")):
+        if stem and unit != column and stem in (column, column.removesuffix(f"_{suffix}")):
             return column
     return None
 

@@ -29,8 +29,8 @@ def map_folders(config_dir: str | None = None) -> tuple[Path, ...]:
     places = [configuration_folder() / "source", *_users(), Path("conf") / "source"]
     if config_dir is not None:
         places.append(Path(config_dir) / "source")
-    there = {place.resolve(): place for place in places if place.is_dir()}
-    return tuple(there.values())
+    existing = {place.resolve(): place for place in places if place.is_dir()}
+    return tuple(existing.values())
 
 
 def source_maps(source: str = AUTO, config_dir: str | None = None) -> dict[str, SourceMap]:

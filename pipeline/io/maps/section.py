@@ -56,10 +56,10 @@ class Section:
     def close(self) -> None:
         """Raises UsageError for an unknown key."""
         for key in self.remaining:
-            near = difflib.get_close_matches(key, self.known_keys, 1)
+            similar = difflib.get_close_matches(key, self.known_keys, 1)
             hint = (
-                f"did you mean {near[0]!r}?"
-                if near
+                f"did you mean {similar[0]!r}?"
+                if similar
                 else f"known keys: {', '.join(self.known_keys)}"
             )
             raise self.fault(key, "is no key of a source map", hint)

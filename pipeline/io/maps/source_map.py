@@ -406,12 +406,12 @@ def laid_over(base: Mapping[str, Any], top: Mapping[str, Any]) -> dict[str, Any]
         The upper map; a map over a map is laid key by key.
 
     """
-    both = {
+    nested = {
         key: {**base[key], **value}
         for key, value in top.items()
         if isinstance(value, dict) and isinstance(base.get(key), dict)
     }
-    return {**base, **top, **both}
+    return {**base, **top, **nested}
 
 
 def parse_source_map(data: bytes, name: str) -> SourceMap:
@@ -511,8 +511,10 @@ def _fields(section: Section) -> tuple[FieldMap, ...]:
         part = Section(section.source, f"fields.{name}", plain)
         column = part.text("column")
         if column not in COLUMNS:
-            near = difflib.get_close_matches(column or "", list(COLUMNS), 3)
-            hint = f"did you mean {', '.join(near)}?" if near else f"one of {', '.join(COLUMNS)}"
+            similar = difflib.get_close_matches(column or "", list(COLUMNS), 3)
+            hint = (
+                f"did you mean {', '.join(similar)}?" if similar else f"one of {', '.join(COLUMNS)}"
+            )
             raise part.fault("column", f"{column!r} is no column of the contract", hint)
         sign = part.number("sign", 1.0)
         if sign not in (1.0, -1.0):

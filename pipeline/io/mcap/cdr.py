@@ -78,8 +78,8 @@ class CdrDecoder:
         body = _Pass(batch, raw, order, align, wanted)
         for part in self.layout:
             body.field(part, "", None)
-        left = body.size - body.at
-        if np.any(left < 0) or np.any(left >= _PADDING):
+        remaining = body.size - body.at
+        if np.any(remaining < 0) or np.any(remaining >= _PADDING):
             raise _bad("has another length than its schema gives")
         self._trail = body.trail
         return body.collected()
@@ -286,14 +286,14 @@ class _Pass:
             else:
                 self.at = np.where(only, -(-self.at // to) * to, self.at)
         else:
-            here = self.at[rows]
-            self.at[rows] = np.where(only, -(-here // to) * to, here)
+            positions = self.at[rows]
+            self.at[rows] = np.where(only, -(-positions // to) * to, positions)
 
     def move(self, by: Any, rows: Integers | None) -> None:
         """Move past `by` bytes; past the end of a message is a CaptureError."""
         if rows is None:
-            same = np.ndim(by) == 1 and by.size and bool(np.all(by == by[0]))
-            self.at = self.at + (int(by[0]) if same else by)
+            uniform = np.ndim(by) == 1 and by.size and bool(np.all(by == by[0]))
+            self.at = self.at + (int(by[0]) if uniform else by)
             over = (
                 self.at > self.shortest if isinstance(self.at, int) else np.any(self.at > self.size)
             )

@@ -171,12 +171,12 @@ def scan(data: bytes, *, recover: bool = False) -> Layout:
             "record it as MCAP, or give it the suffix of what it is",
         )
     layout = Layout(data)
-    whole = data.endswith(MAGIC) and len(data) >= 2 * len(MAGIC)
-    spans = walk(data, len(MAGIC), len(data) - len(MAGIC) if whole else len(data))
+    complete = data.endswith(MAGIC) and len(data) >= 2 * len(MAGIC)
+    spans = walk(data, len(MAGIC), len(data) - len(MAGIC) if complete else len(data))
     end = _data_section(layout, spans)
-    if not whole or spans.fault is not None or end is None:
+    if not complete or spans.fault is not None or end is None:
         cut = _cut(layout, spans.fault)
-        if whole or not recover:
+        if complete or not recover:
             raise cut
         return _good_part(layout, spans, end, cut)
     _data_end(layout, spans, end)
@@ -346,9 +346,9 @@ def _check_index(layout: Layout) -> None:
 
 def _check_size(layout: Layout) -> None:
     """Each chunk may be modest and a thousand of them a bomb."""
-    plain = sum(chunk.size for chunk in layout.chunks)
-    if plain > max(MAX_WHOLE_FLOOR_BYTES, MAX_WHOLE_RATIO * len(layout.data)):
-        raise too_large(f"its {len(layout.data)} bytes claim to unpack to {plain}")
+    unpacked_bytes = sum(chunk.size for chunk in layout.chunks)
+    if unpacked_bytes > max(MAX_WHOLE_FLOOR_BYTES, MAX_WHOLE_RATIO * len(layout.data)):
+        raise too_large(f"its {len(layout.data)} bytes claim to unpack to {unpacked_bytes}")
 
 
 def check_definitions(layout: Layout) -> None:
@@ -388,8 +388,11 @@ def _index_of(layout: Layout, chunk: rec.Chunk) -> rec.ChunkIndex:
 
 
 def _match(what: str, stated: Iterable[object], actual: Iterable[object]) -> None:
-    left, right = list(stated), list(actual)
-    if len(left) != len(right):
-        raise corrupt(f"the index names {len(left)} {what} records, the file holds {len(right)}")
-    if set(left) != set(right):
+    stated_items, actual_items = list(stated), list(actual)
+    if len(stated_items) != len(actual_items):
+        raise corrupt(
+            f"the index names {len(stated_items)} {what} records, "
+            f"the file holds {len(actual_items)}"
+        )
+    if set(stated_items) != set(actual_items):
         raise corrupt(f"the index contradicts the file on a {what} record")

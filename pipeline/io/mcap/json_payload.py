@@ -185,15 +185,15 @@ def _collect(series: Any, name: str, wanted: Wanted, leaves: dict[str, Leaf]) ->
 def _one_by_one(payloads: list[bytes], wanted: Wanted) -> dict[str, Leaf]:
     """The leaves by reading each message on its own."""
     rows: list[dict[str, Any]] = []
-    seen: dict[str, None] = {}
+    keys: dict[str, None] = {}
     for row, payload in enumerate(payloads):
         flat: dict[str, Any] = {}
         _flatten(_object(payload, row), "", flat, row, 0)
         rows.append(flat)
-        seen.update(dict.fromkeys(flat))
-        if len(seen) > MAX_FIELDS:
+        keys.update(dict.fromkeys(flat))
+        if len(keys) > MAX_FIELDS:
             raise _bad(f"stream has more than {MAX_FIELDS} fields", row)
-    names = [name for name in seen if wanted(name)]
+    names = [name for name in keys if wanted(name)]
     return {name: _leaf(name, [flat.get(name) for flat in rows]) for name in names}
 
 
@@ -229,8 +229,10 @@ def _leaf(name: str, values: list[Any]) -> Leaf:
 def _numbers(name: str, values: list[Any]) -> Any:
     try:
         if all(type(value) is int for value in values) and values:
-            whole = np.array(values, np.int64)
-            return whole if np.abs(whole).max() > _EXACT_INTEGER else whole.astype(np.float64)
+            integers = np.array(values, np.int64)
+            return (
+                integers if np.abs(integers).max() > _EXACT_INTEGER else integers.astype(np.float64)
+            )
         numbers = np.array([np.nan if v is None else float(v) for v in values], np.float64)
     except (TypeError, ValueError, OverflowError):
         raise _bad(f"has something other than numbers in {name!r}") from None

@@ -138,15 +138,15 @@ class _Pass:
         present = np.zeros(rows, bool)
         present[owner] = True
         for number, part in fields.items():
-            seen = events[number]
+            of_field = events[number]
             if isinstance(part, Message):
-                self.nested(part, prefix, seen, rows, counts)
+                self.nested(part, prefix, of_field, rows, counts)
             elif not part.repeated:
                 self.leaves[prefix + part.name] = Leaf(
-                    self.singular(part, seen, rows, present), counts
+                    self.singular(part, of_field, rows, present), counts
                 )
             elif counts is None:
-                self.leaves[prefix + part.name] = self.repeated(part, seen, rows)
+                self.leaves[prefix + part.name] = self.repeated(part, of_field, rows)
             else:
                 raise _bad(f"has the array {prefix + part.name!r} inside an array")
 
@@ -161,8 +161,8 @@ class _Pass:
         """Occurrences of `fields`: messages of the common shapes at once, the rest by cursor."""
         if np.any(np.diff(owner) <= 0):
             return self.events(fields, start, end, owner)
-        places, left = shaped_rows(self.raw, plan, start, end - start)
-        events = self.events(fields, start[left], end[left], owner[left])
+        places, unmatched = shaped_rows(self.raw, plan, start, end - start)
+        events = self.events(fields, start[unmatched], end[unmatched], owner[unmatched])
         for number, part in fields.items():
             for rows, at in places.get(number, ()):
                 if isinstance(part, Scalar):
@@ -170,10 +170,10 @@ class _Pass:
         return events
 
     def nested(
-        self, part: Message, prefix: str, seen: _Events, rows: int, counts: Integers | None
+        self, part: Message, prefix: str, events: _Events, rows: int, counts: Integers | None
     ) -> None:
         """A message field: merged into its owner's row, or one row an element if repeated."""
-        owner, start, length = _joined(seen)
+        owner, start, length = _joined(events)
         prefix = f"{prefix}{part.name}."
         if not part.repeated:
             self.message(part, prefix, start, start + length, owner, rows, counts)
@@ -202,8 +202,8 @@ class _Pass:
             repeats = repeats + 1 if low == high == last_tag else 0
             last_tag = low if low == high else -1
             for tag in [low] if low == high else np.unique(tags).tolist():
-                same = slice(None) if low == high else tags == tag
-                rows, value = active[same], after[same]
+                of_tag = slice(None) if low == high else tags == tag
+                rows, value = active[of_tag], after[of_tag]
                 part, wire = fields.get(tag >> 3), tag & 7
                 if tag >> 3 == 0:
                     raise _bad("has a field numbered 0")
@@ -250,10 +250,10 @@ class _Pass:
         while more.size:
             if shift > 63:
                 raise _bad("has a number of more than 64 bits")
-            here = after[more]
-            if np.any(here >= end[more]):
+            positions = after[more]
+            if np.any(positions >= end[more]):
                 raise _bad("ends inside a field")
-            byte = self.raw[here]
+            byte = self.raw[positions]
             value[more] |= (byte & 0x7F).astype(np.uint64) << np.uint64(shift)
             after[more] += 1
             more = more[(byte & 0x80) != 0]
@@ -278,24 +278,24 @@ class _Pass:
             most = (stop - begin) // stride
             if most == 0:
                 raise _bad("ends inside a field")
-            same = np.ones(most, bool)
+            equal = np.ones(most, bool)
             for offset in range(at - begin):
                 column = np.ndarray((most,), np.uint8, self.buffer, begin + offset, (stride,))
-                same &= column == self.raw[begin + offset]
-            count = most if same.all() else int(np.argmin(same))
+                equal &= column == self.raw[begin + offset]
+            count = most if equal.all() else int(np.argmin(equal))
             places = at + stride * np.arange(count, dtype=np.int64)
             size = np.full(count, width, np.int64)
             events.add(np.full(count, owner[row]), places, size, tag & 7)
             cursor[row] = begin + count * stride
 
     def singular(
-        self, part: Scalar, seen: _Events, rows: int, present: NDArray[np.bool_]
+        self, part: Scalar, events: _Events, rows: int, present: NDArray[np.bool_]
     ) -> NDArray[Any]:
         """Values [rows] of a scalar field, the last occurrence counting."""
         dtype = np.dtype(_storage(part.dtype))
         values = np.zeros(rows, dtype)
         missing = np.ones(rows, bool) if not part.zero_when_absent else ~present
-        for owner, start, extent in zip(seen.owner, seen.start, seen.extent, strict=True):
+        for owner, start, extent in zip(events.owner, events.start, events.extent, strict=True):
             values[owner] = self.read(part, start, extent)
             missing[owner] = False
         if missing.any():
@@ -303,16 +303,20 @@ class _Pass:
             values[missing] = np.nan
         return values
 
-    def repeated(self, part: Scalar, seen: _Events, rows: int) -> Leaf:
+    def repeated(self, part: Scalar, events: _Events, rows: int) -> Leaf:
         """Values of an array field, packed or not, in message order."""
-        if len(seen.owner) == 1 and seen.wire[0] == LENGTH and np.all(np.diff(seen.owner[0]) > 0):
+        if (
+            len(events.owner) == 1
+            and events.wire[0] == LENGTH
+            and np.all(np.diff(events.owner[0]) > 0)
+        ):
             counts = np.zeros(rows, np.int64)
-            counts[seen.owner[0]], values = self.packed(part, seen.start[0], seen.extent[0])
+            counts[events.owner[0]], values = self.packed(part, events.start[0], events.extent[0])
             return Leaf(values, counts)
         owners: list[Integers] = []
         pieces: list[NDArray[Any]] = []
         for owner, start, extent, wire in zip(
-            seen.owner, seen.start, seen.extent, seen.wire, strict=True
+            events.owner, events.start, events.extent, events.wire, strict=True
         ):
             if wire != LENGTH:
                 owners.append(owner)
@@ -407,12 +411,12 @@ def _as_type(values: NDArray[np.uint64], dtype: str) -> NDArray[Any]:
     return np.asarray(values.astype(dtype))
 
 
-def _joined(seen: _Events) -> tuple[Integers, Integers, Integers]:
-    if not seen.owner:
+def _joined(events: _Events) -> tuple[Integers, Integers, Integers]:
+    if not events.owner:
         empty = np.empty(0, np.int64)
         return empty, empty, empty
     return (
-        np.concatenate(seen.owner),
-        np.concatenate(seen.start),
-        np.concatenate(seen.extent).astype(np.int64),
+        np.concatenate(events.owner),
+        np.concatenate(events.start),
+        np.concatenate(events.extent).astype(np.int64),
     )

@@ -172,21 +172,21 @@ def _implicit(part: Any, file: Any) -> bool:
         return True
     if file.syntax != "editions":
         return False
-    own, of_file = part.options.features, file.options.features
-    presence = own.field_presence or of_file.field_presence
+    of_part, of_file = part.options.features, file.options.features
+    presence = of_part.field_presence or of_file.field_presence
     return bool(presence == 2)
 
 
 def _recursive(name: str, descriptor: Any, types: dict[str, tuple[Any, Any]]) -> bool:
     """Whether a message type contains itself; such trees hold no samples and are left out."""
-    seen: set[str] = set()
+    visited: set[str] = set()
     stack = [descriptor]
     while stack:
         for part in stack.pop().field:
-            if part.type == _MESSAGE_TYPE and part.type_name not in seen:
+            if part.type == _MESSAGE_TYPE and part.type_name not in visited:
                 if part.type_name == name:
                     return True
-                seen.add(part.type_name)
+                visited.add(part.type_name)
                 if part.type_name in types:
                     stack.append(types[part.type_name][0])
     return False

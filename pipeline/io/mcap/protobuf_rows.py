@@ -115,7 +115,7 @@ def shaped_rows(
 
     """
     by_shape: dict[int, list[tuple[Integers, Integers]]] = {}
-    left = np.ones(start.size, bool)
+    unmatched = np.ones(start.size, bool)
     shapes = 0
     sizes, counts = np.unique(length, return_counts=True)
     for size in sizes[counts >= _MIN_MESSAGES].tolist():
@@ -127,15 +127,15 @@ def shaped_rows(
                 break
             shapes += 1
             begin = start[members]
-            same = np.ones(members.size, bool)
+            equal = np.ones(members.size, bool)
             for offset, byte in shape.tags:
-                same &= raw[begin + offset] == byte
-            rows = members[same]
+                equal &= raw[begin + offset] == byte
+            rows = members[equal]
             for number, offset in shape.values:
                 by_shape.setdefault(number, []).append((rows, start[rows] + offset))
-            left[rows] = False
-            members = members[~same]
-    return by_shape, left
+            unmatched[rows] = False
+            members = members[~equal]
+    return by_shape, unmatched
 
 
 def even_shape(batch: Batch, plan: Message) -> Shape | None:

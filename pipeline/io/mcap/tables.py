@@ -134,8 +134,8 @@ def _stream(
 ) -> _Stream:
     channel = definitions.channel(number)
     schema = definitions.schemas.get(channel.schema_id)
-    same = None if schema is None else Schema(0, schema.name, schema.encoding, schema.data)
-    key = (channel.topic, channel.message_encoding, same)
+    without_id = None if schema is None else Schema(0, schema.name, schema.encoding, schema.data)
+    key = (channel.topic, channel.message_encoding, without_id)
     if key not in streams:
         decoder = decoder_of(channel.message_encoding, schema)
         streams[key] = _Stream(channel.topic, channel.message_encoding, schema, decoder)
@@ -247,8 +247,8 @@ def pick_joint(batch: Batch, leaves: dict[str, Leaf], joint: str | None) -> dict
             raise _bad(f"a joint state has another number of {quantity} values than of joints")
         first = np.cumsum(leaf.counts) - leaf.counts
         values = np.full(counts.size, np.nan)
-        there = leaf.counts > 0
-        values[there] = leaf.values.reshape(-1)[(first + at)[there]]
+        nonempty = leaf.counts > 0
+        values[nonempty] = leaf.values.reshape(-1)[(first + at)[nonempty]]
         scalars[quantity] = Leaf(values)
     return scalars
 
@@ -270,12 +270,12 @@ def _place(batch: Batch, names: Leaf, counts: Integers, joint: str | None) -> In
         return np.zeros(counts.size, np.int64)
     target = joint.encode() + b"\0"
     raw = np.frombuffer(batch.buffer, np.uint8)
-    same = length == len(target)
+    equal = length == len(target)
     for offset, byte in enumerate(target):
-        same &= raw[np.minimum(start + offset, raw.size - 1)] == byte
+        equal &= raw[np.minimum(start + offset, raw.size - 1)] == byte
     whose = np.repeat(np.arange(counts.size), counts)
     place = np.arange(whose.size) - np.repeat(np.cumsum(counts) - counts, counts)
-    hits = np.bincount(whose[same], minlength=counts.size)
+    hits = np.bincount(whose[equal], minlength=counts.size)
     if np.any(hits != 1):
         row = int(np.argmax(hits != 1))
         raise CaptureError(
@@ -284,7 +284,7 @@ def _place(batch: Batch, names: Leaf, counts: Integers, joint: str | None) -> In
             "check the joint's name with `inspect`",
             (row, row),
         )
-    return place[same].astype(np.int64)
+    return place[equal].astype(np.int64)
 
 
 class Column:

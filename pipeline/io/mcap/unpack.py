@@ -43,22 +43,22 @@ def unpack(data: bytes, chunk: Chunk, first_message: int = 0) -> bytes:
     """
     packed = memoryview(data)[chunk.begin : chunk.end]
     if chunk.compression == "":
-        plain = bytes(packed)
+        unpacked = bytes(packed)
     elif chunk.compression == "zstd":
-        plain = _unzstd(packed, chunk)
+        unpacked = _unzstd(packed, chunk)
     elif chunk.compression == "lz4":
-        plain = _unlz4(packed, chunk)
+        unpacked = _unlz4(packed, chunk)
     else:
         raise CaptureError(
             "unsupported",
             f"a chunk is packed with {chunk.compression!r}",
             "record with lz4, zstd or no compression",
         )
-    if len(plain) != chunk.size:
+    if len(unpacked) != chunk.size:
         raise corrupt(f"{_where(chunk)} unpacks to another size than declared")
-    if chunk.crc and crc32(plain) != chunk.crc:
+    if chunk.crc and crc32(unpacked) != chunk.crc:
         raise corrupt(f"{_where(chunk)} fails its checksum", (first_message, first_message))
-    return plain
+    return unpacked
 
 
 def _where(chunk: Chunk) -> str:
@@ -76,10 +76,10 @@ def _unzstd(packed: memoryview, chunk: Chunk) -> bytes:
         reader = zstandard.ZstdDecompressor(max_window_size=_ZSTD_MAX_WINDOW_BYTES).stream_reader(
             packed, read_across_frames=True
         )
-        plain = reader.read(chunk.size + 1)
+        unpacked = reader.read(chunk.size + 1)
     except zstandard.ZstdError as fault:
         raise corrupt(f"{_where(chunk)} does not unpack: {fault}") from None
-    return plain
+    return unpacked
 
 
 def _unlz4(packed: memoryview, chunk: Chunk) -> bytes:
@@ -87,9 +87,9 @@ def _unlz4(packed: memoryview, chunk: Chunk) -> bytes:
 
     unpacker = lz4.frame.LZ4FrameDecompressor()
     try:
-        plain: bytes = unpacker.decompress(packed, max_length=chunk.size + 1)
+        unpacked: bytes = unpacker.decompress(packed, max_length=chunk.size + 1)
     except (RuntimeError, EOFError) as fault:
         raise corrupt(f"{_where(chunk)} does not unpack: {fault}") from None
     if not unpacker.eof or unpacker.unused_data:
         raise corrupt(f"{_where(chunk)} unpacks to another size than declared")
-    return plain
+    return unpacked

@@ -139,9 +139,9 @@ def _run(data: bytes, position: int, end: int, opcode: int, length: int) -> int:
         offset = position + count * stride
         ops = np.ndarray((block,), np.uint8, data, offset, (stride,))
         sizes = np.ndarray((block,), "<u8", data, offset + 1, (stride,))
-        same = (ops == opcode) & (sizes == length)
-        if not same.all():
-            return count + int(np.argmin(same))
+        equal = (ops == opcode) & (sizes == length)
+        if not equal.all():
+            return count + int(np.argmin(equal))
         count += block
     return count
 

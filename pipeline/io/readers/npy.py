@@ -48,8 +48,8 @@ def read(data: bytes) -> tuple[RawTable, ...]:
         names = [n for n in array.dtype.names if np.issubdtype(array.dtype[n], np.number)]
         return (RawTable("npy", {name: array[name] for name in names}),)
     if not np.issubdtype(array.dtype, np.number) or array.ndim not in (1, 2):
-        what = f"an array of {array.dtype} with {array.ndim} dimensions"
-        raise CaptureError("not_a_table", f"it is {what}, no table", REMEDY)
+        shape = f"an array of {array.dtype} with {array.ndim} dimensions"
+        raise CaptureError("not_a_table", f"it is {shape}, no table", REMEDY)
     columns = array.reshape(array.shape[0], -1)
     return (RawTable("npy", {str(n): columns[:, n] for n in range(columns.shape[1])}),)
 

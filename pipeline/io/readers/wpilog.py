@@ -73,24 +73,24 @@ def _entries(data: bytes) -> list[_Entry]:
     if data[:6] != MARK:
         raise CaptureError("not_wpilog", "it does not begin as a data log", "copy the log again")
     (extra,) = struct.unpack_from("<I", data, 8)
-    open_, done = dict[int, _Entry](), list[_Entry]()
+    open_, finished = dict[int, _Entry](), list[_Entry]()
     for number, time_us, payload in _records(data, 12 + extra):
         if number == 0:
-            _control(payload, open_, done)
+            _control(payload, open_, finished)
         elif number in open_:
             open_[number].times_us.append(time_us)
             open_[number].payloads.append(payload)
-    return done
+    return finished
 
 
-def _control(payload: bytes, open_: dict[int, _Entry], done: list[_Entry]) -> None:
+def _control(payload: bytes, open_: dict[int, _Entry], finished: list[_Entry]) -> None:
     kind, number = struct.unpack_from("<BI", payload)
     if kind == START:
         name, at = _text(payload, 5)
         form, at = _text(payload, at)
         unit, _ = _text(payload, at)
         open_[number] = _Entry(name, form, unit)
-        done.append(open_[number])
+        finished.append(open_[number])
     elif kind == FINISH:
         open_.pop(number, None)
 

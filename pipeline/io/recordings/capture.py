@@ -109,26 +109,26 @@ def recording_bytes(
         Shown as a log.
 
     """
-    own = own_evidence(capture, evidence)
-    traces, fits = list(capture_traces(capture)), list(fit_traces(own))
-    drawn = (residual_maps(capture, one) for one in first_of_each(own))
+    of_capture = own_evidence(capture, evidence)
+    traces, fits = list(capture_traces(capture)), list(fit_traces(of_capture))
+    drawn = (residual_maps(capture, one) for one in first_of_each(of_capture))
     maps = tuple(islice((one for one in drawn if one is not None), MOST_MAPS))
     name = f"{capture.meta.motor_id} {PurePosixPath(capture.path).stem}"
     table = sample_table(traces)
     shown = Shown(traces, fits, maps, has_lanes(capture), datasheet is not None, table)
-    with recording(name, identity(capture, datasheet), capture_layout(shown)) as made:
+    with recording(name, identity(capture, datasheet), capture_layout(shown)) as recorded:
         for trace in (*traces, *(fit.trace for fit in fits)):
-            send_trace(made.stream, trace)
+            send_trace(recorded.stream, trace)
         if table is not None and table[1] > 1:
-            send_trace(made.stream, table[0])
+            send_trace(recorded.stream, table[0])
         for one in maps:
-            _send_maps(made.stream, one)
-        send_lanes(made.stream, capture)
-        send_lines(made.stream, capture, lines_of(capture, own, findings))
-        _send_properties(made.stream, capture)
+            _send_maps(recorded.stream, one)
+        send_lanes(recorded.stream, capture)
+        send_lines(recorded.stream, capture, lines_of(capture, of_capture, findings))
+        _send_properties(recorded.stream, capture)
         if datasheet is not None:
-            send_page(made.stream, "/datasheet", capture_markdown(datasheet, capture.path))
-    return made.content
+            send_page(recorded.stream, "/datasheet", capture_markdown(datasheet, capture.path))
+    return recorded.content
 
 
 def identity(capture: Capture, datasheet: Datasheet | None) -> tuple[str, str, str]:

@@ -203,16 +203,16 @@ def _residual(capture: Capture, evidence: Evidence) -> list[Line]:
     lines: list[Line] = []
     unit = unit_words(evidence.y_name)
     for series in evidence.series:
-        left = series.measured - series.fitted if series.fitted.size else np.zeros(0)
-        finite = np.isfinite(left)
+        residuals = series.measured - series.fitted if series.fitted.size else np.zeros(0)
+        finite = np.isfinite(residuals)
         if not finite.any():
             continue
-        worst = int(np.nanargmax(np.abs(left)))
-        rms = float(np.sqrt(np.mean(left[finite] ** 2)))
+        worst = int(np.nanargmax(np.abs(residuals)))
+        rms = float(np.sqrt(np.mean(residuals[finite] ** 2)))
         words = (
             f"{evidence.title}: {quantity_words(evidence.y_name)} "
             f"residual rms {quantity(rms, unit, 3)}, "
-            f"largest {quantity(float(abs(left[worst])), unit, 3)} at {series.x[worst]:.4g} s"
+            f"largest {quantity(float(abs(residuals[worst])), unit, 3)} at {series.x[worst]:.4g} s"
         )
         lines.append(("INFO", words, _row_at(capture, float(series.x[worst]))))
     return lines
@@ -230,8 +230,8 @@ def _index(capture: Capture, rows: Sequence[int]) -> TimeColumn:
     import rerun as rr
 
     table = capture.tables[0] if capture.tables else pl.DataFrame()
-    kept: NDArray[np.int64] = np.clip(np.asarray(rows), 0, max(table.height - 1, 0))
+    places: NDArray[np.int64] = np.clip(np.asarray(rows), 0, max(table.height - 1, 0))
     if "t_s" not in table.columns or table.height == 0:
-        return rr.TimeColumn(ROW, sequence=kept.tolist())
-    t_s = np.nan_to_num(table["t_s"].to_numpy()[kept])
+        return rr.TimeColumn(ROW, sequence=places.tolist())
+    t_s = np.nan_to_num(table["t_s"].to_numpy()[places])
     return rr.TimeColumn(TIME, duration=nanoseconds(t_s).astype("timedelta64[ns]"))

@@ -50,8 +50,8 @@ def capture_traces(capture: Capture) -> Iterator[Trace]:
         else:
             rows = pl.Series(ROW, np.arange(table.height, dtype=np.int64))
             trace = Trace(entity, ROW, values.insert_column(0, rows))
-        plain = all(name.isascii() and name.isidentifier() for name in trace.columns)
-        yield replace(trace, packed=plain and table.height > LONG_ROWS)
+        identifiers = all(name.isascii() and name.isidentifier() for name in trace.columns)
+        yield replace(trace, packed=identifiers and table.height > LONG_ROWS)
 
 
 def sample_table(traces: Sequence[Trace]) -> tuple[Trace, int] | None:

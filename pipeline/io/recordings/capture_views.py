@@ -124,19 +124,19 @@ def loupe_views(fits: Sequence[FitTrace]) -> tuple[ViewPlan, ...]:
     span_s = max(_span_s(fit.trace) for fit in timed)
     around_s = round_s(span_s / LOUPE_SHARE)
     first = timed[0].y_name
-    own = [fit for fit in timed if fit.y_name == first and fit.title == timed[0].title]
+    of_signal = [fit for fit in timed if fit.y_name == first and fit.title == timed[0].title]
     words = f"Loupe ±{quantity(around_s, 's', 2)} at the cursor"
-    both = [
-        Line(f.trace.entity, component, f"{word}{_after(f, own)}", colour, width)
-        for f in own
+    pairs = [
+        Line(f.trace.entity, component, f"{word}{_after(f, of_signal)}", colour, width)
+        for f in of_signal
         for component, word, colour, width in (
             ("measured", "measured", MEASURED, WIDE),
             ("fitted", "model", MODEL, 1.4),
         )
     ]
-    residual = _residual_view(first, own)
+    residual = _residual_view(first, of_signal)
     return (
-        ViewPlan(f"{words}: {with_unit(first)}", tuple(both), 1.5, None, around_s),
+        ViewPlan(f"{words}: {with_unit(first)}", tuple(pairs), 1.5, None, around_s),
         ViewPlan(f"{words}: {residual.name}", residual.lines, 1.0, residual.reach, around_s),
     )
 
@@ -148,8 +148,8 @@ def _views(
     quantities = list(dict.fromkeys(fit.y_name for fit in fits))[:most_fits]
     for y_name in quantities:
         title = next(fit.title for fit in fits if fit.y_name == y_name)
-        own = [fit for fit in fits if (fit.title, fit.y_name) == (title, y_name)]
-        views += [_fit_view(title, y_name, own, traces), _residual_view(y_name, own)]
+        of_title = [fit for fit in fits if (fit.title, fit.y_name) == (title, y_name)]
+        views += [_fit_view(title, y_name, of_title, traces), _residual_view(y_name, of_title)]
     groups = _by_unit(traces, set(quantities))
     chosen = list(groups.items())[:most_groups]
     views += [_group_view(unit, columns, traces) for unit, columns in chosen]
@@ -263,9 +263,9 @@ def _traces_tab(shown: Shown, plans: Sequence[ViewPlan]) -> Any:
     side: list[Any] = [time_view(plan) for plan in loupe]
     side_shares = [plan.share for plan in loupe]
     side.append(findings_view("/findings", "Findings of this capture, at their rows"))
-    left = rrb.Vertical(*rows, row_shares=shares or None)
+    traces_view = rrb.Vertical(*rows, row_shares=shares or None)
     right = rrb.Vertical(*side, row_shares=[*side_shares, 1.0])
-    return rrb.Horizontal(left, right, column_shares=[1.7, 1.0], name="1 · Traces")
+    return rrb.Horizontal(traces_view, right, column_shares=[1.7, 1.0], name="1 · Traces")
 
 
 def _maps_tab(maps: Sequence[ResidualMaps]) -> Any:
@@ -305,8 +305,10 @@ def _sheet_tab(shown: Shown, name: str) -> Any:
         if step == 1:
             views.append(_table_view(table, "Samples"))
         else:
-            some = _table_view(table, f"Samples, one row in {step}")
-            views.append(rrb.Tabs(some, _table_view(shown.traces[0], "All samples"), active_tab=0))
+            table_view = _table_view(table, f"Samples, one row in {step}")
+            views.append(
+                rrb.Tabs(table_view, _table_view(shown.traces[0], "All samples"), active_tab=0)
+            )
     return rrb.Horizontal(*views, name=name)
 
 

@@ -88,18 +88,18 @@ def comparison_bytes(result: Comparison) -> bytes:
 
     """
     identity = canonical_json(result.document()).decode()
-    with recording(f"{result.motor_id} comparison", (identity,), _layout(result)) as made:
+    with recording(f"{result.motor_id} comparison", (identity,), _layout(result)) as recorded:
         for trace in result.traces:
-            send_trace(made.stream, table_of(trace))
-        send_page(made.stream, "/sheet", _sheet(result))
+            send_trace(recorded.stream, table_of(trace))
+        send_page(recorded.stream, "/sheet", _sheet(result))
         stated = {
             "motor_id": result.motor_id,
             "model": result.name,
             "effects": list(result.effects),
             "held_out": result.held_out,
         }
-        send_property(made.stream, "comparison", stated)
-    return made.content
+        send_property(recorded.stream, "comparison", stated)
+    return recorded.content
 
 
 def entity_of(trace: Trace) -> str:
@@ -133,9 +133,9 @@ def table_of(trace: Trace) -> Table:
     }
     if trace.before is not None:
         columns |= {"before": trace.before, "residual_before": trace.measured - trace.before}
-    kept = np.unique(np.concatenate([line_points(c, MOST_POINTS) for c in columns.values()]))
-    frame = pl.DataFrame({name: c[kept].astype(np.float32) for name, c in columns.items()})
-    return timed(entity_of(trace), trace.t_s[kept], frame)
+    rows = np.unique(np.concatenate([line_points(c, MOST_POINTS) for c in columns.values()]))
+    frame = pl.DataFrame({name: c[rows].astype(np.float32) for name, c in columns.items()})
+    return timed(entity_of(trace), trace.t_s[rows], frame)
 
 
 def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
@@ -149,25 +149,25 @@ def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
         Path of the capture.
 
     """
-    own = (_views_of(trace) for trace in result.traces if trace.capture == capture)
-    return tuple(plan for both in own for plan in both)
+    of_capture = (_views_of(trace) for trace in result.traces if trace.capture == capture)
+    return tuple(plan for views in of_capture for plan in views)
 
 
 def _views_of(trace: Trace) -> tuple[ViewPlan, ViewPlan]:
     """A signal, and its residual: without what was added, behind, and with it."""
     entity = entity_of(trace)
     measured = Line(entity, "measured", "measured", MEASURED, WIDE)
-    model, left = Line(entity, "model", "model", MODEL), _left(trace)
+    model, residual_plan = Line(entity, "model", "model", MODEL), _left(trace)
     lines: tuple[Line, ...] = (measured, model)
     if trace.before is not None:
         before = Line(entity, "before", "model before", BASELINE)
         lines = (measured, before, replace(model, name="model after"))
         without = Line(entity, "residual_before", "measured − model before", BASELINE)
-        after = replace(left.lines[0], name="measured − model after")
-        reach = max(left.reach or 0.0, _reach(trace.measured - trace.before))
-        left = replace(left, lines=(without, after), reach=reach)
+        after = replace(residual_plan.lines[0], name="measured − model after")
+        reach = max(residual_plan.reach or 0.0, _reach(trace.measured - trace.before))
+        residual_plan = replace(residual_plan, lines=(without, after), reach=reach)
     words = f"{with_unit(trace.signal)}, model {KINDS[trace.kind]}"
-    return ViewPlan(words, lines, 2.0), left
+    return ViewPlan(words, lines, 2.0), residual_plan
 
 
 def _left(trace: Trace) -> ViewPlan:
@@ -198,14 +198,14 @@ def loupes(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
         for one in result.errors
         if one.capture == capture and one.noise_floor > 0.0
     }
-    own = [trace for trace in result.traces if trace.capture == capture]
-    own.sort(key=lambda trace: -ratios.get((trace.signal, trace.kind), 0.0))
+    of_capture = [trace for trace in result.traces if trace.capture == capture]
+    of_capture.sort(key=lambda trace: -ratios.get((trace.signal, trace.kind), 0.0))
     plans: list[ViewPlan] = []
-    for trace in own[:MOST_LOUPES]:
+    for trace in of_capture[:MOST_LOUPES]:
         around_s = round_s(float(np.ptp(trace.t_s)) / LOUPE_SHARE)
         words = f"Loupe ±{quantity(around_s, 's', 2)}: "
-        both = (_views_of(trace)[0], _left(trace))
-        plans += [replace(one, name=words + one.name, around_s=around_s) for one in both]
+        views = (_views_of(trace)[0], _left(trace))
+        plans += [replace(one, name=words + one.name, around_s=around_s) for one in views]
     return tuple(plans)
 
 
@@ -218,9 +218,9 @@ def _layout(result: Comparison) -> Blueprint:
         plans = planned(result, capture)
         sides = []
         for kind in KINDS:
-            mine = [p for p in plans if f"/{kind}/" in p.lines[0].entity]
-            if mine:
-                sides.append(stacked(mine))
+            of_kind = [p for p in plans if f"/{kind}/" in p.lines[0].entity]
+            if of_kind:
+                sides.append(stacked(of_kind))
         shares = [1.6] * len(sides) + [1.0]
         sides.append(stacked(loupes(result, capture)))
         name = capture.rsplit("/", 1)[-1]

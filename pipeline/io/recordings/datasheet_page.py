@@ -28,8 +28,8 @@ def sheet_markdown(datasheet: Datasheet, first: Sequence[str]) -> str:
     """
     lines = [f"# {plain(datasheet.motor_id)}: {datasheet.status}", ""]
     lines += [f"- {plain(reason)}" for reason in datasheet.why]
-    own = [name for name in first if name in datasheet.constants]
-    lines += _constants_and_checks(datasheet, own, "Key constants")
+    names = [name for name in first if name in datasheet.constants]
+    lines += _constants_and_checks(datasheet, names, "Key constants")
     return "\n".join([*lines, "", f"version {datasheet.version}", ""])
 
 
@@ -46,19 +46,19 @@ def capture_markdown(datasheet: Datasheet, path: str) -> str:
         Constants that rest on this capture come first.
 
     """
-    own = [
+    names = [
         name for name in sorted(datasheet.constants) if path in datasheet.constants[name].captures
     ]
     lines = [f"# {plain(datasheet.motor_id)}"]
-    lines += _constants_and_checks(datasheet, own, "Constants from this capture")
+    lines += _constants_and_checks(datasheet, names, "Constants from this capture")
     return "\n".join([*lines, "", "Its status is in the recording of the motor.", ""])
 
 
-def _constants_and_checks(datasheet: Datasheet, own: Sequence[str], heading: str) -> list[str]:
-    rest = [name for name in sorted(datasheet.constants) if name not in own]
-    lines = ["", f"## {heading}", "", *_table(datasheet, own)] if own else []
-    if rest:
-        lines += ["", "## Other constants", "", *_table(datasheet, rest)]
+def _constants_and_checks(datasheet: Datasheet, leading: Sequence[str], heading: str) -> list[str]:
+    further = [name for name in sorted(datasheet.constants) if name not in leading]
+    lines = ["", f"## {heading}", "", *_table(datasheet, leading)] if leading else []
+    if further:
+        lines += ["", "## Other constants", "", *_table(datasheet, further)]
     return [*lines, "", "## Checks", "", *_checks(datasheet)]
 
 

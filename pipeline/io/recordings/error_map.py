@@ -83,8 +83,8 @@ def map_picture(error_map: ErrorMap, reach: float) -> Image:
     cells = np.kron(diverging(share), np.ones((CELL, CELL, 1), dtype=np.uint8))
     down, across = np.indices((height, width)) // (CELL // 2)
     hatch = np.array(_HATCH, dtype=np.uint8)[(down + across) % 2]
-    seen = np.kron(known, np.ones((CELL, CELL), dtype=bool))
-    return np.where(seen[..., None], cells, hatch)
+    known_pixels = np.kron(known, np.ones((CELL, CELL), dtype=bool))
+    return np.where(known_pixels[..., None], cells, hatch)
 
 
 def bar_picture(rows: int) -> Image:

@@ -75,10 +75,10 @@ def motor_layout(signals: Sequence[str], captures: int) -> Blueprint:
         name="Constants",
         query=rrb.archetypes.DataframeQuery(timeline=ROW),
     )
-    left = rrb.Tabs(
+    tabs = rrb.Tabs(
         page_view("/sheet", "Datasheet"), page_view("/checks", "Checks"), table, active_tab=0
     )
-    motor = rrb.Horizontal(left, right, column_shares=[1.0, 1.6], name="Motor")
+    motor = rrb.Horizontal(tabs, right, column_shares=[1.0, 1.6], name="Motor")
     return workspace(motor, timeline=CAPTURE)
 
 

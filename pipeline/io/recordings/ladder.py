@@ -85,16 +85,16 @@ def ladder_bytes(result: Diagnosis) -> bytes:
     """
     identity = canonical_json(result.document()).decode()
     name = f"{result.motor_id} ladder"
-    with recording(name, (identity,), ladder_layout(result)) as made:
-        _send_sheets(made.stream, result)
+    with recording(name, (identity,), ladder_layout(result)) as recorded:
+        _send_sheets(recorded.stream, result)
         for signal in mapped_signals(result):
-            _send_errors(made.stream, result, signal)
-            _send_maps(made.stream, result, signal)
-            _send_angle_ends(made.stream, result, signal)
-            _send_spread(made.stream, result, signal)
+            _send_errors(recorded.stream, result, signal)
+            _send_maps(recorded.stream, result, signal)
+            _send_angle_ends(recorded.stream, result, signal)
+            _send_spread(recorded.stream, result, signal)
         stated = {"motor_id": result.motor_id, "model": result.model, "verdict": result.verdict}
-        send_property(made.stream, "diagnosis", stated)
-    return made.content
+        send_property(recorded.stream, "diagnosis", stated)
+    return recorded.content
 
 
 def _send(stream: RecordingStream, entity: str, steps: Sequence[int], columns: Any) -> None:

@@ -119,15 +119,15 @@ def lots_bytes(result: LotRegression) -> bytes:
     """
     identity = canonical_json(result.document()).decode()
     name = f"{result.baseline.selector} → {result.candidate.selector}"
-    with recording(name, (identity,), lots_layout(result)) as made:
-        send_page(made.stream, "/verdict", verdict_markdown(result))
+    with recording(name, (identity,), lots_layout(result)) as recorded:
+        send_page(recorded.stream, "/verdict", verdict_markdown(result))
         for one in compared(result):
-            _send_histograms(made.stream, one)
-            _send_drift(made.stream, one)
+            _send_histograms(recorded.stream, one)
+            _send_drift(recorded.stream, one)
         for band in result.cogging:
-            send_trace(made.stream, band_trace(band))
-        _send_orders(made.stream, result)
-        _send_motors(made.stream, result)
+            send_trace(recorded.stream, band_trace(band))
+        _send_orders(recorded.stream, result)
+        _send_motors(recorded.stream, result)
         stated = {
             "verdict": result.verdict,
             "headline": result.headline,
@@ -135,8 +135,8 @@ def lots_bytes(result: LotRegression) -> bytes:
             "candidate": result.candidate.selector,
             "lots": [*result.baseline.lots, *result.candidate.lots],
         }
-        send_property(made.stream, "regression", stated)
-    return made.content
+        send_property(recorded.stream, "regression", stated)
+    return recorded.content
 
 
 def _send_histograms(stream: RecordingStream, constant: ConstantResult) -> None:
@@ -157,11 +157,11 @@ def _send_drift(stream: RecordingStream, constant: ConstantResult) -> None:
 def _send_orders(stream: RecordingStream, result: LotRegression) -> None:
     width = max([0.4, *(level.order / 60.0 for level in result.orders)])
     for side, shift in zip(SIDES, (-width, 0.0), strict=True):
-        own = [level for level in result.orders if level.side == side]
-        if own:
-            values = 1e3 * np.array([level.mean for level in own])
-            left = np.array([float(level.order) for level in own]) + shift
-            send_bars(stream, f"/orders/{side}", values, left, width, COLOURS[side])
+        of_side = [level for level in result.orders if level.side == side]
+        if of_side:
+            values = 1e3 * np.array([level.mean for level in of_side])
+            edges = np.array([float(level.order) for level in of_side]) + shift
+            send_bars(stream, f"/orders/{side}", values, edges, width, COLOURS[side])
 
 
 def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
@@ -344,12 +344,12 @@ def cogging_plan(result: LotRegression) -> ViewPlan | None:
 def _verdict_tab(result: LotRegression, shown: Sequence[ConstantResult]) -> Any:
     import rerun.blueprint as rrb
 
-    left: list[Any] = [page_view("/verdict", "Verdict")]
+    pages: list[Any] = [page_view("/verdict", "Verdict")]
     shares = [1.4]
     if shown:
         order = [MOTORS, *(f"{MOTORS}/{one.name}" for one in shown)]
         query = rrb.archetypes.DataframeQuery(timeline=PLACE, entity_order=order)
-        left.append(rrb.DataframeView(origin=MOTORS, name="Motors", query=query))
+        pages.append(rrb.DataframeView(origin=MOTORS, name="Motors", query=query))
         shares.append(1.0)
     right: list[Any] = []
     if shown:
@@ -365,6 +365,6 @@ def _verdict_tab(result: LotRegression, shown: Sequence[ConstantResult]) -> Any:
         lower.append(bar_view(orders, *(f"/orders/{side}" for side in sides), legend=True))
     if lower:
         right.append(rrb.Horizontal(*lower, column_shares=[1.8, 1.0][: len(lower)]))
-    columns = [rrb.Vertical(*left, row_shares=shares)]
+    columns = [rrb.Vertical(*pages, row_shares=shares)]
     columns += [rrb.Vertical(*right)] if right else []
     return rrb.Horizontal(*columns, column_shares=[1.0, 1.5][: len(columns)], name="1 · Lots")

@@ -96,19 +96,19 @@ def motor_bytes(
         (),
         motor_layout(signals_of(strips), len({strip.capture for strip in strips})),
         (APPLICATION, segment_id(datasheet)),
-    ) as made:
+    ) as recorded:
         send_page(
-            made.stream,
+            recorded.stream,
             "/sheet",
             sheet_markdown(datasheet, KEY_CONSTANTS),
         )
-        send_page(made.stream, "/checks", checks_markdown(datasheet))
-        _send_constants(made.stream, datasheet)
-        _send_overview(made.stream, strips, refused=datasheet.status == "refused")
-        _send_cogging(made.stream, evidence)
-        _send_findings(made.stream, strips, findings)
-        _send_properties(made.stream, datasheet, strips)
-    return made.content
+        send_page(recorded.stream, "/checks", checks_markdown(datasheet))
+        _send_constants(recorded.stream, datasheet)
+        _send_overview(recorded.stream, strips, refused=datasheet.status == "refused")
+        _send_cogging(recorded.stream, evidence)
+        _send_findings(recorded.stream, strips, findings)
+        _send_properties(recorded.stream, datasheet, strips)
+    return recorded.content
 
 
 def segment_id(datasheet: Datasheet) -> str:
@@ -143,19 +143,19 @@ def overview(campaign: Campaign, evidence: Sequence[Evidence]) -> Iterator[Strip
     fits = [(c.path, first_of_each(own_evidence(c, evidence))) for c in campaign.captures]
     drawn = [(number, *one) for number, one in enumerate(one for one in fits if one[1])]
     reach: dict[str, float] = {}
-    for _, _, own in drawn:
-        for one in own:
-            here = signal_floor(one.series[0].measured) / FULL_COLOUR_SHARE
-            reach[one.y_name] = max(here, reach.get(one.y_name, 0.0))
-    for number, path, own in drawn:
-        for one in own:
+    for _, _, fits_of_path in drawn:
+        for one in fits_of_path:
+            floor_percent = signal_floor(one.series[0].measured) / FULL_COLOUR_SHARE
+            reach[one.y_name] = max(floor_percent, reach.get(one.y_name, 0.0))
+    for number, path, fits_of_path in drawn:
+        for one in fits_of_path:
             series = one.series[0]
             percent = 100.0 * (series.measured - series.fitted) / reach[one.y_name]
-            kept = line_points(percent, POINTS_A_SERIES)
+            rows = line_points(percent, POINTS_A_SERIES)
             span = float(series.x[-1] - series.x[0]) or 1.0
-            share = (series.x[kept] - series.x[0]) / span
+            share = (series.x[rows] - series.x[0]) / span
             places = np.rint((number + share * 0.98) * STEPS_A_CAPTURE).astype(np.int64)
-            yield Strip(path, one.y_name, *_ended(places, percent[kept]))
+            yield Strip(path, one.y_name, *_ended(places, percent[rows]))
 
 
 def _ended(places: NDArray[np.int64], values: Array) -> tuple[NDArray[np.int64], Array]:
@@ -193,8 +193,8 @@ def _send_constants(stream: RecordingStream, datasheet: Datasheet) -> None:
     }
     frame = pl.DataFrame({k: [drawable(t) for t in v] for k, v in texts.items()})
     index = pl.Series(ROW, np.arange(len(estimates), dtype=np.int64))
-    whole = pl.concat([frame, numbers], how="horizontal").insert_column(0, index)
-    send_trace(stream, Trace("/constants", ROW, whole))
+    table = pl.concat([frame, numbers], how="horizontal").insert_column(0, index)
+    send_trace(stream, Trace("/constants", ROW, table))
 
 
 def _send_overview(stream: RecordingStream, strips: Sequence[Strip], *, refused: bool) -> None:
@@ -205,8 +205,8 @@ def _send_overview(stream: RecordingStream, strips: Sequence[Strip], *, refused:
     for strip in strips:
         frame = pl.DataFrame({"percent": strip.percent.astype(np.float32)})
         index = pl.Series(CAPTURE, strip.places)
-        whole = Trace(f"/overview/{strip.signal}", CAPTURE, frame.insert_column(0, index))
-        send_trace(stream, whole)
+        trace = Trace(f"/overview/{strip.signal}", CAPTURE, frame.insert_column(0, index))
+        send_trace(stream, trace)
     if not strips:
         return
     places = np.concatenate([strip.places for strip in strips])
@@ -237,21 +237,21 @@ def _send_cogging(stream: RecordingStream, evidence: Sequence[Evidence]) -> None
     """Torque over one turn, both directions averaged so that friction drops out; its orders."""
     from pipeline.io.recordings.views import MODEL, RESIDUAL
 
-    own = [one for one in evidence if one.estimator == "cogging"]
-    for one in own:
+    of_cogging = [one for one in evidence if one.estimator == "cogging"]
+    for one in of_cogging:
         if one.kind == "bars":
             series = one.series[0]
             low = series.x <= HIGHEST_ORDER
             if low.any():
-                values, left = 1e3 * series.measured[low], series.x[low] - 0.4
-                send_bars(stream, "/cogging/orders", values, left, 0.8, MODEL)
+                values, edges = 1e3 * series.measured[low], series.x[low] - 0.4
+                send_bars(stream, "/cogging/orders", values, edges, 0.8, MODEL)
         else:
-            wave, left = _wave(one)
+            wave, edges = _wave(one)
             width = 360.0 / WAVE_CELLS
-            send_bars(stream, "/cogging/wave", wave, left, width, RESIDUAL)
+            send_bars(stream, "/cogging/wave", wave, edges, width, RESIDUAL)
             order = 1 + int(np.argmax(np.abs(np.fft.rfft(wave))[1:]))
-            few = max(WAVE_CELLS * PREVIEW_PERIODS // order, 2)
-            send_bars(stream, "/preview/cogging", wave[:few], left[:few], width, RESIDUAL)
+            cells = max(WAVE_CELLS * PREVIEW_PERIODS // order, 2)
+            send_bars(stream, "/preview/cogging", wave[:cells], edges[:cells], width, RESIDUAL)
 
 
 def _wave(evidence: Evidence) -> tuple[Array, Array]:
@@ -259,9 +259,9 @@ def _wave(evidence: Evidence) -> tuple[Array, Array]:
     turn = 2.0 * np.pi
     total = np.zeros(WAVE_CELLS)
     for series in evidence.series:
-        fine = np.isfinite(series.measured)
-        place = (np.mod(series.x[fine], turn) / turn * WAVE_CELLS).astype(int) % WAVE_CELLS
-        values = series.measured[fine] - series.measured[fine].mean()
+        finite = np.isfinite(series.measured)
+        place = (np.mod(series.x[finite], turn) / turn * WAVE_CELLS).astype(int) % WAVE_CELLS
+        values = series.measured[finite] - series.measured[finite].mean()
         count = np.bincount(place, minlength=WAVE_CELLS)
         total += np.bincount(place, values, WAVE_CELLS) / np.maximum(count, 1)
     mean = 1e3 * total / len(evidence.series)

@@ -96,16 +96,16 @@ def recording(
 
     rr.set_strict_mode(True)
     shown = drawable(name)
-    home, own = ids or (application(shown), digest(identity))
-    stream = rr.RecordingStream(home, recording_id=own, send_properties=False)
+    home, recording_id = ids or (application(shown), digest(identity))
+    stream = rr.RecordingStream(home, recording_id=recording_id, send_properties=False)
     with _kept_in_memory(stream) as finished:
         if layout is not None:
             stream.send_blueprint(layout, make_active=True, make_default=True)
         stream.send_recording_name(shown)
-        made = Recording(stream)
-        yield made
+        recorded = Recording(stream)
+        yield recorded
         stream.flush(timeout_sec=FLUSH_S)
-        made.content = finished()
+        recorded.content = finished()
 
 
 @contextmanager
@@ -148,8 +148,8 @@ def application(name: str) -> str:
         two names could become one; such a name gets a digest.
 
     """
-    kept = "".join(c if c.isascii() and (c.isalnum() or c in " -_") else "-" for c in name)
-    return kept if kept == name else f"{kept} {digest((name,))[:6]}"
+    readable = "".join(c if c.isascii() and (c.isalnum() or c in " -_") else "-" for c in name)
+    return readable if readable == name else f"{readable} {digest((name,))[:6]}"
 
 
 def digest(parts: Sequence[str]) -> str:
@@ -179,8 +179,8 @@ def timed(entity: str, t_s: Array, values: pl.DataFrame) -> Trace:
     """
     finite = np.isfinite(t_s)
     index = pl.Series(TIME, nanoseconds(t_s[finite])).cast(pl.Duration("ns"))
-    kept = values if finite.all() else values.filter(pl.Series(finite))
-    return Trace(entity, TIME, kept.insert_column(0, index))
+    finite_values = values if finite.all() else values.filter(pl.Series(finite))
+    return Trace(entity, TIME, finite_values.insert_column(0, index))
 
 
 def nanoseconds(t_s: Array) -> NDArray[np.int64]:

@@ -191,8 +191,8 @@ def _each(work: Callable[[Key], None], keys: Iterable[Key]) -> None:
     Raises what the first that failed raised, when the others have ended.
     """
     with ThreadPoolExecutor(AT_ONCE) as threads:
-        for done in [threads.submit(work, key) for key in keys]:
-            done.result()
+        for future in [threads.submit(work, key) for key in keys]:
+            future.result()
 
 
 def place_of(key: Key) -> str:

@@ -50,13 +50,13 @@ class StandIn:
     @property
     def place(self) -> str:
         """The plain folder, with every data file that the true one holds by now."""
-        plain, true = Path(self._temporary.name), self._folder.resolve()
-        if (true / LOG).is_dir() and not (plain / LOG).is_symlink():
-            (plain / LOG).symlink_to(true / LOG)
+        temporary, true = Path(self._temporary.name), self._folder.resolve()
+        if (true / LOG).is_dir() and not (temporary / LOG).is_symlink():
+            (temporary / LOG).symlink_to(true / LOG)
         for path in true.iterdir() if true.is_dir() else ():
-            if path.suffix == ".parquet" and not (plain / path.name).is_symlink():
-                (plain / path.name).symlink_to(path)
-        return str(plain)
+            if path.suffix == ".parquet" and not (temporary / path.name).is_symlink():
+                (temporary / path.name).symlink_to(path)
+        return str(temporary)
 
     def create(self) -> str:
         """The place of a table that is to be made there."""

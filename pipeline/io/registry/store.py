@@ -135,17 +135,17 @@ class Registry:
     ) -> Receipt:
         registered = {e.key: e for e in reversed(before) if e.kind == "publish"}
         known, conflicts = [], []
-        whole = {event.key for event in added}
+        settled = {event.key for event in added}
         for key in sheets.keys() - {event.key for event in added}:
             event = registered[key]
             if event.content_sha256 == sheets[key].sha256:
-                whole.add(key)
+                settled.add(key)
                 known.append(event)
             else:
                 self._exports.discard(key)
                 conflicts.append(event)
         self._exports.settle_all(
-            {key: sheet.content for key, sheet in sheets.items() if key in whole}
+            {key: sheet.content for key, sheet in sheets.items() if key in settled}
         )
         order = sorted(known, key=lambda e: e.sequence), sorted(conflicts, key=lambda e: e.sequence)
         return Receipt(tuple(added), tuple(order[0]), tuple(order[1]))
@@ -235,14 +235,18 @@ class Registry:
             How many versions were changed.
 
         """
-        wanted = {version.key: version.revision for version in versions}
+        revisions = {version.key: version.revision for version in versions}
 
         def append(events: Sequence[Event]) -> list[Row]:
-            there = {v.key: v.tags for own in histories(events).values() for v in own}
+            tags_of = {
+                v.key: v.tags
+                for versions_of_key in histories(events).values()
+                for v in versions_of_key
+            }
             number, chain = (events[-1].sequence, events[-1].chain) if events else (0, START)
             rows: list[Row] = []
-            for key, revision in wanted.items():
-                if (name in there[key]) == (kind == "tag"):
+            for key, revision in revisions.items():
+                if (name in tags_of[key]) == (kind == "tag"):
                     continue
                 number += 1
                 event = Event(number, _utc(now), kind, *key, revision, by=by, why=name)
@@ -284,7 +288,9 @@ class Registry:
     def revocations(self) -> Mapping[str, tuple[Revocation, ...]]:
         """The versions that are revoked now, by motor; none where there is no registry yet."""
         motors = histories(self._table.events() or ())
-        by_motor = {m: tuple(r for v in own if (r := v.revocation)) for m, own in motors.items()}
+        by_motor = {
+            m: tuple(r for v in history if (r := v.revocation)) for m, history in motors.items()
+        }
         return {motor_id: revoked for motor_id, revoked in by_motor.items() if revoked}
 
     def last_commit(self) -> int | None:
@@ -371,22 +377,22 @@ class Registry:
             raise
         except PipelineError as error:
             return Verification(0, 0, (*gaps, error.message), ())
-        lost, notes = self._file_faults(published)
+        file_faults, notes = self._file_faults(published)
         unique = len({event.key for event in published})
         decisions = len(events) - len(published)
-        return Verification(unique, decisions, (*faults_found, *lost), tuple(notes))
+        return Verification(unique, decisions, (*faults_found, *file_faults), tuple(notes))
 
     def _content_faults(self, published: Sequence[Event]) -> Iterable[str]:
         rows = {event.sequence: event for event in published}
-        left = set(rows)
+        unread = set(rows)
         for number, text in self._table.contents(list(rows)):
-            left.discard(number)
+            unread.discard(number)
             event = rows[number]
             if _digest(text.encode()) != event.content_sha256:
                 yield f"row {number} ({event.motor_id!r}): its datasheet is not what was published"
             elif not _agrees(event, text):
                 yield f"row {number} ({event.motor_id!r}): says other than its datasheet"
-        yield from (f"row {number}: its datasheet is missing" for number in sorted(left))
+        yield from (f"row {number}: its datasheet is missing" for number in sorted(unread))
 
     def _file_faults(self, published: Sequence[Event]) -> tuple[list[str], list[str]]:
         sentences, notes = [], []
@@ -399,11 +405,11 @@ class Registry:
                 sentences.append(f"{place}: the file is missing; publishing the version writes it")
             elif _digest(content) != sha256:
                 sentences.append(f"{place}: the file is not what was published")
-        if left := self._exports.pending():
-            notes.append(f"{left} pending files of writers that were interrupted or still write")
+        if pending := self._exports.pending():
+            notes.append(f"{pending} pending files of writers that were interrupted or still write")
         rows = {place_of(event.key) for event in published}
-        lost = (name for name in self._exports.names() if name not in rows)
-        sentences += [f"{name}: the file has no row; the table lost it" for name in lost]
+        unlisted = (name for name in self._exports.names() if name not in rows)
+        sentences += [f"{name}: the file has no row; the table lost it" for name in unlisted]
         return sorted(sentences), sorted(notes)
 
     def _missing(self) -> UsageError:
@@ -513,14 +519,14 @@ def _agrees(event: Event, text: str) -> bool:
     """Whether a row says what its datasheet says."""
     try:
         document = json.loads(text)
-        wanted = {
+        expected = {
             "motor_id": document["motor_id"],
             "version": document["version"],
             **_event_fields(document),
         }
     except (ValueError, LookupError, TypeError):
         return False
-    return all(getattr(event, name) == value for name, value in wanted.items())
+    return all(getattr(event, name) == value for name, value in expected.items())
 
 
 def _utc(moment: datetime) -> datetime:

@@ -133,13 +133,13 @@ class EventTable:
             if table is None:
                 return
             for start in range(0, len(sequences), batch):
-                wanted = sequences[start : start + batch]
-                numbers = ", ".join(str(int(number)) for number in wanted)
+                batch_of_sequences = sequences[start : start + batch]
+                numbers = ", ".join(str(int(number)) for number in batch_of_sequences)
                 rows = _rows(table, ("sequence", "content"), f"sequence IN ({numbers})")
                 contents_by_row: dict[int, str] = dict(rows.iter_rows())
                 yield from (
                     (number, contents_by_row[number])
-                    for number in wanted
+                    for number in batch_of_sequences
                     if number in contents_by_row
                 )
 
@@ -198,8 +198,8 @@ class EventTable:
 
     def missing_commits(self) -> list[int]:
         """Numbers of the commits that are missing from the log before the last one (disk only)."""
-        there = self._commits()
-        return sorted(set(range(max(there, default=0))) - there)
+        present = self._commits()
+        return sorted(set(range(max(present, default=0))) - present)
 
     def last_commit(self) -> int | None:
         """The number of the last commit; None where no log is to be seen on a disk."""

@@ -91,13 +91,13 @@ class Code:
             Dotted names.
 
         """
-        left, modules_used = list(modules), set[str]()
-        while left:
-            module = left.pop()
+        queue, modules_used = list(modules), set[str]()
+        while queue:
+            module = queue.pop()
             if module not in modules_used:
                 modules_used.add(module)
-                left += [target for _, _, target in self._targets(module)]
-                left += [*self._found_by(module), *self._above(module)]
+                queue += [target for _, _, target in self._targets(module)]
+                queue += [*self._found_by(module), *self._above(module)]
         return frozenset(modules_used)
 
     def libraries(self, *modules: str) -> tuple[str, ...]:
@@ -116,18 +116,18 @@ class Code:
         known = self._digests.get(module)
         if known is not None:
             return known
-        content, own = self._source(module)
+        content, syntax_of_module = self._source(module)
         # stands in where a circle of imports comes back to it
-        self._digests[module] = own.digest
-        taken = {
+        self._digests[module] = syntax_of_module.digest
+        digests = {
             (bound, name, self._digest(target)) for bound, name, target in self._targets(module)
         }
         plug_ins = {self._digest(plug_in) for plug_in in self._found_by(module)}
         above = {self._digest(package) for package in self._above(module)}
         digest = _sha256(
             [
-                own.digest,
-                sorted(taken),
+                syntax_of_module.digest,
+                sorted(digests),
                 sorted(plug_ins),
                 sorted(above),
                 self._texts(module),
@@ -221,8 +221,8 @@ class Code:
     def _keep(self) -> None:
         """Keeps what sources say for the next start; without a place it is found out again."""
         if self._notes is not None and self._new:
-            kept = [*self._kept.items(), *self._new.items()][-MOST_KEPT:]
-            keep_checksummed(self._notes, {"form": _form(), "syntax": dict(kept)})
+            records = [*self._kept.items(), *self._new.items()][-MOST_KEPT:]
+            keep_checksummed(self._notes, {"form": _form(), "syntax": dict(records)})
         self._kept |= self._new
         self._new = {}
 
@@ -255,10 +255,10 @@ class Code:
 
 def _kept(notes: Path | None) -> dict[str, Any]:
     """What is known of sources by the sha256 of their bytes."""
-    kept = None if notes is None else read_checksummed(notes)
-    if not isinstance(kept, dict) or kept.get("form") != _form():
+    content = None if notes is None else read_checksummed(notes)
+    if not isinstance(content, dict) or content.get("form") != _form():
         return {}
-    return dict(kept["syntax"])
+    return dict(content["syntax"])
 
 
 @cache
@@ -337,11 +337,15 @@ def _own(*modules: str) -> list[str]:
 
 def _versions(names: Iterable[str]) -> list[str]:
     """`name version` of distributions, and of those that are named after them (`polars-...`)."""
-    there = installed()
+    installed_versions = installed()
     versions = []
     for name in sorted({_plain(name) for name in names}):
-        own = [n for n in there if n == name or n.startswith(f"{name}-")]
-        versions += [f"{n} {there[n]}" for n in sorted(own)] if name in there else [f"{name} -"]
+        of_distribution = [n for n in installed_versions if n == name or n.startswith(f"{name}-")]
+        versions += (
+            [f"{n} {installed_versions[n]}" for n in sorted(of_distribution)]
+            if name in installed_versions
+            else [f"{name} -"]
+        )
     return versions
 
 

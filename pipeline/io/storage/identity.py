@@ -139,9 +139,9 @@ class Identities:
             return
         now = time.time_ns()
         files = {
-            file: [list(seen), sha256]
-            for file, (seen, sha256) in self._known.items()
-            if now - max(seen[3], seen[4]) > _instant_ns(seen)
+            file: [list(identity), sha256]
+            for file, (identity, sha256) in self._known.items()
+            if now - max(identity[3], identity[4]) > _instant_ns(identity)
         }
         keep_checksummed(self._path, {"files": files})
         _prune(self._path.parent)

@@ -60,22 +60,22 @@ def syntax_of(content: bytes, package: str) -> Syntax:
 
     """
     tree = ast.parse(content)
-    own: list[Import] = []
+    imports: list[Import] = []
     tops: set[str] = set()
     for node in _walk(tree):
         for imported in _imports(node):
             top = imported.home.split(".")[0]
             if imported.level or top == package:
-                own.append(imported)
+                imports.append(imported)
             else:
                 tops.add(top)
         if (text := _place(node, package)) is not None:
-            own.append(Import(0, text, "", BY_TEXT))
+            imports.append(Import(0, text, "", BY_TEXT))
     parts: list[str] = []
     _append_text(tree, package, parts)
     return Syntax(
         hashlib.sha256("\0".join(parts).encode("utf-8", "surrogatepass")).hexdigest(),
-        tuple(dict.fromkeys(own)),
+        tuple(dict.fromkeys(imports)),
         tuple(sorted(tops - sys.stdlib_module_names)),
     )
 

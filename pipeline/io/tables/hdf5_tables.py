@@ -93,8 +93,8 @@ def _datasets(h5py: Any, file: Any) -> dict[str, Any]:
 def _vectors(path: str, one: Any) -> dict[str, np.ndarray]:
     """The numeric vectors of a dataset by name; empty for texts, references and whole tables."""
     if one.dtype.names is not None:
-        kept = [n for n in one.dtype.names if np.issubdtype(one.dtype[n], np.number)]
-        return {f"{path}/{name}": np.ravel(one[name]) for name in kept}
+        numeric = [n for n in one.dtype.names if np.issubdtype(one.dtype[n], np.number)]
+        return {f"{path}/{name}": np.ravel(one[name]) for name in numeric}
     vector = one.ndim > 0 and max(one.shape, default=0) == one.size > 0
     if not vector or not np.issubdtype(one.dtype, np.number):
         return {}
