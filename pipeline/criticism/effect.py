@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from pipeline.criticism.policy.policy import DEFAULT, Policy
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Made = TypeVar("Made")
 
 SCALES = ("current_a", "voltage_v", "speed_rad_s", "freq_hz", "torque_nm", "period_s", "flux_wb")
 """What `Machine.scales` holds, and a parameter's `scale` may name."""
@@ -326,7 +327,7 @@ class Operating(Samples):
         same = columns.keys() >= _MOTION and self.ts_s == other.ts_s
         return replace(self, **columns, kept=dict(other.kept)) if same else self
 
-    def once(self, column: Any, name: Hashable, make: Callable[[], Any]) -> Any:
+    def once(self, column: Any, name: Hashable, make: Callable[[], Made]) -> Made:
         """What depends on one array alone, computed once for all copies of the state that share the
         array.
 
@@ -341,7 +342,7 @@ class Operating(Samples):
 
         Returns
         -------
-        object
+        Made
             The result of `make`, of this call or an earlier one.
 
         """
@@ -349,7 +350,8 @@ class Operating(Samples):
         if known is None:
             # the column is kept with it, so that nothing else takes its identity
             known = self.kept[id(column), name] = column, make()
-        return known[1]
+        result: Made = known[1]
+        return result
 
     def waves(self, order: int) -> tuple[Any, Any]:
         """Cosine and sine of a multiple of the electrical angle, computed once an angle.
@@ -396,8 +398,8 @@ class Operating(Samples):
         power = 1 if finer else 2
         if self.shaft.held or not (self.inverter or finer) or angle.size < _NEIGHBOURS:
             return np.cos(angle), np.sin(angle)
-        seen = np.sinc(np.gradient(angle) / (2.0 * math.pi)) ** power
-        return seen * np.cos(angle), seen * np.sin(angle)
+        share = np.sinc(np.gradient(angle) / (2.0 * math.pi)) ** power
+        return share * np.cos(angle), share * np.sin(angle)
 
     def one_sample(self) -> Operating:
         """The first sample alone [1]."""
@@ -435,8 +437,12 @@ class Operating(Samples):
     def i_a(self) -> Complex:
         """Complex rotor-frame current d + jq [A]."""
         name = ("current", id(self.iq_a))
-        _, current = self.once(self.id_a, name, lambda: (self.iq_a, self.id_a + 1j * self.iq_a))
+        _, current = self.once(self.id_a, name, self._current)
         return current
+
+    def _current(self) -> tuple[Array, Complex]:
+        """The complex current, with the q current that keeps its identity."""
+        return self.iq_a, self.id_a + 1j * self.iq_a
 
     @property
     def flux_wb(self) -> Complex:
@@ -568,11 +574,11 @@ def between(signal: Any, at: Array) -> Any:
     place = np.clip(at, 0.0, signal.size - 1.0)
     first = np.minimum(place.astype(np.int64), max(signal.size - 2, 0))
     part = place - first
-    near = [signal[np.clip(first + k, 0, signal.size - 1)] for k in (-1, 0, 1, 2)]
-    before, here, there, after = near
-    bend = 2.0 * before - 5.0 * here + 4.0 * there - after
-    twist = 3.0 * (here - there) + after - before
-    return here + 0.5 * part * (there - before + part * (bend + part * twist))
+    points = [signal[np.clip(first + k, 0, signal.size - 1)] for k in (-1, 0, 1, 2)]
+    before, left, right, after = points
+    bend = 2.0 * before - 5.0 * left + 4.0 * right - after
+    twist = 3.0 * (left - right) + after - before
+    return left + 0.5 * part * (right - before + part * (bend + part * twist))
 
 
 Values = Mapping[str, float]

@@ -211,7 +211,8 @@ def block_means(values: Array, size: int) -> Array:
 
     """
     blocks = values.shape[0] // size
-    return values[: blocks * size].reshape(blocks, size, *values.shape[1:]).mean(axis=1)
+    means: Array = values[: blocks * size].reshape(blocks, size, *values.shape[1:]).mean(axis=1)
+    return means
 
 
 def decimated(size: int, most: int = 2000) -> slice:

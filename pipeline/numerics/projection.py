@@ -62,7 +62,8 @@ class Projection:
         """
         windows = sliding_window_view(residuals, self.length, axis=1)[:, self.starts, :]
         by_window = np.ascontiguousarray(windows.transpose(1, 2, 0))
-        return np.matmul(self.functions, by_window).transpose(2, 0, 1)
+        projected: Array = np.matmul(self.functions, by_window).transpose(2, 0, 1)
+        return projected
 
     def means(self, signals: Array) -> Array:
         """Means over each window, weighted with the plain window.
@@ -81,7 +82,8 @@ class Projection:
         plain = self.functions[:, :1, :]
         weights = plain / plain.sum(axis=2, keepdims=True)
         windows = sliding_window_view(signals, self.length, axis=1)[:, self.starts, :]
-        return np.matmul(weights, windows.transpose(1, 2, 0))[:, 0, :].T
+        sums: Array = np.matmul(weights, windows.transpose(1, 2, 0))[:, 0, :].T
+        return sums
 
     def only(self, windows: NDArray[np.bool_]) -> Projection:
         """The same test functions over some of the windows.

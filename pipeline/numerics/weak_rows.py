@@ -75,7 +75,8 @@ class WeakRows:
         if self.members.size == 0:
             views = np.lib.stride_tricks.sliding_window_view(signal, kernel.size)[self.starts]
             centred = views - views.mean(axis=1, keepdims=True) if order else views
-            return centred @ kernel
+            sums: Array = centred @ kernel
+            return sums
         part = signal[self.members]
         if order:
             means = _sums(part, self.sizes) / self.sizes
@@ -248,7 +249,8 @@ def _slopes(t_s: Array, y: Array, size: int) -> Array:
     def stretches(values: Array) -> Array:
         whole = np.pad(values, (0, -count % step), mode="edge")
         rows = np.lib.stride_tricks.sliding_window_view(whole, length)[::step]
-        return rows - rows.mean(axis=1, keepdims=True)
+        centred: Array = rows - rows.mean(axis=1, keepdims=True)
+        return centred
 
     def means(values: Array) -> Array:
         running = np.cumsum(np.pad(values, ((0, 0), (1, 0))), axis=1)

@@ -69,7 +69,8 @@ def first_order_lag(signal: Array, step: float) -> Array:
 
     kept = math.exp(-step)
     mean = -math.expm1(-step) / step
-    return lfilter([1.0 - mean, mean - kept], [1.0, -kept], signal - signal[0]) + signal[0]
+    lagged: Array = lfilter([1.0 - mean, mean - kept], [1.0, -kept], signal - signal[0]) + signal[0]
+    return lagged
 
 
 def scope_range(largest: float) -> float:

@@ -99,7 +99,8 @@ def _about_a_line(theta: Array, current: Array) -> Array:
     at = theta - theta.mean()
     power = float(at @ at)
     slope = float(at @ current) / power if power > 0 else 0.0
-    return current - current.mean() - slope * at
+    residual: Array = current - current.mean() - slope * at
+    return residual
 
 
 def _noise(spread: list[Array], means: list[Array], policy: Policy) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.effect import Array, Machine, Made
 from pipeline.numerics.projection import Projection
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.capture import Capture
@@ -178,7 +178,7 @@ class Segment:
         """Samples."""
         return int(next(iter(self.recorded.values())).size)
 
-    def once(self, column: Array, name: Hashable, by: Hashable, make: Callable[[], Any]) -> Any:
+    def once(self, column: Array, name: Hashable, by: Hashable, make: Callable[[], Made]) -> Made:
         """What depends on one recorded column, computed once for all copies of the segment.
 
         Parameters
@@ -195,13 +195,14 @@ class Segment:
 
         Returns
         -------
-        object
+        Made
             The result of `make`, of this call or an earlier one.
 
         """
         known = self.kept.get(name)
         if known is not None and known[0] is column and known[1] == by:
-            return known[2]
+            earlier: Made = known[2]
+            return earlier
         result = make()
         if any(column is one for one in self.recorded.values()):
             self.kept[name] = column, by, result

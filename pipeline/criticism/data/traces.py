@@ -164,7 +164,8 @@ def smoothed(signal: Array, width: int) -> Array:
         [np.full(half, signal[:half].mean()), signal, np.full(half, signal[-half:].mean())]
     )
     total = np.concatenate([[0.0], np.cumsum(padded)])
-    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+    means: Array = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+    return means
 
 
 def decimated(signal: Array, factor: int) -> Array:
@@ -184,7 +185,8 @@ def decimated(signal: Array, factor: int) -> Array:
 
     """
     n = signal.size // factor * factor
-    return signal[:n].reshape(-1, factor).mean(axis=1)
+    means: Array = signal[:n].reshape(-1, factor).mean(axis=1)
+    return means
 
 
 def reversals(theta: Array, slack: float) -> NDArray[np.int64]:

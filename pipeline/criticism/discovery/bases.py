@@ -271,4 +271,5 @@ def _cardinal(knots: Array, at: Array) -> Array:
     from scipy.interpolate import CubicSpline  # slow to import and rarely used
 
     spline = CubicSpline(knots, np.eye(knots.size), bc_type="natural")
-    return spline(np.clip(at, knots[0], knots[-1]))
+    values: Array = spline(np.clip(at, knots[0], knots[-1]))
+    return values

@@ -110,7 +110,8 @@ class Expression:
             return np.zeros(np.shape(v))
         slope = np.stack(rows)
         variance = np.einsum("iv,ij,jv->v", slope, self.covariance, slope)
-        return np.sqrt(np.maximum(variance, 0.0))
+        deviation: Array = np.sqrt(np.maximum(variance, 0.0))
+        return deviation
 
     def u(self, term: int, name: str) -> float:
         """Standard uncertainty of an amplitude or scale of a term.
@@ -233,9 +234,11 @@ class Pursuit:
 
         """
         normal = curves.T @ self.gram @ curves
-        return np.linalg.lstsq(
+        solved = np.linalg.lstsq(
             normal + _RIDGE * np.diag(np.diag(normal)), curves.T @ self.moment, rcond=1e-10
-        )[0]
+        )
+        coefficients: Array = solved[0]
+        return coefficients
 
     def curves(self, terms: Sequence[Term]) -> Array:
         """Terms as coefficients of the hats and waves of the input.
@@ -463,7 +466,10 @@ def _inverse(normal: Array) -> Array:
     if not normal.size:
         return normal
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    return np.linalg.pinv(unit_diagonal(normal), hermitian=True) / np.outer(scale, scale)
+    covariance: Array = np.linalg.pinv(unit_diagonal(normal), hermitian=True) / np.outer(
+        scale, scale
+    )
+    return covariance
 
 
 def curve_about(

@@ -11,7 +11,8 @@ def _current(r: Recorded, q: Values) -> Complex:
     if not r.inverter:
         return r.i_a
     offset = (q["alpha_a"] + 1j * q["beta_a"]) * np.exp(-1j * r.eps_rad)
-    return r.i_a - offset
+    recorded: Complex = r.i_a - offset
+    return recorded
 
 
 EFFECT = Effect(

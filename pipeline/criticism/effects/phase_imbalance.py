@@ -9,7 +9,8 @@ from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Val
 
 def _drop(x: Operating, q: Values) -> Complex:
     gamma = q["cosine"] + 1j * q["sine"]
-    return x.base["r_ohm"] * gamma * np.conj(x.i_a) * np.exp(-2j * x.eps_rad)
+    drop: Complex = x.base["r_ohm"] * gamma * np.conj(x.i_a) * np.exp(-2j * x.eps_rad)
+    return drop
 
 
 EFFECT = Effect(

@@ -16,7 +16,8 @@ def _voltage(v_v: Complex, x: Operating, q: Values, _: str) -> Complex:
     if x.supply.q_alone:
         # what is turned into the q axis cannot be known without the d axis
         return v_v + 1j * q["delay_s"] / x.ts_s * np.gradient(v_v.imag)
-    return v_v * np.exp(1j * turn)
+    turned: Complex = v_v * np.exp(1j * turn)
+    return turned
 
 
 def _speed(omega: Array, q: Values, period: float) -> Array:

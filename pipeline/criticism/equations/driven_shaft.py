@@ -88,7 +88,8 @@ def measured(segment: Segment, signals: Signals, _: Model, values: Values) -> Ar
     """The voltage that drives each sample's motion [1, n], with what the delay is longer."""
     volts = signals[VOLTAGE]
     late = values[LATE_VOLTAGE] / segment.ts_s
-    return between(volts, np.arange(volts.size, dtype=np.float64) - late)[None]
+    shifted: Array = between(volts, np.arange(volts.size, dtype=np.float64) - late)[None]
+    return shifted
 
 
 def predicted(segment: Segment, x: Operating, _: Pieces, model: Model, values: Values) -> Array:

@@ -112,7 +112,8 @@ def _parts(current: Array, policy: Tables) -> NDArray[np.int64] | None:
     if levels.max(initial=0) > 0 or reach == 0.0:
         return None
     place = (current - current.min()) / reach * policy.parts
-    return np.minimum(place.astype(np.int64), policy.parts - 1)
+    parts: NDArray[np.int64] = np.minimum(place.astype(np.int64), policy.parts - 1)
+    return parts
 
 
 def _noise(columns: Signals, reading: float) -> float | None:

@@ -145,7 +145,8 @@ def lost_shares(
         fall = current_a + per_volt * (after - winding * (duty + dead))
         late = _passed(rise + (low - 0.5) * ramp, ramp, width)
         keeps = _passed(fall + (low_after - 0.5) * ramp, ramp, width)
-    return late + keeps - 1.0
+    share: Array = late + keeps - 1.0
+    return share
 
 
 def _beside(volts: Array, loss_v: float, late: Array, side: float) -> tuple[Array, Array]:

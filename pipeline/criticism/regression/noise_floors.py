@@ -408,7 +408,8 @@ def _jumps(segment: Segment, direct: str, quadrature: str, policy: NoiseFloors) 
     bend[1:-1] = np.abs(np.diff(vector, 2)) / math.sqrt(2.0)
     bend[bend < policy.jump * noise] = 0.0
     rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
-    return policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
+    jumps: Array = policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
+    return jumps
 
 
 def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Array:

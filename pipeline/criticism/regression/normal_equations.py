@@ -174,7 +174,8 @@ class NormalEquations:
     def _products(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int64]:
         """Where the products of columns are in `normal`."""
         first, second = np.minimum(rows, columns), np.maximum(rows, columns)
-        return first * (2 * self.slope.shape[1] - first - 1) // 2 + second
+        places: NDArray[np.int64] = first * (2 * self.slope.shape[1] - first - 1) // 2 + second
+        return places
 
     def moved(self, places: NDArray[np.int64], step: Array) -> NormalEquations:
         """The normal equations at the end of a step; the priors stay where they were.
@@ -312,7 +313,8 @@ def pseudo_inverse(normal: Array) -> Array:
     power, axes = np.linalg.eigh(normal / np.outer(size, size))
     good = power > _TIE * max(float(power[-1]), 1.0)
     inverse: Array = (axes[:, good] / power[good]) @ axes[:, good].T
-    return inverse / np.outer(size, size)
+    unscaled: Array = inverse / np.outer(size, size)
+    return unscaled
 
 
 def _solved(normal: Array, slope: Array) -> Array:
@@ -373,4 +375,5 @@ def unit_diagonal(normal: Array) -> Array:
 
     """
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    return normal / np.outer(scale, scale)
+    scaled: Array = normal / np.outer(scale, scale)
+    return scaled

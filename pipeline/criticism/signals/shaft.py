@@ -96,7 +96,8 @@ def _moved_on(segment: Segment, x: Operating, values: Values) -> Complex:
 
     """
     period = segment.ts_s * segment.size / x.theta_rad.size
-    return values["ripple_torque"] * segment.ts_s * central(x.i_a, period)
+    torque: Complex = values["ripple_torque"] * segment.ts_s * central(x.i_a, period)
+    return torque
 
 
 def _torque_of_current(x: Operating, pieces: Pieces, current: Complex) -> Array:

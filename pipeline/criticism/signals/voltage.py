@@ -38,7 +38,8 @@ def rotor_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Comp
 
     """
     slope = central(pieces.psi_wb, period_s)
-    return pieces.drop_v + slope + 1j * omega_e_rad_s * pieces.psi_wb
+    volts: Complex = pieces.drop_v + slope + 1j * omega_e_rad_s * pieces.psi_wb
+    return volts
 
 
 def held_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Complex:
@@ -65,7 +66,8 @@ def held_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Compl
     """
     slope = forward(pieces.psi_wb, period_s)
     psi, drop = ahead(pieces.psi_wb), ahead(pieces.drop_v)
-    return drop + slope + 1j * omega_e_rad_s * psi
+    volts: Complex = drop + slope + 1j * omega_e_rad_s * psi
+    return volts
 
 
 def recorded_voltage(

@@ -189,7 +189,8 @@ def _signal(batch: Batch, signals: Signals, name: str) -> Array:
 
 def _means(error: Array) -> Array:
     window = bump(error.shape[1])
-    return error @ window / window.sum()
+    mean: Array = error @ window / window.sum()
+    return mean
 
 
 @dataclass(frozen=True, slots=True)

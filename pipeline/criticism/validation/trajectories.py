@@ -99,7 +99,8 @@ class Batch:
             Without the surroundings.
 
         """
-        return self.folded(column)[:, self.pad : self.pad + self.length]
+        inside: Array = self.folded(column)[:, self.pad : self.pad + self.length]
+        return inside
 
 
 def batch_of(segment: Segment, model: Model, values: Values) -> Batch | None:
@@ -339,12 +340,14 @@ def _first_speed(batch: Batch, theta: Array) -> Array:
     # the slope of a straight line through the samples around
     offset = np.arange(-half, half + 1)
     around = folded[:, batch.pad - half : batch.pad + half + 1]
-    return around @ offset / float(offset @ offset) / batch.segment.ts_s
+    speed: Array = around @ offset / float(offset @ offset) / batch.segment.ts_s
+    return speed
 
 
 def _central_speed(batch: Batch, theta: Array) -> Array:
     folded = batch.folded(theta)
-    return (folded[:, batch.pad + 1] - folded[:, batch.pad - 1]) / (2 * batch.segment.ts_s)
+    speed: Array = (folded[:, batch.pad + 1] - folded[:, batch.pad - 1]) / (2 * batch.segment.ts_s)
+    return speed
 
 
 def _corrected(

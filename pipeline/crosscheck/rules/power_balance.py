@@ -107,7 +107,8 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> Array:
     rows = np.column_stack([*columns, np.ones(omega.size)])
     size = max(1, rows.shape[0] // BINS)
     usable = rows[: rows.shape[0] // size * size]
-    return usable.reshape(-1, size, rows.shape[1]).mean(axis=1)
+    means: Array = usable.reshape(-1, size, rows.shape[1]).mean(axis=1)
+    return means
 
 
 def _slope(blocks: Array) -> tuple[float, float]:

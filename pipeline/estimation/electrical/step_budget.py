@@ -240,7 +240,8 @@ def _lever(name: str, solution: Solution) -> Array:
     scale[scale == 0.0] = 1.0
     scaled = fit.jacobian / scale
     inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
-    return -(inverse[row] / scale[row]) @ scaled.T
+    weights: Array = -(inverse[row] / scale[row]) @ scaled.T
+    return weights
 
 
 def _place(record: StepRecord) -> tuple[str, float]:

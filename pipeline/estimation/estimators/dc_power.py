@@ -266,7 +266,8 @@ def attenuation(blocks: Blocks, solution: LinearFit, design: Array) -> Array:
     moment[0] = float(np.sum(2.0 * torque * blocks.torque_noise_nm**2 * error))
     size = np.linalg.norm(design, axis=0)
     gram = (design / size).T @ (design / size)
-    return np.linalg.solve(gram, moment / size) / size
+    shift: Array = np.linalg.solve(gram, moment / size) / size
+    return shift
 
 
 def _constants(coefficients: Array) -> Array:

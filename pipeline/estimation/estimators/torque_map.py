@@ -201,7 +201,8 @@ def _regress(points: Sequence[Point], alpha_1_k: float, chosen: Sequence[str]) -
 def _sigma(points: Sequence[Point]) -> Array:
     """Relative weights: the noise of a mean falls with the root of its rows."""
     rows = _column(points, "rows")
-    return np.sqrt(rows.mean() / rows)
+    ratio: Array = np.sqrt(rows.mean() / rows)
+    return ratio
 
 
 def _estimates(

@@ -153,7 +153,8 @@ class DragFit:
         scale = np.sqrt(np.maximum(np.diag(joint), 1e-300))
         correlation = joint / np.outer(scale, scale) + 1e-12 * np.eye(3)
         values, vectors = np.linalg.eigh(correlation)
-        return vectors * np.sqrt(np.maximum(values, 0.0)) * scale[:, None]
+        root: Array = vectors * np.sqrt(np.maximum(values, 0.0)) * scale[:, None]
+        return root
 
     def curve(self, rows: ShaftRows) -> tuple[Array, Array, Array]:
         """Drag over speed, for a plot.
@@ -462,7 +463,8 @@ def _implausible(
 def _drag_part(design: Array, fit: LinearFit, names: Sequence[str]) -> Array:
     """Drag [w] in torque that a fit gives each row: its drag columns over g."""
     places = [k for k, name in enumerate(names) if name in _DRAG_NAMES]
-    return design[:, places] @ fit.coefficients[places] / fit.coefficients[0]
+    drag: Array = design[:, places] @ fit.coefficients[places] / fit.coefficients[0]
+    return drag
 
 
 def _low_end(curve: Array, fastest: float) -> tuple[float, float]:

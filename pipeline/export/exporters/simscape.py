@@ -107,7 +107,8 @@ def _torque(source: Source) -> list[str]:
 def _summed(tables: Sequence[EffectTable], variable: str, grid: np.ndarray) -> list[float]:
     turn = 2.0 * np.pi if variable == "theta_mech_rad" else None
     each = [np.interp(grid, t.axes[variable], t.values, period=turn) for t in tables]
-    return np.sum(each, axis=0).tolist()
+    torques: list[float] = np.sum(each, axis=0).tolist()
+    return torques
 
 
 def _delay(source: Source) -> list[str]:

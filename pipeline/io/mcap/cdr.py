@@ -274,9 +274,8 @@ class _Pass:
 
     def places(self, rows: Integers | None) -> Integers:
         """Byte positions in the buffer of the messages `rows`."""
-        if rows is None:
-            return self.origin + self.at
-        return self.origin[rows] + self.at[rows]
+        at: Integers = self.origin + self.at if rows is None else self.origin[rows] + self.at[rows]
+        return at
 
     def align(self, width: int, rows: Integers | None, only: Any = True) -> None:
         to = min(width, self.align_most)

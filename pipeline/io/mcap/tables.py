@@ -284,7 +284,8 @@ def _place(batch: Batch, names: Leaf, counts: Integers, joint: str | None) -> In
             "check the joint's name with `inspect`",
             (row, row),
         )
-    return place[equal].astype(np.int64)
+    places: Integers = place[equal].astype(np.int64)
+    return places
 
 
 class Column:

@@ -241,7 +241,8 @@ def _descriptor(names: list[str], block: int | None) -> bytes:
     from google.protobuf import descriptor_pb2
 
     files = descriptor_pb2.FileDescriptorSet(file=[_file_descriptor(names, block)])
-    return files.SerializeToString(deterministic=True)
+    content: bytes = files.SerializeToString(deterministic=True)
+    return content
 
 
 def _protobuf(table: Table, block: int | None) -> Payloads:
