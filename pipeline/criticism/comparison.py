@@ -150,16 +150,10 @@ def _before_effects(
     system = linear_system(gauss_newton(base).fit)
     held_out = leave_out(system)
     moved = _moves(reported_parameters(system, held_out), after)
-    without_errors, all_errors = in_common((system, whole), (held_out, full_held_out))
+    smaller, larger = in_common((system, whole), (held_out, full_held_out))
     errors = tuple(_errors(system, held_out))
-    return _BeforeEffects(
-        without_errors.total,
-        all_errors.total,
-        moved,
-        errors,
-        Before(system, held_out),
-        tuple(removed),
-    )
+    fitted = Before(system, held_out)
+    return _BeforeEffects(smaller.total, larger.total, moved, errors, fitted, tuple(removed))
 
 
 def _moves(

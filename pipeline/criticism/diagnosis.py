@@ -224,12 +224,10 @@ def _one_capture_notes(ladder: Ladder) -> Iterator[str]:
     """Notes of the effects that one capture alone supports, of those that others could show."""
     for n in range(1, len(ladder.steps)):
         step = ladder.steps[n]
-        capture = rests_on(
-            (ladder.steps[n - 1].system, step.system), ladder.held_out[n - 1 : n + 1]
-        )
+        path = rests_on((ladder.steps[n - 1].system, step.system), ladder.held_out[n - 1 : n + 1])
         name = step.fit.model.effects[-1].name
-        if capture is not None and name in ladder.steps[-1].added:
-            yield _ALONE.format(name, capture)
+        if path is not None and name in ladder.steps[-1].added:
+            yield _ALONE.format(name, path)
 
 
 def _combination_notes(
@@ -254,14 +252,9 @@ def _as_reported(system: LinearSystem, remainders: Sequence[Remainder]) -> tuple
         for s in system.segments
         for channel in s.channels
     }
-    small = [
-        over_its_floor for over_its_floor in over_floor(system) if over_its_floor not in remainders
-    ]
-    reported = (*remainders, *(replace(remainder, matters=False) for remainder in small))
-    return tuple(
-        replace(remainder, signal=names[remainder.capture, remainder.signal])
-        for remainder in reported
-    )
+    small = [excess for excess in over_floor(system) if excess not in remainders]
+    reported = (*remainders, *(replace(r, matters=False) for r in small))
+    return tuple(replace(r, signal=names[r.capture, r.signal]) for r in reported)
 
 
 def _enough(cut_segments: Sequence[Segment]) -> bool:
@@ -333,12 +326,12 @@ def _ranking(
     """Found effects in the order found, then the others by their score on the last step."""
     last = ladder.steps[-1]
     ranked = [_ranked_added(ladder, last.fit.effect(name), offered, library) for name in last.added]
-    not_added = [
+    others = [
         _ranked_candidate(s) for s in last.scores if s.candidate.effect.name not in last.added
     ]
     reasons = {name: _AGAINST if note else _UNSUPPORTED for name, note in ladder.cut.items()}
-    not_added = [replace(r, shortfall=reasons.get(r.effect, r.shortfall)) for r in not_added]
-    return tuple(ranked + sorted(not_added, key=lambda r: (-r.score, r.effect)))
+    others = [replace(r, shortfall=reasons.get(r.effect, r.shortfall)) for r in others]
+    return tuple(ranked + sorted(others, key=lambda r: (-r.score, r.effect)))
 
 
 def _ranked_added(
@@ -430,8 +423,4 @@ def _parameters(
     step: LadderStep, effect: Effect, held_out: HeldOut
 ) -> dict[str, ReportedParameter]:
     reported, start = parameters_of(step, held_out), f"{effect.name}."
-    return {
-        name.removeprefix(start): parameter
-        for name, parameter in reported.items()
-        if name.startswith(start)
-    }
+    return {name.removeprefix(start): p for name, p in reported.items() if name.startswith(start)}

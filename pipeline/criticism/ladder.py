@@ -67,10 +67,7 @@ def parameters_of(step: LadderStep, held_out: HeldOut) -> dict[str, ReportedPara
     reported = reported_parameters(step.system, held_out)
     parameters = step.fit.model.parameters()
     selected = ((name, reported[name]) for name in parameters)
-    return {
-        name: ReportedParameter(parameter.value, parameter.u, parameter.unit)
-        for name, parameter in selected
-    }
+    return {name: ReportedParameter(p.value, p.u, p.unit) for name, p in selected}
 
 
 def _rms(values: np.ndarray) -> float:

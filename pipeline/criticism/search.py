@@ -285,18 +285,16 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
 
     """
     searched = search(start.system.fit, library)
-    own_rows = [leave_out(step.system) for step in searched]
-    steps, unconfirmed = _confirmed(searched, own_rows)
-    supported, remainders = truncated(
-        steps, in_common([r.system for r in steps], own_rows[: len(steps)])
-    )
-    held_out = in_common([r.system for r in supported], own_rows[: len(supported)])
-    cut = {step.added[-1]: contradiction(step) for step in steps[len(supported) :]}
-    return Ladder(start, supported, list(held_out), remainders, cut | unconfirmed)
+    errors = [leave_out(step.system) for step in searched]
+    steps, unconfirmed = _confirmed(searched, errors)
+    kept, remainders = truncated(steps, in_common([r.system for r in steps], errors[: len(steps)]))
+    held_out = in_common([r.system for r in kept], errors[: len(kept)])
+    cut = {step.added[-1]: contradiction(step) for step in steps[len(kept) :]}
+    return Ladder(start, kept, list(held_out), remainders, cut | unconfirmed)
 
 
 def _confirmed(
-    steps: Sequence[LadderStep], own_rows: Sequence[HeldOut]
+    steps: Sequence[LadderStep], errors: Sequence[HeldOut]
 ) -> tuple[tuple[LadderStep, ...], dict[str, str]]:
     """The steps without trailing ones that one capture alone supports, of which others show that
     it is not there; and a note of each that goes.
@@ -304,7 +302,7 @@ def _confirmed(
     count, notes = len(steps), {}
     while count > 1:
         systems = [step.system for step in steps[count - 2 : count]]
-        held_out = in_common(systems, own_rows[count - 2 : count])
+        held_out = in_common(systems, errors[count - 2 : count])
         capture = rests_on(systems, held_out)
         if capture is None:
             break

@@ -38,9 +38,7 @@ def settling_of(captures: Iterable[Capture], policy: Policy) -> tuple[float, flo
     which from another order of magnitude takes inertia for a delay.
 
     """
-    estimates = [
-        estimate for capture in captures if (estimate := _of_log(capture, policy)) is not None
-    ]
+    estimates = [fit for capture in captures if (fit := _of_log(capture, policy)) is not None]
     return min(estimates)[1:] if estimates else None
 
 

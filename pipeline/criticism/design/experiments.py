@@ -96,14 +96,10 @@ def separations(
             ),
             key=lambda one: (-one[0], one[1]),
         )
-        better = [
-            (power, description)
-            for power, description in ranked
-            if power > base + policy.least_power
-        ][: policy.most_experiments]
-        separations_found += [
-            Separation(other, description, power) for power, description in better
+        better = [(power, label) for power, label in ranked if power > base + policy.least_power][
+            : policy.most_experiments
         ]
+        separations_found += [Separation(other, label, power) for power, label in better]
         if not better:
             separations_found.append(Separation(other, remedy, None))
     return tuple(separations_found)

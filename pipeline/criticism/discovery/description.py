@@ -166,20 +166,18 @@ def turn_angles(orders: Sequence[float]) -> Array:
 
 def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:
     """The smooth curves of a port [K, k] as coefficients of its hats, one block a carrier."""
-    hat_basis, smooth_basis = pursuit.port.basis, smooth.basis
-    if hat_basis is None or smooth_basis is None or not hat_basis.nodes.size:
+    hats, smooth_basis = pursuit.port.basis, smooth.basis
+    if hats is None or smooth_basis is None or not hats.nodes.size:
         return np.eye(pursuit.system.matrix.shape[1] - pursuit.model_size)
-    block = np.zeros((len(hat_basis.names), len(smooth_basis.names)))
+    block = np.zeros((len(hats.names), len(smooth_basis.names)))
     for n in range(len(smooth_basis.names)):
         weights = np.zeros(len(smooth_basis.names))
         weights[n] = 1.0
-        block[: hat_basis.nodes.size, n] = smooth_basis.curve(hat_basis.nodes, weights)
-    for n, order in enumerate(hat_basis.orders):
+        block[: hats.nodes.size, n] = smooth_basis.curve(hats.nodes, weights)
+    for n, order in enumerate(hats.orders):
         first = 2 * smooth_basis.orders.index(order)
         block[:, first : first + 2] = 0.0
-        block[hat_basis.nodes.size + 2 * n, first] = block[
-            hat_basis.nodes.size + 2 * n + 1, first + 1
-        ] = 1.0
+        block[hats.nodes.size + 2 * n, first] = block[hats.nodes.size + 2 * n + 1, first + 1] = 1.0
     return np.asarray(np.kron(np.eye(len(pursuit.port.carriers)), block), dtype=float)
 
 

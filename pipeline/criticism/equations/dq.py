@@ -214,10 +214,8 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     voltage = (held_voltage if is_held else rotor_voltage)(pieces, omega, period)
     edge, shift = values["ripple_edge"], values["ripple_shift"]
     averaged = 1.0 if segment.instrument.timing != "instant" else 0.0
-    shortening = averaged / 24.0 + edge
-    factor = x.once(
-        x.theta_rad, ("shortened", shortening), lambda: _shortened(shortening * turn**2)
-    )
+    share = averaged / 24.0 + edge
+    factor = x.once(x.theta_rad, ("shortened", share), lambda: _shortened(share * turn**2))
     mean: Complex = factor * voltage
     if segment.instrument.frame:
         mean = mean * np.exp(1j * segment.instrument.frame * turn)

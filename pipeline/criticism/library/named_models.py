@@ -41,9 +41,7 @@ def model_of(spec: ModelSpec, machine: Machine) -> Model:
     if spec.name not in MODELS:
         raise UsageError(f"unknown model {spec.name}", f"known are {', '.join(MODELS)}")
     removed = {name[1:] for name in spec.effects if name.startswith("-")}
-    requested = [name for name in spec.effects if not name.startswith("-")]
-    names = [
-        name for name in dict.fromkeys([*MODELS[spec.name], *requested]) if name not in removed
-    ]
+    extra = [name for name in spec.effects if not name.startswith("-")]
+    names = [name for name in dict.fromkeys([*MODELS[spec.name], *extra]) if name not in removed]
     added = tuple(chosen(tuple(names), spec.effects_path).values())
     return Model(replace(machine, policy=policy_of(spec.policy)), added)

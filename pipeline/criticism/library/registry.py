@@ -137,10 +137,8 @@ def chosen(names: tuple[str, ...], effects_path: str | None = None) -> dict[str,
     library = effects(effects_path)
     unknown = [name for name in names if name not in library]
     if unknown:
-        similar = [close for name in unknown for close in get_close_matches(name, library, 1)]
-        hint = (
-            f"did you mean {', '.join(similar)}?" if similar else f"known are {', '.join(library)};"
-        )
+        alike = [close for name in unknown for close in get_close_matches(name, library, 1)]
+        hint = f"did you mean {', '.join(alike)}?" if alike else f"known are {', '.join(library)};"
         remedy = "effects_path=FOLDER holds your own"
         raise UsageError(f"unknown effect {', '.join(unknown)}", f"{hint} {remedy}")
     return {name: library[name] for name in names}

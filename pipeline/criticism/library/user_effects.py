@@ -86,11 +86,9 @@ class Hook:
         if np.isfinite(result).all():
             return
         known = np.logical_and.reduce([np.isfinite(one) for one in inputs if one.shape == shape])
-        infinite = np.broadcast_to(~np.isfinite(result), shape) & known
-        if infinite.any():
-            message = (
-                f"{where} gives no finite number at {np.count_nonzero(infinite)} of {infinite.size}"
-            )
+        gaps = np.broadcast_to(~np.isfinite(result), shape) & known
+        if gaps.any():
+            message = f"{where} gives no finite number at {np.count_nonzero(gaps)} of {gaps.size}"
             raise UsageError(f"{message} samples", "give one for every current, speed and angle")
 
 

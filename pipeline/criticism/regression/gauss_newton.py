@@ -119,7 +119,7 @@ def _damped(system: LinearSystem) -> Best:
     normal_equations = replace(
         system, prior_precision=system.prior_precision + ridge
     ).normal_equations()
-    return lambda live: normal_equations.restricted_to(live).best()
+    return lambda live: normal_equations.only(live).best()
 
 
 def _ridge(fit: Fit, columns: Sequence[Column]) -> Array:

@@ -188,13 +188,11 @@ def in_common(fits: Sequence[LinearSystem], held_out: Sequence[HeldOut]) -> tupl
     that leaves more open: of each row the surest prediction's widening counts in all.
 
     """
-    shared = np.all([np.isfinite(errors.residual) for errors in held_out], axis=0)
-    widening = np.minimum.reduce(
-        [np.broadcast_to(errors.widening, shared.shape) for errors in held_out]
-    )
+    shared = np.all([np.isfinite(h.residual) for h in held_out], axis=0)
+    widening = np.minimum.reduce([np.broadcast_to(h.widening, shared.shape) for h in held_out])
     return tuple(
-        HeldOut.of(system, np.where(shared, errors.residual, np.nan), errors.steps, widening)
-        for system, errors in zip(fits, held_out, strict=True)
+        HeldOut.of(system, np.where(shared, h.residual, np.nan), h.steps, widening)
+        for system, h in zip(fits, held_out, strict=True)
     )
 
 

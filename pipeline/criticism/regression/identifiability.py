@@ -151,9 +151,8 @@ def known(system: LinearSystem, held_out: HeldOut) -> Known:
         Without anything that only keeps steps short, or where the fit began.
 
     """
-    return known_by(
-        system, held_out, _sizes(system.fit, system.columns[: system.model_columns.size])
-    )
+    sizes = _sizes(system.fit, system.columns[: system.model_columns.size])
+    return known_by(system, held_out, sizes)
 
 
 def known_by(system: LinearSystem, held_out: HeldOut, sizes: Array) -> Known:
@@ -464,19 +463,17 @@ def reported_combinations(system: LinearSystem, held_out: HeldOut) -> tuple[Know
     open_ = np.isinf(identified.u) | ~identified.determined
     places = [n for n, name in enumerate(names) if name in physical and observed[n] and open_[n]]
     positive = [names.index(name) for name in POSITIVE if fit.values[name] > 0.0]
-    combinations = known_combinations(identified, values, places, positive)
+    joint = known_combinations(identified, values, places, positive)
     moving = np.zeros(len(names), dtype=bool)
     for moved, walked_to in (
-        walked(identified, values, combinations, math.log(policy.walk_factor))
-        if combinations
-        else ()
+        walked(identified, values, joint, math.log(policy.walk_factor)) if joint else ()
     ):
         at = replace(fit, values=fit.values | dict(zip(names, walked_to.tolist(), strict=True)))
         deviance = linear_system(at, before=system, chord=True).deviance
         if not abs(deviance - system.deviance) < policy.walk_rise:
             moving |= moved
     named = _named(system, sure_of)
-    wide = [(one, sure_of.u_of(one.gradient, bent=one.product)) for one in combinations]
+    wide = [(one, sure_of.u_of(one.gradient, bent=one.product)) for one in joint]
     wide = [
         (one, u)
         for one, u in wide

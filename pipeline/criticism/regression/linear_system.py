@@ -289,7 +289,7 @@ class LinearSystem:
             power[number] = (group_residuals**2).sum(axis=1)
         return [replace(known, power=power[:, n], slope=slope[:, n]) for n in range(len(residuals))]
 
-    def restricted_to(self, places: NDArray[np.int64]) -> LinearSystem:
+    def only(self, places: NDArray[np.int64]) -> LinearSystem:
         """The same system with some of its columns.
 
         Parameters
@@ -502,10 +502,8 @@ def _is_valid(column: Column, made_at: Values, fit: Fit) -> bool:
     if _linear(column, model):
         return True
     parameters = model.parameters()
-    removed = any(
-        value and "." in name and name not in parameters for name, value in made_at.items()
-    )
-    return not removed and all(
+    out = any(value and "." in name and name not in parameters for name, value in made_at.items())
+    return not out and all(
         abs(now[name] - made_at.get(name, 0.0))
         <= far * max(abs(now[name]), p.typical * model.machine.scale(p))
         for name, (_, p) in parameters.items()

@@ -136,22 +136,15 @@ def linearise(
     noise, scale = floor.noise_and_scale(group[valid], sampler.reading_error(floor.near, valid))
     row_weight = 1.0 / scale
     weak_columns = _weak_columns(segment, sampler, columns, valid)
-    whitened = (
+    rows = (
         np.column_stack([projected(segment, sampler.base_residual)[valid], *weak_columns])
         * row_weight[:, None]
     )
-    absorb(whitened, offsets(segment, valid, row_weight, model.policy.noise_floors))
+    absorb(rows, offsets(segment, valid, row_weight, model.policy.noise_floors))
     unit = reported_unit(segment, values) / (row_weight * window_gain(segment))
     noise_ratio = noise * row_weight
     return Rows(
-        whitened[:, 0],
-        whitened[:, 1:],
-        group[valid],
-        window[valid],
-        unit,
-        noise_ratio,
-        row_weight,
-        groups,
+        rows[:, 0], rows[:, 1:], group[valid], window[valid], unit, noise_ratio, row_weight, groups
     )
 
 
@@ -454,16 +447,14 @@ class _Sampler:
             place = self.segment.channels.index(self.observes.torque_in)
             drag[place] = change.drag_nm * (1.0 + self.values["gain_torque"]) / column.step
             return drag if np.any(drag) else None
-        without_shaft = self.model.without(
-            *(e.name for e in self.model.effects if e.shaft is not None)
-        )
+        model = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
         if self.observes.form == "affine":
             zero_pieces = self._pieces_of_nothing()
-            after = predicted(self.segment, self.x, change, without_shaft, self.values) - predicted(
-                self.segment, self.x, zero_pieces, without_shaft, self.values
+            after = predicted(self.segment, self.x, change, model, self.values) - predicted(
+                self.segment, self.x, zero_pieces, model, self.values
             )
         else:
-            after = predicted(self.segment, self.x, change, without_shaft, self.quiet)
+            after = predicted(self.segment, self.x, change, model, self.quiet)
         return -after / column.step if np.any(np.abs(after) > _NOTHING) else None
 
     def _pieces_of_nothing(self) -> Pieces:

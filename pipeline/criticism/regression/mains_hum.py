@@ -104,13 +104,12 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
         ]
         for channel, one in _as_sensed(segment, model, values).items():
             most = (policy.largest * _whole(channel, model.machine)) ** 2
-            for freq, line_powers in zip(lines, spectrum.lines(one, lines, most), strict=True):
-                powers[segment.kind, channel, freq].append(line_powers)
-                if line_powers[0] > policy.stands_out * line_powers[1]:
+            for freq, pairs in zip(lines, spectrum.lines(one, lines, most), strict=True):
+                powers[segment.kind, channel, freq].append(pairs)
+                if pairs[0] > policy.stands_out * pairs[1]:
                     clear[freq].add(segment.capture)
     ratios = {
-        key: np.array([line / beside for line, beside in line_powers])
-        for key, line_powers in powers.items()
+        key: np.array([line / beside for line, beside in pairs]) for key, pairs in powers.items()
     }
     common = {freq for freq, captures in clear.items() if len(captures) >= policy.captures}
     return tuple(

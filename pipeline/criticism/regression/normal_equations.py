@@ -80,7 +80,7 @@ class Prior:
         gradient = self.gradient + self.precision * step
         return float(prior_costs(gradient, self.precision).sum())
 
-    def restricted_to(self, places: NDArray[np.int64]) -> Prior:
+    def only(self, places: NDArray[np.int64]) -> Prior:
         """The prior of some of the parameters.
 
         Parameters
@@ -155,7 +155,7 @@ class NormalEquations:
         power, slope = normal[:, 0].copy(), normal[:, 1:size].copy()
         return cls(counts.astype(float), power, slope, normal[:, size:].copy(), prior, policy)
 
-    def restricted_to(self, places: NDArray[np.int64]) -> NormalEquations:
+    def only(self, places: NDArray[np.int64]) -> NormalEquations:
         """The normal equations of some of the columns.
 
         Parameters
@@ -164,9 +164,9 @@ class NormalEquations:
             Their indices.
 
         """
-        return self._restricted_to(places, self.prior.restricted_to(places))
+        return self._only(places, self.prior.only(places))
 
-    def _restricted_to(self, places: NDArray[np.int64], prior: Prior) -> NormalEquations:
+    def _only(self, places: NDArray[np.int64], prior: Prior) -> NormalEquations:
         rows, columns = np.triu_indices(places.size)
         normal = np.take(self.normal, self._products(places[rows], places[columns]), axis=1)
         return replace(self, slope=self.slope[:, places], normal=normal, prior=prior)
@@ -225,7 +225,7 @@ class NormalEquations:
             self.normal[:, self._products(all_columns, all_columns)].any(axis=0)
         )
         observed = Prior(prior.precision[nonzero], prior.gradient[nonzero], prior.elsewhere)
-        known = self._restricted_to(nonzero, observed)
+        known = self._only(nonzero, observed)
         now = np.maximum(self._reduced_chi2(self.power), 1.0)
         ends = [known._descended(now**power, rounds or self.policy.most_rounds) for power in starts]
         end = min(ends, key=lambda end: end.deviance)

@@ -59,9 +59,8 @@ def hooks_in(segment: Segment) -> frozenset[str]:
 
     """
     observed = equation_of(segment).observes
-    without = (
-        {"torque"} if observed.torque_in and observed.torque_in not in segment.channels else set()
-    )
+    torque_in = observed.torque_in
+    without = {"torque"} if torque_in and torque_in not in segment.channels else set()
     return observed.hooks - without
 
 

@@ -123,10 +123,8 @@ def _unlogged(segment: Segment, equation: Equation, machine: Machine) -> dict[st
         UNLOGGED_AT_REST if hooks[name] == "drop" and equation.use.at_rest else UNLOGGED[name]
         for name in lacks
     )
-    of_capture = (
-        n for n, at in machine.unlogged.items() if at in {(c, segment.capture) for c in lacks}
-    )
-    return dict.fromkeys((*common, *of_capture), 1.0)
+    local = (n for n, at in machine.unlogged.items() if at in {(c, segment.capture) for c in lacks})
+    return dict.fromkeys((*common, *local), 1.0)
 
 
 def _late_speed(segment: Segment, capture: Capture) -> dict[str, float]:
@@ -191,10 +189,8 @@ def sparse(segment: Segment, windows: int) -> Segment:
     rows = np.clip(rows, 0, segment.size - 1).ravel()
     cut = {name: column[rows] for name, column in segment.recorded.items()}
     moved = PAD + (weak.length + 2 * PAD) * np.arange(windows)
-    thinned = replace(
-        weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen]
-    )
+    thin = replace(weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen])
     blocks = None if segment.blocks is None else segment.blocks[chosen]
-    short = replace(segment, recorded=cut, weak=thinned, blocks=blocks, kept=Kept())
+    short = replace(segment, recorded=cut, weak=thin, blocks=blocks, kept=Kept())
     lines = segment.disturbances.lines
     return short if lines is None else with_lines(short, lines[:, :, chosen])

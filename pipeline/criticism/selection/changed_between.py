@@ -55,14 +55,12 @@ def with_free_shares(system: LinearSystem) -> LinearSystem | None:
 
 def _fall(system: LinearSystem, names: tuple[str, ...]) -> float:
     """Fall of the deviance, to first order, where shares are left free."""
-    share_columns, model_columns = system.place(names), system.model_columns
+    share_columns, columns = system.place(names), system.model_columns
     precision, gradient = system.prior_precision.copy(), system.prior_gradient.copy()
     precision[share_columns] = gradient[share_columns] = 0.0
     free = replace(system, prior_precision=precision, prior_gradient=gradient)
     thorough = system.policy.selection.thorough
-    before, after = (
-        weighted.normal_equations(model_columns).best(*thorough) for weighted in (system, free)
-    )
+    before, after = (s.normal_equations(columns).best(*thorough) for s in (system, free))
     return before.deviance - after.deviance
 
 

@@ -91,7 +91,7 @@ def with_starts(
         return tuple(scores)
     best = {score.candidate.effect.name: score for score in scores}
     thorough = wide.policy.selection.thorough
-    base = wide.restricted_to(wide.model_columns)
+    base = wide.only(wide.model_columns)
     before = Standing.of(
         base, np.arange(len(base.columns)), base.normal_equations().best(*thorough)
     )

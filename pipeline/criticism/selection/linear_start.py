@@ -112,9 +112,7 @@ def _misses(wide: LinearSystem, significant: NDArray[np.bool_], channel: str) ->
     q = wide.reduced_chi2(wide.residual)
     groups = zip(wide.labels, q, significant, strict=True)
     return any(
-        is_over and q > least
-        for (_, name, order), q, is_over in groups
-        if (name, order) == (channel, 0)
+        over and q > least for (_, name, order), q, over in groups if (name, order) == (channel, 0)
     )
 
 
@@ -191,8 +189,8 @@ def _begun(fit: Fit, effect: Effect, form: LinearForm) -> Fit | None:
     columns = tuple(effect_columns(form.effect, fit.model, ()))
     system = linear_system(replace(fit, sigma=sigmas), columns)
     known, effort = system.normal_equations(), fit.policy.selection.thorough
-    end = known.restricted_to(np.arange(len(system.columns))).best(*effort)
-    rigid = known.restricted_to(system.model_columns).best(*effort)
+    end = known.only(np.arange(len(system.columns))).best(*effort)
+    rigid = known.only(system.model_columns).best(*effort)
     acting = np.array([channel == form.channel for _, channel, _ in system.labels])
     if not clears(system, acting, rigid.reduced_chi2, end.reduced_chi2):
         return None

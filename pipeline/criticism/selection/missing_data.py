@@ -128,10 +128,8 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
         if share is not None and share >= machine.policy.cutting.unexplained_share:
             shares[current][recorded.path] = share
     where = {
-        current: ", ".join(
-            f"{path} {100.0 * share:.2g} %" for path, share in sorted(by_path.items())
-        )
-        for current, by_path in shares.items()
+        current: ", ".join(f"{path} {100.0 * share:.2g} %" for path, share in sorted(paths.items()))
+        for current, paths in shares.items()
     }
     notes = {
         True: "the motion of these drives gives no inertia and no friction, as a torque that "
@@ -142,7 +140,7 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
         "turns the shaft (voltage that follows neither speed nor acceleration over what the latter "
         f"takes, squared): {where[False]}; log iq_a, or record with nothing coupled to the shaft",
     }
-    return tuple(notes[current] for current, by_path in shares.items() if by_path)
+    return tuple(notes[current] for current, paths in shares.items() if paths)
 
 
 def at_ambient(fit: Fit) -> tuple[str, ...]:
@@ -195,26 +193,18 @@ def unrecorded(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str
 
     """
     used = {segment.capture for segment in cut_segments}
-    captures = [
-        capture for capture in campaign.captures if capture.path in used and capture.has("t_s")
-    ]
-    without_d = [
-        capture.path for capture in captures if capture.has("iq_a") and not capture.has("id_a")
-    ]
+    captures = [c for c in campaign.captures if c.path in used and c.has("t_s")]
+    without_d = [c.path for c in captures if c.has("iq_a") and not c.has("id_a")]
     by_speed = [
-        capture.path
-        for capture in captures
-        if capture.has("omega_mech_rad_s")
-        and not (capture.has("theta_mech_rad") or capture.has("theta_elec_rad"))
+        c.path
+        for c in captures
+        if c.has("omega_mech_rad_s") and not (c.has("theta_mech_rad") or c.has("theta_elec_rad"))
     ]
-    substitutes = (
-        ("id_a", "taken as zero", without_d),
-        ("angle", "known by omega_mech_rad_s", by_speed),
-    )
+    cases = (("id_a", "taken as zero", without_d), ("angle", "known by omega_mech_rad_s", by_speed))
     return tuple(
         f"what is left may be of an {name} that was not recorded, and is {how}: log it in "
         + ", ".join(sorted(paths))
-        for name, how, paths in substitutes
+        for name, how, paths in cases
         if paths
     )
 
@@ -222,12 +212,10 @@ def unrecorded(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str
 def _warmer(fit: Fit, name: str) -> dict[str, float]:
     """How much warmer [K] each capture without this temperature is fitted than most of them."""
     known = fit.model.machine.unlogged
-    temperature_of = {
-        path: fit.values[key] for key, (signal, path) in known.items() if signal == name
-    }
+    fitted = {path: fit.values[key] for key, (signal, path) in known.items() if signal == name}
     # what all have in common is in the shared nuisance, or in theirs
-    usual = float(np.median(list(temperature_of.values()))) if temperature_of else 0.0
-    return {path: value - usual for path, value in temperature_of.items()}
+    usual = float(np.median(list(fitted.values()))) if fitted else 0.0
+    return {path: value - usual for path, value in fitted.items()}
 
 
 def unexcited(

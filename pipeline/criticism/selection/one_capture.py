@@ -34,9 +34,7 @@ def rests_on(systems: Sequence[LinearSystem], held_out: Sequence[HeldOut]) -> st
         Path of the capture.
 
     """
-    without, after = (
-        predicted_chi2(system, errors) for system, errors in zip(systems, held_out, strict=True)
-    )
+    without, after = (predicted_chi2(s, h) for s, h in zip(systems, held_out, strict=True))
     return only_capture(systems[-1], without, after)
 
 

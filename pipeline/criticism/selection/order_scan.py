@@ -307,15 +307,13 @@ def _spectrum(parts: Sequence[Part], count: int, policy: OrderScan) -> tuple[Arr
     return power, np.maximum(beside, 1e-300)
 
 
-def _peak(parts: Sequence[Part], approximate: float, policy: OrderScan) -> float:
+def _peak(parts: Sequence[Part], rough: float, policy: OrderScan) -> float:
     """The order within a step that has the most power; a whole one that has about as much."""
-    integer = float(round(approximate))
-    tried = np.append(
-        approximate + policy.step * np.linspace(-1.0, 1.0, 2 * policy.finer + 1), integer
-    )
+    whole = float(round(rough))
+    tried = np.append(rough + policy.step * np.linspace(-1.0, 1.0, 2 * policy.finer + 1), whole)
     power = np.sum([part.power(tried) for part in parts], axis=0).max(axis=0)
     best = int(np.argmax(power))
-    return integer if power[-1] >= policy.whole_share * power[best] else float(tried[best])
+    return whole if power[-1] >= policy.whole_share * power[best] else float(tried[best])
 
 
 def _clustered(lines: Sequence[Line], policy: OrderScan) -> Iterator[list[Line]]:
@@ -330,12 +328,12 @@ def _clustered(lines: Sequence[Line], policy: OrderScan) -> Iterator[list[Line]]
         yield [line for _, line in members]
 
 
-def _common(approximate: float, logs: Sequence[Log], policy: OrderScan) -> float:
+def _common(rough: float, logs: Sequence[Log], policy: OrderScan) -> float:
     """The order that several logs have: whole, or where waves of one phase fit all of them best.
 
     Angles go on from turn to turn, so that a wave of any order is one function of them.
     """
-    order = _peak([part for log in logs for part in log.parts], approximate, policy)
+    order = _peak([part for log in logs for part in log.parts], rough, policy)
     if order.is_integer():
         return order
     channels = dict.fromkeys(log.channel for log in logs)

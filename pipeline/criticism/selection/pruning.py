@@ -128,7 +128,7 @@ def _loss(system: LinearSystem, known: NormalEquations, names: Sequence[str]) ->
     out = np.array([n for n in model_columns if system.columns[n].name in names], dtype=int)
     move = np.array([-system.fit.values[system.columns[n].name] for n in out])
     return (
-        known.moved(out, move).restricted_to(np.setdiff1d(model_columns, out)).best().deviance
+        known.moved(out, move).only(np.setdiff1d(model_columns, out)).best().deviance
         - known.deviance()
     )
 

@@ -219,7 +219,7 @@ def widened(
     columns = [c for candidate in offered for c in candidate.columns]
     if before is not None:
         present = {column.key for column in model_columns(fit.model)}
-        before = before.restricted_to(
+        before = before.only(
             np.array([n for n, c in enumerate(before.columns) if c.key not in present], dtype=int)
         )
     return linear_system(fit, columns, before)
@@ -356,9 +356,7 @@ class _Scoring:
     @classmethod
     def of(cls, system: LinearSystem, significant: NDArray[np.bool_] | None) -> _Scoring:
         model_columns, normal_equations = system.model_columns, system.normal_equations()
-        before = Standing.of(
-            system, model_columns, normal_equations.restricted_to(model_columns).best()
-        )
+        before = Standing.of(system, model_columns, normal_equations.only(model_columns).best())
         remaining = np.zeros(len(system.labels), dtype=bool) if significant is None else significant
         return cls(system, normal_equations, model_columns, before, remaining)
 
@@ -415,9 +413,9 @@ class _Scoring:
         """
         live = places
         while live.size:
-            end = self.normal_equations.restricted_to(
-                np.concatenate([self.model_columns, live])
-            ).best(*effort)
+            end = self.normal_equations.only(np.concatenate([self.model_columns, live])).best(
+                *effort
+            )
             steps = zip(
                 self._names(live), end.step[self.model_columns.size :].tolist(), strict=True
             )
@@ -450,10 +448,10 @@ class _Scoring:
         clearest, beside = max(small, key=lambda pair: pair[0].fall)
         thorough = self.system.policy.selection.thorough
         _, shrunk = best[score.candidate.effect.name]
-        without = self.normal_equations.restricted_to(
-            np.concatenate([self.model_columns, beside])
-        ).best(*thorough)
-        with_both = self.normal_equations.restricted_to(
+        without = self.normal_equations.only(np.concatenate([self.model_columns, beside])).best(
+            *thorough
+        )
+        with_both = self.normal_equations.only(
             np.concatenate([self.model_columns, beside, shrunk])
         ).best(*thorough)
         worth = without.deviance - with_both.deviance > score.penalty

@@ -260,14 +260,8 @@ class _Baseline:
     @classmethod
     def of(cls, wide: LinearSystem, added: Sequence[Effect]) -> _Baseline:
         held_out, significant = leave_out(wide), significant_groups(wide)
-        return cls(
-            wide,
-            added,
-            held_out,
-            _floor_factors(wide),
-            _form_error_factors(wide, added),
-            significant,
-        )
+        factors = _floor_factors(wide), _form_error_factors(wide, added)
+        return cls(wide, added, held_out, *factors, significant)
 
     def is_improved_by(self, tried: LinearSystem, score: Score) -> bool:
         """Whether a candidate predicts captures held out better, and mends more than it spoils."""
@@ -319,13 +313,8 @@ def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np
     fit, effect = system.fit, system.fit.model.effects[-1]
     if material(fit, effect):
         return True
-    before_chi2, after_chi2 = (
-        before.reduced_chi2(before.residual),
-        system.reduced_chi2(system.residual),
-    )
-    takes_most = effect.discriminator is None and clears(
-        system, significant, before_chi2, after_chi2
-    )
+    chi2 = [fitted.reduced_chi2(fitted.residual) for fitted in (before, system)]
+    takes_most = effect.discriminator is None and clears(system, significant, *chi2)
     return takes_most and shaped(fit, effect)
 
 
@@ -407,9 +396,7 @@ def _improves_held_out(
     )
     priors = cost > policy.excess and after_cost < (1.0 - policy.least_share) * cost
     helps = priors or power_share(wide, same_hook * before, same_hook * after) >= policy.least_share
-    below_floor = min(
-        fall_below_floor(wide, factors * before, factors * after) for factors in (1.0, below)
-    )
+    below_floor = min(fall_below_floor(wide, k * before, k * after) for k in (1.0, below))
     return fall > least[0] and (helps or below_floor > least[1])
 
 
@@ -575,10 +562,10 @@ def loss_without(
         To first order: the model is taken as linear between here and there.
 
     """
-    prefixes = tuple(f"{name}." for name in names)
+    stems = tuple(f"{name}." for name in names)
     fit, model_columns = system.fit, system.model_columns
     out = np.array(
-        [n for n in model_columns if system.columns[n].name.startswith(prefixes)], dtype=int
+        [n for n in model_columns if system.columns[n].name.startswith(stems)], dtype=int
     )
     stay = np.setdiff1d(model_columns, out)
     if instead is not None:
@@ -592,5 +579,5 @@ def loss_without(
     names_out = [system.columns[n].name for n in out]
     move = np.array([-fit.values[n] if amplitude[n] else 0.0 for n in names_out])
     equations = system.normal_equations() if normal_equations is None else normal_equations
-    end = equations.moved(out, move).restricted_to(stay).best(*fit.policy.selection.thorough)
+    end = equations.moved(out, move).only(stay).best(*fit.policy.selection.thorough)
     return end.deviance - equations.deviance()

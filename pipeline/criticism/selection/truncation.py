@@ -141,9 +141,7 @@ def _waved(system: LinearSystem) -> set[str]:
     """Signals with waves of the angle that are reported."""
     significant = significant_groups(system)
     return {
-        channel
-        for (_, channel, order), is_over in zip(system.labels, significant, strict=True)
-        if is_over and order
+        c for (_, c, order), over in zip(system.labels, significant, strict=True) if over and order
     }
 
 

@@ -207,22 +207,16 @@ def _equations(
     if weak is None:
         return
     residuals = residual(segment, fit.model, simulated.values)
-    before_residuals = None
+    baseline = None
     if before is not None:
-        before_residuals = residual(
-            segment, before.system.fit.model, before.values(simulated.number)
-        )
+        baseline = residual(segment, before.system.fit.model, before.values(simulated.number))
     width = max(2 * round(fit.policy.validation.look_s / segment.ts_s / 2) + 1, 1)
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(width // 2, weak.length, max(width // 2, 1))[None, :]
     for place, channel in enumerate(segment.channels):
         recorded = smoothed(segment.recorded[channel], width)[rows]
         model = recorded - smoothed(residuals[place], width)[rows]
-        without = (
-            None
-            if before_residuals is None
-            else recorded - smoothed(before_residuals[place], width)[rows]
-        )
+        without = None if baseline is None else recorded - smoothed(baseline[place], width)[rows]
         time = segment.recorded["t_s"][rows]
         columns = (time, recorded, model, without)
         yield _trace(segment, channel, "equation", simulated.split, columns)

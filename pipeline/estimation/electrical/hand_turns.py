@@ -161,10 +161,8 @@ def _by_vector(spin: Spin) -> list[Turn]:
     The centre c0 + c1 t is where |flux - centre|² is constant: |f|² = 2 Re(conj(f) centre) + k,
     linear in c0, c1 and k with the small |centre|² left in k.
     """
-    centred = [
-        replace(c, v_v=c.v_v - float(np.mean(c.v_v[_at_rest(c.v_v)]))) for c in spin.channels
-    ]
-    vector = replace(spin, channels=tuple(centred)).vector_v(centred=False)
+    zeroed = [replace(c, v_v=c.v_v - float(np.mean(c.v_v[_at_rest(c.v_v)]))) for c in spin.channels]
+    vector = replace(spin, channels=tuple(zeroed)).vector_v(centred=False)
     flux = cubic(spin.t_s, vector)
     flux = flux - flux.mean()
     time = (spin.t_s - spin.t_s.mean()) / float(np.ptp(spin.t_s))

@@ -63,14 +63,12 @@ def count_pole_pairs(method: Method, groups: Sequence[Group]) -> tuple[Estimate,
     words = ""
     paths = []
     for capture in dict.fromkeys(g.capture.path for g in groups):
-        of_capture = [g for g in groups if g.capture.path == capture]
-        ratio, by_angle = electrical_per_mechanical(
-            of_capture[0].spin, [g.stretch for g in of_capture]
-        )
+        spins = [g for g in groups if g.capture.path == capture]
+        ratio, by_angle = electrical_per_mechanical(spins[0].spin, [g.stretch for g in spins])
         if math.isfinite(ratio):
             ratios.append(ratio)
             paths.append(capture)
-            if len(of_capture[0].spin.channels) > 1:
+            if len(spins[0].spin.channels) > 1:
                 senses.add(1 if ratio > 0.0 else -1)
             words = "theta_mech_rad" if by_angle else "omega_mech_rad_s"
     missing = (

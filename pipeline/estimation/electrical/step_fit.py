@@ -108,11 +108,7 @@ def solve(model: StepModel, axes: Sequence[str]) -> Solution:
     penalty = bic_penalty(model)
     for _ in range(TERMS):
         proposals = offers_of(solution, axes, sigmas)
-        accepted = [
-            max(of_axis)[1]
-            for of_axis in proposals.values()
-            if of_axis and max(of_axis)[0] > penalty
-        ]
+        accepted = [max(o)[1] for o in proposals.values() if o and max(o)[0] > penalty]
         if not accepted:
             break
         free = solution.free.copy()
@@ -242,17 +238,15 @@ def _weights(
     weights, shares = [], []
     for record, pair, read in zip(model.records, sigmas, model.predict_both(rows), strict=True):
         noises = (record.current_noise, record.voltage_noise)
-        used_rows = (np.ones(record.count.size, dtype=bool), record.level != BETWEEN)
-        variances = [
+        masks = (np.ones(record.count.size, dtype=bool), record.level != BETWEEN)
+        powers = [
             row_variance(values[:, 0], record.count, noise, sigma, used)
-            for values, noise, sigma, used in zip(read, noises, pair, used_rows, strict=True)
+            for values, noise, sigma, used in zip(read, noises, pair, masks, strict=True)
         ]
         weights.append(
-            np.array(
-                [u / np.sqrt(total) for u, (total, _) in zip(used_rows, variances, strict=True)]
-            )
+            np.array([u / np.sqrt(total) for u, (total, _) in zip(masks, powers, strict=True)])
         )
-        shares.append(np.array([white / total for total, white in variances]))
+        shares.append(np.array([white / total for total, white in powers]))
     return tuple(weights), tuple(shares)
 
 

@@ -129,14 +129,14 @@ class Drive:
         return self.r_ohm + self.source_ohm
 
 
-def drive_of(record: StepRecord, places: Own, values: Array) -> Drive:
+def drive_of(record: StepRecord, slots: Own, values: Array) -> Drive:
     """The drive of a capture from the columns of its own parameters [m, size].
 
     Parameters
     ----------
     record
         The capture.
-    places
+    slots
         Where its own parameters sit.
     values : array [m, size]
         Variants of them.
@@ -147,15 +147,15 @@ def drive_of(record: StepRecord, places: Own, values: Array) -> Drive:
     def column(place: int | None) -> Array:
         return none if place is None else values[:, place]
 
-    r_ohm, source_ohm = values[:, places.r_ohm], column(places.source_ohm)
-    edges = wave.edges_s + wave.period_s * values[:, places.moves] @ wave.moves.T
+    r_ohm, source_ohm = values[:, slots.r_ohm], column(slots.source_ohm)
+    edges = wave.edges_s + wave.period_s * values[:, slots.moves] @ wave.moves.T
     levels = (
-        values[:, places.levels_v] if wave.has_supply else np.tile(wave.levels_v, (none.size, 1))
+        values[:, slots.levels_v] if wave.has_supply else np.tile(wave.levels_v, (none.size, 1))
     )
     settled = levels[:, 0] / (r_ohm + source_ohm)
-    first = settled if places.first_a is None else values[:, places.first_a]
+    first = settled if slots.first_a is None else values[:, slots.first_a]
     return Drive(
-        r_ohm, source_ohm, column(places.offset_a), edges, first, column(places.drop_v), levels
+        r_ohm, source_ohm, column(slots.offset_a), edges, first, column(slots.drop_v), levels
     )
 
 
@@ -186,12 +186,12 @@ def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
     )
     start = np.zeros(layout.size)
     start[[LD, LQ]] = np.clip(both, 0.2 * l_total.min() / 2, 5.0 * l_total.max() / 2)
-    for record, at, places in zip(records, layout.starts, layout.own, strict=True):
+    for record, at, slots in zip(records, layout.starts, layout.own, strict=True):
         start[at] = record.r_start_ohm
-        if places.source_ohm is not None:
-            start[at + places.source_ohm] = max(record.wave.source_ohm, -0.5 * record.r_start_ohm)
+        if slots.source_ohm is not None:
+            start[at + slots.source_ohm] = max(record.wave.source_ohm, -0.5 * record.r_start_ohm)
         if record.wave.has_supply:
-            start[at + places.levels_v.start : at + places.levels_v.stop] = record.wave.levels_v
+            start[at + slots.levels_v.start : at + slots.levels_v.stop] = record.wave.levels_v
     return start
 
 
@@ -274,10 +274,10 @@ class StepModel:
 
         """
         shared, cos_g, width, volts, drives = [], [], [], [], []
-        for record, grid, rows, at, places in zip(
+        for record, grid, rows, at, slots in zip(
             self.records, self._grids, variants, self.layout.starts, self.layout.own, strict=True
         ):
-            drive = drive_of(record, places, rows[:, at : at + places.size])
+            drive = drive_of(record, slots, rows[:, at : at + slots.size])
             segment, begin, end = grid
             lengths = np.diff(drive.edges_s, axis=1)[:, segment]
             pad = self._count - segment.size
@@ -366,21 +366,21 @@ class StepModel:
         free = np.flatnonzero(jacobian)
         columns = [self.columns_of(c, free) for c in range(len(self.records))]
         variants = []
-        for used_columns in columns:
-            rows = np.tile(parameters, (used_columns.size + 1, 1))
-            rows[np.arange(1, used_columns.size + 1), used_columns] += widths[used_columns]
+        for used in columns:
+            rows = np.tile(parameters, (used.size + 1, 1))
+            rows[np.arange(1, used.size + 1), used] += widths[used]
             variants.append(rows)
         blocks, slopes = [], []
         for c, (current, volts) in enumerate(self.predict_both(variants)):
-            record, used_columns = self.records[c], columns[c]
-            place = np.searchsorted(free, used_columns)
+            record, used = self.records[c], columns[c]
+            place = np.searchsorted(free, used)
             for predicted, measured, weight in zip(
                 (current, volts), (record.i_a, record.v_v), weights[c], strict=True
             ):
                 blocks.append((predicted[:, 0] - measured) * weight)
                 slope = np.zeros((measured.size, free.size))
                 slope[:, place] = (
-                    (predicted[:, 1:] - predicted[:, :1]) / widths[used_columns] * weight[:, None]
+                    (predicted[:, 1:] - predicted[:, :1]) / widths[used] * weight[:, None]
                 )
                 slopes.append(slope)
         return np.concatenate(blocks), np.vstack(slopes)
@@ -401,7 +401,7 @@ class StepModel:
 
         """
         predicted = []
-        for current, record, rows, at, places in zip(
+        for current, record, rows, at, slots in zip(
             self.predict(variants),
             self.records,
             variants,
@@ -409,7 +409,7 @@ class StepModel:
             self.layout.own,
             strict=True,
         ):
-            drive = drive_of(record, places, rows[:, at : at + places.size])
+            drive = drive_of(record, slots, rows[:, at : at + slots.size])
             volts = np.zeros_like(current)
             at_level = record.level != BETWEEN
             through = current[at_level] - drive.offset_a
@@ -435,10 +435,10 @@ class StepModel:
         low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
         positive = [LD, LQ, *self.layout.starts]
         low[positive] = 1e-3 * start[positive]
-        for at, places in zip(self.layout.starts, self.layout.own, strict=True):
-            if places.source_ohm is not None:
-                low[at], low[at + places.source_ohm] = 0.6 * start[at], -0.5 * start[at]
-            moves = slice(at + places.moves.start, at + places.moves.stop)
+        for at, slots in zip(self.layout.starts, self.layout.own, strict=True):
+            if slots.source_ohm is not None:
+                low[at], low[at + slots.source_ohm] = 0.6 * start[at], -0.5 * start[at]
+            moves = slice(at + slots.moves.start, at + slots.moves.stop)
             low[moves], high[moves] = -policy().steps.edge_reach, policy().steps.edge_reach
         return low, high
 
@@ -470,18 +470,18 @@ class StepModel:
             widths[place] = 1e-6 * parameters[place]
             powers = np.arange(1.0, 1.0 + TERMS) + (place == LQ)
             widths[place + 1 : place + 1 + TERMS] = 1e-6 * flux**-powers
-        for record, at, places in zip(
+        for record, at, slots in zip(
             self.records, self.layout.starts, self.layout.own, strict=True
         ):
             ampere = max(record.largest_a, 1e-9)
-            widths[at : at + places.size] = 1e-5 * ampere
+            widths[at : at + slots.size] = 1e-5 * ampere
             widths[at] = 1e-6 * parameters[at]
-            if places.source_ohm is not None:
-                widths[at + places.source_ohm] = 1e-6 * parameters[at]
-            widths[at + places.moves.start : at + places.moves.stop] = 1e-4
-            widths[at + places.moves.stop : at + places.size] = 1e-5 * ampere * parameters[at]
-            if places.drop_v is not None:
-                widths[at + places.drop_v] = 1e-5 * ampere * parameters[at]
+            if slots.source_ohm is not None:
+                widths[at + slots.source_ohm] = 1e-6 * parameters[at]
+            widths[at + slots.moves.start : at + slots.moves.stop] = 1e-4
+            widths[at + slots.moves.stop : at + slots.size] = 1e-5 * ampere * parameters[at]
+            if slots.drop_v is not None:
+                widths[at + slots.drop_v] = 1e-5 * ampere * parameters[at]
         return widths
 
 

@@ -207,16 +207,12 @@ def _sampled(
     else:
         edges, means = t_s, 0.5 * (v_v[1:] + v_v[:-1])
     group = -(-means.size // policy().steps.most_cells)
-    beside_edges = {k + d for together in free for k in together for d in (-1, 0, 1)}
-    cuts = np.array(
-        sorted({*range(0, means.size, group), *beside_edges, means.size}), dtype=np.intp
-    )
+    beside = {k + d for together in free for k in together for d in (-1, 0, 1)}
+    cuts = np.array(sorted({*range(0, means.size, group), *beside, means.size}), dtype=np.intp)
     areas = np.add.reduceat(means * np.diff(edges), cuts[:-1])
     moves = np.ones((cuts.size, 1))
     if free:
-        moves = np.column_stack([np.isin(cuts, edges_of_group) for edges_of_group in free]).astype(
-            np.float64
-        )
+        moves = np.column_stack([np.isin(cuts, edge) for edge in free]).astype(np.float64)
     kept_s = edges[cuts]
     none = np.zeros(0, dtype=np.intp)
     return Waveform(kept_s, areas / np.diff(kept_s), moves, period_s, 0.0, none)

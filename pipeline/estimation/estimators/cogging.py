@@ -290,12 +290,12 @@ def _variance_of_mean(
         squares = np.sum((forward - forward.mean()) ** 2) + np.sum(
             (backward - backward.mean()) ** 2
         )
-        observed = float(squares) / free
+        power = float(squares) / free
         if (
             predicted == 0.0
-            or fdtrc(free, dof, observed / predicted) < policy().cogging.friction_level
+            or fdtrc(free, dof, power / predicted) < policy().cogging.friction_level
         ):
-            return observed, float(free)
+            return power, float(free)
     return predicted, dof
 
 

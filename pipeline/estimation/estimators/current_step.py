@@ -273,12 +273,12 @@ def _saturation_plot(solution: Solution, axes: Sequence[str]) -> Evidence:
     series = []
     for name in axes:
         x, y, fitted = [], [], []
-        for record, at, places in zip(
+        for record, at, slots in zip(
             model.records, model.layout.starts, model.layout.own, strict=True
         ):
             if abs(_share(record, name)) < math.sqrt(0.5):
                 continue
-            drive = drive_of(record, places, solution.parameters[None, at : at + places.size])
+            drive = drive_of(record, slots, solution.parameters[None, at : at + slots.size])
             peak = float(record.i_a[int(np.argmax(np.abs(record.i_a)))])
             ramp = np.linspace(0.0, peak, 41)
             shared = solution.parameters[: len(SHARED)]

@@ -123,12 +123,12 @@ def _flux(
     parts = [METHOD.scatter("psi", u, dof)]
     parts += propagate([(-value * excess, of_alpha)])
     for source, gain in instrument_uncertainties(captures, ("voltage",)).items():
-        of_source = [voltage_source(c.meta) == source for c, _ in turns]
-        parts.append(Contribution(source, value * gain * float(share[of_source].sum()), "B"))
+        members = [voltage_source(c.meta) == source for c, _ in turns]
+        parts.append(Contribution(source, value * gain * float(share[members].sum()), "B"))
     for source, offset in magnet_uncertainties(captures).items():
-        of_source = [magnet_source(c) == source for c, _ in turns]
+        members = [magnet_source(c) == source for c, _ in turns]
         parts.append(
-            Contribution(source, -value * alpha * offset * float(share[of_source].sum()), "B")
+            Contribution(source, -value * alpha * offset * float(share[members].sum()), "B")
         )
     notes = [unlogged_note(captures), unstated_note(captures, ("voltage", "temperature"))]
     at = {"temp_magnet_degc": 25.0, "temp_measured_degc": round(excess + 25.0, 2)}

@@ -268,7 +268,7 @@ def _cogging(
 
 
 def _true_order(
-    observed: int, positions: int | None, known: Constants, campaign: Campaign
+    order: int, positions: int | None, known: Constants, campaign: Campaign
 ) -> tuple[int, str]:
     """The order behind one seen on even positions, and a note where it could be another.
 
@@ -278,15 +278,13 @@ def _true_order(
     slots, pairs = campaign.nameplate("slots"), known.best("pole_pairs")
     poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
     if positions is None or not isinstance(slots, int) or not isinstance(poles, int):
-        return observed, ""
+        return order, ""
     fundamental = cogging_order(slots, poles)
-    alike = [observed, *(m * positions + s * observed for m in (1, 2, 3) for s in (-1, 1))]
-    possible = [k for k in alike if k % fundamental == 0]
-    if observed % fundamental == 0 or len(possible) != 1:
-        return observed, ""
-    return possible[
-        0
-    ], f"; {positions} even positions show order {possible[0]} as {observed}: hold at more"
+    alike = [order, *(m * positions + s * order for m in (1, 2, 3) for s in (-1, 1))]
+    fits = [k for k in alike if k % fundamental == 0]
+    if order % fundamental == 0 or len(fits) != 1:
+        return order, ""
+    return fits[0], f"; {positions} even positions show order {fits[0]} as {order}: hold at more"
 
 
 def _evidence(

@@ -286,23 +286,17 @@ def _evidence(
         series = []
         levels = sorted({round(getattr(f, other) / (tolerance * reach)) for f in fluxes})
         for level in levels:
-            of_level = [
-                f for f in fluxes if round(getattr(f, other) / (tolerance * reach)) == level
-            ]
-            of_level.sort(key=lambda f: (getattr(f, current), f.group))
-            x = np.array([getattr(f, current) for f in of_level])
-            y = np.array([getattr(f, flux) for f in of_level])
-            amps = float(np.mean([getattr(f, other) for f in of_level])) if level else 0.0
+            pairs = [f for f in fluxes if round(getattr(f, other) / (tolerance * reach)) == level]
+            pairs.sort(key=lambda f: (getattr(f, current), f.group))
+            x = np.array([getattr(f, current) for f in pairs])
+            y = np.array([getattr(f, flux) for f in pairs])
+            amps = float(np.mean([getattr(f, other) for f in pairs])) if level else 0.0
             label = f"{other} {amps:.3g} A"
             line = np.array([])
             if result is not None:
-                at_zero = x[np.abs(x) < tolerance * reach], y[np.abs(x) < tolerance * reach]
-                start = (
-                    float(np.mean(at_zero[1] - result.value_h * at_zero[0]))
-                    if at_zero[0].size
-                    else 0.0
-                )
-                line = start + result.value_h * x if axis == "q" or at_zero[0].size else line
+                zero = x[np.abs(x) < tolerance * reach], y[np.abs(x) < tolerance * reach]
+                start = float(np.mean(zero[1] - result.value_h * zero[0])) if zero[0].size else 0.0
+                line = start + result.value_h * x if axis == "q" or zero[0].size else line
             series.append(Series(label, x, y, line))
         title = f"Flux linkage of the {axis} axis at constant speed"
         caption = "line: the published apparent inductance"

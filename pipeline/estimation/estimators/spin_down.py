@@ -351,7 +351,7 @@ def _estimates(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> tu
 def _form(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> Array:
     """How far the halves of the coasts disagree on the two ratios, each fitted by itself."""
     values = []
-    without_extras = Motion((), motion.ripples, motion.fastest_rad_s)
+    simple = Motion((), motion.ripples, motion.fastest_rad_s)
     for late in (False, True):
         halves = []
         for i, coast in enumerate(coasts):
@@ -367,11 +367,9 @@ def _form(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> Array:
                     coast.of_angle, coast.sigma,
                 )
             )  # fmt: skip
-        first = _initial_values(without_extras, halves)
-        start = _transferred(
-            Motion((), (), without_extras.fastest_rad_s), without_extras, first, len(halves)
-        )
-        values.append(_solve(without_extras, halves, start).parameters[:2])
+        first = _initial_values(simple, halves)
+        start = _transferred(Motion((), (), simple.fastest_rad_s), simple, first, len(halves))
+        values.append(_solve(simple, halves, start).parameters[:2])
     apart = np.abs(values[1] - values[0])
     beside = np.abs(0.5 * (values[0] + values[1]) - fit.parameters[:2])
     return np.maximum(apart, beside)

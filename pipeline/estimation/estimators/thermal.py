@@ -161,11 +161,9 @@ def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | N
     if record.temp_second_degc is not None and np.isfinite(record.temp_second_degc).all():
         second = record.temp_second_degc
         across = -trapezoid(t, winding - second)
-        constant = balanced[:, 0]
+        one = balanced[:, 0]
         double = _winding_fit(np.column_stack([*balanced[:, :2].T, across, outward]), winding)
-        body = linear_fit(
-            np.column_stack([constant, -across, -trapezoid(t, second - ambient)]), second
-        )
+        body = linear_fit(np.column_stack([one, -across, -trapezoid(t, second - ambient)]), second)
         start, direct = _start(double, body)
         if start is not None and (
             two_nodes := _two_nodes(record, losses_w, ambient, start, direct)

@@ -218,10 +218,8 @@ def _instruments(
 def _evidence(captures: Sequence[Capture], rows: _Rows, fitted_nm: Array) -> tuple[Evidence, ...]:
     series = []
     for number, capture in enumerate(captures):
-        in_table = np.flatnonzero(rows.table == number)
-        series.append(
-            over_x(capture.path, rows.iq_a[in_table], rows.torque_nm[in_table], fitted_nm[in_table])
-        )
+        at = np.flatnonzero(rows.table == number)
+        series.append(over_x(capture.path, rows.iq_a[at], rows.torque_nm[at], fitted_nm[at]))
     title = "Torque of the clamped shaft against q current"
     return (METHOD.plot(title, ("iq_a", "torque_shaft_nm"), "scatter", series),)
 

@@ -237,14 +237,12 @@ def _blocks(
         name if name is not None and _bridged(data, name) else None for name in others
     )
     current = np.sqrt(data["square_a2"])
-    largest_a = float(current.max(initial=0.0))
+    most_a = float(current.max(initial=0.0))
     plateaus = find_plateaus(
-        current, least=50, tolerance=policy().heat_record.steady_share, least_span=largest_a
+        current, least=50, tolerance=policy().heat_record.steady_share, least_span=most_a
     )
     flowing = [
-        p
-        for p in plateaus
-        if current[p.rows].mean() > policy().heat_record.flowing_share * largest_a
+        p for p in plateaus if current[p.rows].mean() > policy().heat_record.flowing_share * most_a
     ]
     if not flowing:
         return None

@@ -206,9 +206,7 @@ def _parts(entry: Entry) -> list[Entry]:
     if not parts:
         return [entry]
     stated = [tuple(sorted((entry.stated | dict(part.metadata)).items())) for part in parts]
-    return [
-        replace(entry, part=p, metadata=metadata) for p, metadata in zip(parts, stated, strict=True)
-    ]
+    return [replace(entry, part=p, metadata=keys) for p, keys in zip(parts, stated, strict=True)]
 
 
 def _preferred(folder: Path, first: Entry, second: Entry) -> tuple[Entry, Entry]:

@@ -329,17 +329,12 @@ def _stream(table: RawTable, encoding: str, answers: Mapping[str, str]) -> Strea
 def _in_si_units(table: RawTable, fields: Sequence[FieldSeen]) -> dict[str, NDArray[np.float64]]:
     """The columns [n] of a table whose unit is known."""
     columns = {}
-    for described in fields:
-        if (
-            described.column is None
-            or described.question is not None
-            or described.wraps
-            or described.times
-        ):
+    for item in fields:
+        if item.column is None or item.question is not None or item.wraps or item.times:
             continue
-        scale = FOREIGN_UNITS[COLUMNS[described.column].unit].get(described.unit or "", Scale(1.0))
-        values = table.fields[described.name].astype(np.float64)
-        columns[described.column] = values * (described.scale or scale.factor) + scale.shift
+        scale = FOREIGN_UNITS[COLUMNS[item.column].unit].get(item.unit or "", Scale(1.0))
+        values = table.fields[item.name].astype(np.float64)
+        columns[item.column] = values * (item.scale or scale.factor) + scale.shift
     time = _time_s(table, fields)
     return columns if time is None else {**columns, "t_s": time}
 
@@ -362,17 +357,13 @@ def _clock_words(steps: NDArray[np.float64], step: float) -> str:
 
 def _time_s(table: RawTable, fields: Sequence[FieldSeen]) -> NDArray[np.float64] | None:
     """Time [s] by the field that is t_s, its unit known, or by the log clock."""
-    time_field = next((one for one in fields if one.column == "t_s" and not one.question), None)
-    if time_field is not None:
-        values = table.fields[time_field.name].astype(np.float64)
-        if time_field.wraps:
-            values = values + time_field.wraps * np.cumsum(np.diff(values, prepend=values[:1]) < 0)
-        factor = (
-            FOREIGN_UNITS["s"][time_field.unit].factor
-            if time_field.unit and not time_field.scale
-            else 1.0
-        )
-        return values * factor * (time_field.scale or 1.0)
+    clock = next((one for one in fields if one.column == "t_s" and not one.question), None)
+    if clock is not None:
+        values = table.fields[clock.name].astype(np.float64)
+        if clock.wraps:
+            values = values + clock.wraps * np.cumsum(np.diff(values, prepend=values[:1]) < 0)
+        factor = FOREIGN_UNITS["s"][clock.unit].factor if clock.unit and not clock.scale else 1.0
+        return values * factor * (clock.scale or 1.0)
     if table.log_time_ns is None or table.blocks:
         return None
     time: NDArray[np.float64] = table.log_time_ns.astype(np.float64) / 1e9

@@ -180,11 +180,8 @@ def _multiples(numbers: Mapping[str, Array]) -> tuple[Relation, ...]:
         for other in names[:place]:
             one, two = numbers[name], numbers[other]
             factor = float(one @ two / (two @ two))
-            difference = one - factor * two
-            if (
-                np.ptp(one)
-                and float(difference @ difference) < (1.0 - _SAME) * float(np.var(one)) * one.size
-            ):
+            error = one - factor * two
+            if np.ptp(one) and float(error @ error) < (1.0 - _SAME) * float(np.var(one)) * one.size:
                 pairs.append(Relation(name, other, factor, integral=False))
     return tuple(pairs)
 

@@ -65,14 +65,10 @@ class Shape:
 
 def _clearer(one: FieldSeen, other: FieldSeen) -> FieldSeen:
     """The field of two files that leaves less open, with the wrap that either shows."""
-    clearer, other_field = (other, one) if one.question and not other.question else (one, other)
-    if (
-        clearer.wraps is None
-        and clearer.column == other_field.column
-        and other_field.wraps is not None
-    ):
-        return replace(clearer, wraps=other_field.wraps, why=other_field.why)
-    return clearer
+    clear, vague = (other, one) if one.question and not other.question else (one, other)
+    if clear.wraps is None and clear.column == vague.column and vague.wraps is not None:
+        return replace(clear, wraps=vague.wraps, why=vague.why)
+    return clear
 
 
 def map_text(

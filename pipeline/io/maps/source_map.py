@@ -511,10 +511,8 @@ def _fields(section: Section) -> tuple[FieldMap, ...]:
         part = Section(section.source, f"fields.{name}", plain)
         column = part.text("column")
         if column not in COLUMNS:
-            similar = difflib.get_close_matches(column or "", list(COLUMNS), 3)
-            hint = (
-                f"did you mean {', '.join(similar)}?" if similar else f"one of {', '.join(COLUMNS)}"
-            )
+            close = difflib.get_close_matches(column or "", list(COLUMNS), 3)
+            hint = f"did you mean {', '.join(close)}?" if close else f"one of {', '.join(COLUMNS)}"
             raise part.fault("column", f"{column!r} is no column of the contract", hint)
         sign = part.number("sign", 1.0)
         if sign not in (1.0, -1.0):

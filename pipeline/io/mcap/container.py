@@ -388,11 +388,8 @@ def _index_of(layout: Layout, chunk: rec.Chunk) -> rec.ChunkIndex:
 
 
 def _match(what: str, stated: Iterable[object], actual: Iterable[object]) -> None:
-    stated_items, actual_items = list(stated), list(actual)
-    if len(stated_items) != len(actual_items):
-        raise corrupt(
-            f"the index names {len(stated_items)} {what} records, "
-            f"the file holds {len(actual_items)}"
-        )
-    if set(stated_items) != set(actual_items):
+    named, held = list(stated), list(actual)
+    if len(named) != len(held):
+        raise corrupt(f"the index names {len(named)} {what} records, the file holds {len(held)}")
+    if set(named) != set(held):
         raise corrupt(f"the index contradicts the file on a {what} record")

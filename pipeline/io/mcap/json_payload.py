@@ -229,10 +229,8 @@ def _leaf(name: str, values: list[Any]) -> Leaf:
 def _numbers(name: str, values: list[Any]) -> Any:
     try:
         if all(type(value) is int for value in values) and values:
-            integers = np.array(values, np.int64)
-            return (
-                integers if np.abs(integers).max() > _EXACT_INTEGER else integers.astype(np.float64)
-            )
+            exact = np.array(values, np.int64)
+            return exact if np.abs(exact).max() > _EXACT_INTEGER else exact.astype(np.float64)
         numbers = np.array([np.nan if v is None else float(v) for v in values], np.float64)
     except (TypeError, ValueError, OverflowError):
         raise _bad(f"has something other than numbers in {name!r}") from None

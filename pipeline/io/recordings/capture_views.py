@@ -305,10 +305,8 @@ def _sheet_tab(shown: Shown, name: str) -> Any:
         if step == 1:
             views.append(_table_view(table, "Samples"))
         else:
-            table_view = _table_view(table, f"Samples, one row in {step}")
-            views.append(
-                rrb.Tabs(table_view, _table_view(shown.traces[0], "All samples"), active_tab=0)
-            )
+            thin = _table_view(table, f"Samples, one row in {step}")
+            views.append(rrb.Tabs(thin, _table_view(shown.traces[0], "All samples"), active_tab=0))
     return rrb.Horizontal(*views, name=name)
 
 

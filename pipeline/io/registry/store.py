@@ -238,11 +238,7 @@ class Registry:
         revisions = {version.key: version.revision for version in versions}
 
         def append(events: Sequence[Event]) -> list[Row]:
-            tags_of = {
-                v.key: v.tags
-                for versions_of_key in histories(events).values()
-                for v in versions_of_key
-            }
+            tags_of = {v.key: v.tags for history in histories(events).values() for v in history}
             number, chain = (events[-1].sequence, events[-1].chain) if events else (0, START)
             rows: list[Row] = []
             for key, revision in revisions.items():
@@ -288,9 +284,7 @@ class Registry:
     def revocations(self) -> Mapping[str, tuple[Revocation, ...]]:
         """The versions that are revoked now, by motor; none where there is no registry yet."""
         motors = histories(self._table.events() or ())
-        by_motor = {
-            m: tuple(r for v in history if (r := v.revocation)) for m, history in motors.items()
-        }
+        by_motor = {m: tuple(r for v in past if (r := v.revocation)) for m, past in motors.items()}
         return {motor_id: revoked for motor_id, revoked in by_motor.items() if revoked}
 
     def last_commit(self) -> int | None:

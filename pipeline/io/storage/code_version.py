@@ -337,15 +337,11 @@ def _own(*modules: str) -> list[str]:
 
 def _versions(names: Iterable[str]) -> list[str]:
     """`name version` of distributions, and of those that are named after them (`polars-...`)."""
-    installed_versions = installed()
+    known = installed()
     versions = []
     for name in sorted({_plain(name) for name in names}):
-        of_distribution = [n for n in installed_versions if n == name or n.startswith(f"{name}-")]
-        versions += (
-            [f"{n} {installed_versions[n]}" for n in sorted(of_distribution)]
-            if name in installed_versions
-            else [f"{name} -"]
-        )
+        parts = [n for n in known if n == name or n.startswith(f"{name}-")]
+        versions += [f"{n} {known[n]}" for n in sorted(parts)] if name in known else [f"{name} -"]
     return versions
 
 

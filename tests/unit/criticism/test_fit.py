@@ -48,7 +48,7 @@ def test_a_prior_costs_the_squared_distance_from_its_centre() -> None:
     prior = Prior(np.array([4.0, 1.0]), np.array([2.0, 3.0]), elsewhere=7.0)
     assert prior.cost() == pytest.approx(1.0 + 9.0)
     assert prior.cost(np.array([-0.5, -1.0])) == pytest.approx(0.0 + 4.0)
-    assert prior.restricted_to(np.array([0])).elsewhere == pytest.approx(7.0 + 9.0)
+    assert prior.only(np.array([0])).elsewhere == pytest.approx(7.0 + 9.0)
 
 
 def test_what_is_always_in_the_fit_keeps_the_fit_s_error() -> None:

@@ -60,7 +60,7 @@ def test_moved_and_along_are_the_same_as_rows_moved_and_chosen():
     direct = normal_equations(matrix, residual + matrix[:, [1, 3]] @ [0.7, -0.2])
     assert there.power == pytest.approx(direct.power)
     assert there.slope == pytest.approx(direct.slope)
-    some = there.restricted_to(np.array([0, 2])).best()
+    some = there.only(np.array([0, 2])).best()
     left, none = residual + matrix[:, [1, 3]] @ [0.7, -0.2], np.zeros(2)
     again = normal_equations(matrix[:, [0, 2]], left, none, none).best()
     assert some.step == pytest.approx(again.step)
