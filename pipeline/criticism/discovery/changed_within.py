@@ -99,9 +99,9 @@ def changed_within(system: LinearSystem) -> ChangeWithin | None:
     ]
     rows = _Rows.of(system)
     tried = [
-        found
+        change
         for capture in sorted(captures)
-        for found in _found(system, rows, capture, places, significant)
+        for change in _changes(system, rows, capture, places, significant)
     ]
     return max(tried, key=lambda change: change.gain, default=None)
 
@@ -151,7 +151,7 @@ class _Steps:
         share = np.where(self.in_capture, np.clip(np.nan_to_num(passed), 0.0, 1.0), self.away)
         return End.of(self.system, (share * self.column)[:, None])
 
-    def near(self, cut: int, deviance: float, least: int) -> tuple[int, int]:
+    def interval(self, cut: int, deviance: float, least: int) -> tuple[int, int]:
         """First and last cut beside the best one that captures do not discriminate from it."""
         ends, tie = [cut, cut], self.system.policy.selection.tie
         for side, step in enumerate((-1, 1)):
@@ -164,7 +164,7 @@ class _Steps:
         return ends[0], ends[1]
 
 
-def _found(
+def _changes(
     system: LinearSystem,
     rows: _Rows,
     capture: str,
@@ -177,11 +177,11 @@ def _found(
     before = End.of(system, np.empty((system.size, 0)))
     for place in places:
         column, name = system.matrix[:, place], system.columns[place].name
-        seen = in_capture & (column != 0.0) & np.isfinite(rows.time_s)
-        times = np.unique(rows.time_s[seen])
+        shows = in_capture & (column != 0.0) & np.isfinite(rows.time_s)
+        times = np.unique(rows.time_s[shows])
         if times.size < 2 * least:
             continue
-        scanned = _scanned(system, rows, seen, place, times, least)
+        scanned = _scanned(system, rows, shows, place, times, least)
         if scanned is None:
             continue
         cut, after = scanned
@@ -192,8 +192,8 @@ def _found(
         most = clears(system, significant, before.reduced_chi2, end.reduced_chi2)
         if gain <= tie or not most or steps.ramp().deviance < end.deviance + tie:
             continue
-        first, last = steps.near(cut, end.deviance, least)
-        reach = float(rows.reach_s[seen].max())
+        first, last = steps.interval(cut, end.deviance, least)
+        reach = float(rows.reach_s[shows].max())
         at_s = float(times[first] - reach), float(times[last + 1] + reach)
         value = system.fit.values[name] + float(end.step[place])
         difference, unit = float(end.step[-1]), unit_of(system, name)
@@ -204,7 +204,12 @@ def _found(
 
 
 def _scanned(
-    system: LinearSystem, rows: _Rows, seen: NDArray[np.bool_], place: int, times: Array, least: int
+    system: LinearSystem,
+    rows: _Rows,
+    shows: NDArray[np.bool_],
+    place: int,
+    times: Array,
+    least: int,
 ) -> tuple[int, list[str]] | None:
     """Number of the last time before the best change, and the captures that have the later value.
 
@@ -213,40 +218,24 @@ def _scanned(
     which a shaft accelerates is an event, and no other inertia from then on.
     """
     column = system.matrix[:, place]
-    capture = rows.capture[seen][0]
-    held = [n for n in np.unique(rows.capture[column != 0.0]).tolist() if n != capture]
-    columns = [np.where(rows.capture == name, column, 0.0) for name in held]
+    capture = rows.capture[shows][0]
+    others = [n for n in np.unique(rows.capture[column != 0.0]).tolist() if n != capture]
+    columns = [np.where(rows.capture == name, column, 0.0) for name in others]
     known = np.column_stack([system.matrix[:, system.model_columns], *columns])
     weight = system.weights(system.reduced_chi2(system.residual))
-    precision, gradient = (
-        np.pad(of[system.model_columns], (0, len(columns)))
-        for of in (system.prior_precision, system.prior_gradient)
-    )
     weighted = known * weight[:, None]
-    inverse = pseudo_inverse(weighted.T @ known + np.diag(precision))
-    slope = weighted.T @ system.residual + gradient
-    bins = np.searchsorted(times, rows.time_s[seen])
-    changing = column[seen]
-
-    def after(parts: Array) -> Array:
-        """Sums [T - 1] over what is later than each time but the last."""
-        summed = np.zeros((times.size, *parts.shape[1:]))
-        np.add.at(summed, bins, parts)
-        return np.cumsum(summed[::-1], axis=0)[::-1][1:]
-
-    known_by = weight[seen] * changing**2
-    later = after(known_by)
-    earlier, squares = (
-        np.cumsum(np.bincount(bins, of, times.size), dtype=np.float64)[:-1]
-        for of in (known_by, known_by**2)
-    )
-    few = np.minimum(_windows(later, after(known_by**2)), _windows(earlier, squares))
-    cross = after(weighted[seen] * changing[:, None])
-    slopes = after(weight[seen] * changing * system.residual[seen]) - cross @ inverse @ slope
-    free = later - np.einsum("ti,ij,tj->t", cross, inverse, cross)
+    inverse, slope = _covariance_and_slope(system, known, weighted)
+    bins = np.searchsorted(times, rows.time_s[shows])
+    changing = column[shows]
+    known_by = weight[shows] * changing**2
+    cross = _later(weighted[shows] * changing[:, None], bins)
+    residual = weight[shows] * changing * system.residual[shows]
+    slopes = _later(residual, bins) - cross @ inverse @ slope
+    free = _later(known_by, bins) - np.einsum("ti,ij,tj->t", cross, inverse, cross)
     gain = np.where(free > 0.0, slopes**2 / np.maximum(free, 1e-300), 0.0)
     inside = np.arange(gain.size)
-    gain[(few < least) | (inside < least - 1) | (inside >= times.size - least)] = -1.0
+    few = _windows(known_by, bins) < least
+    gain[few | (inside < least - 1) | (inside >= times.size - least)] = -1.0
     cut = int(np.argmax(gain))
     if gain[cut] < 0.0:
         return None
@@ -254,11 +243,43 @@ def _scanned(
     step = -inverse @ (slope + cross[cut] * difference)
     return cut, [
         n
-        for n, one in zip(held, step[step.size - len(held) :].tolist(), strict=True)
-        if abs(one - difference) < abs(one)
+        for n, own in zip(others, step[step.size - len(others) :].tolist(), strict=True)
+        if abs(own - difference) < abs(own)
     ]
 
 
-def _windows(known_by: Array, known_by_square: Array) -> Array:
-    """Effective number of windows [T] that share what is known: (Σ k)²/Σ k² (Kish, 1965)."""
-    return known_by**2 / np.maximum(known_by_square, 1e-300)
+def _covariance_and_slope(
+    system: LinearSystem, known: Array, weighted: Array
+) -> tuple[Array, Array]:
+    """Of the model's own columns and further ones, `known` [R, k], which no prior restricts."""
+    precision, gradient = (
+        np.pad(of[system.model_columns], (0, known.shape[1] - system.model_columns.size))
+        for of in (system.prior_precision, system.prior_gradient)
+    )
+    inverse = pseudo_inverse(weighted.T @ known + np.diag(precision))
+    return inverse, weighted.T @ system.residual + gradient
+
+
+def _later(parts: Array, bins: NDArray[np.intp]) -> Array:
+    """Sums [T - 1] over what is later than each time but the last; `bins` number the times."""
+    summed = np.zeros((int(bins.max()) + 1, *parts.shape[1:]))
+    np.add.at(summed, bins, parts)
+    return np.cumsum(summed[::-1], axis=0)[::-1][1:]
+
+
+def _windows(known_by: Array, bins: NDArray[np.intp]) -> Array:
+    """Effective number of windows [T - 1] that share what is known: (Σ k)²/Σ k² (Kish, 1965), on
+    the side of each time that has fewer. Either side is summed from its own end: a difference of
+    two sums rounds to nothing.
+    """
+    sides = [
+        (_later(known_by, bins), _later(known_by**2, bins)),
+        (_earlier(known_by, bins), _earlier(known_by**2, bins)),
+    ]
+    later, earlier = (total**2 / np.maximum(squares, 1e-300) for total, squares in sides)
+    return np.minimum(later, earlier)
+
+
+def _earlier(parts: Array, bins: NDArray[np.intp]) -> Array:
+    """Sums [T - 1] over what is no later than each time but the last."""
+    return np.cumsum(np.bincount(bins, parts), dtype=np.float64)[:-1]

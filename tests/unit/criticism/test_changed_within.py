@@ -109,3 +109,14 @@ def test_what_one_window_shows_is_an_event_and_no_other_value_from_then_on():
     found_change = scanned(np.ones(20), 50.0 * (np.arange(20) >= 5))
     assert found_change is not None
     assert found_change[0] == 4
+
+
+def test_windows_that_hardly_show_a_constant_do_not_count_as_many():
+    """An event in a window that shows next to nothing, before all those that do: what one side
+    knows is summed from its own end, since as a difference of two sums its square rounds to nothing
+    and it would count as infinitely many windows.
+    """
+    shown = np.repeat([1e-8, 1e-5, 1.0], [3, 1, 16])
+    change = scanned(shown, 4.0 * (np.arange(20) == 3))
+    assert change is not None
+    assert change[0] >= 7, "four windows that show it are no earlier than the eighth"
