@@ -125,6 +125,20 @@ class LinearSystem:
         return np.bincount(self.group, minlength=len(self.labels)).astype(float)
 
     @property
+    def independent_counts(self) -> Array:
+        """Weak samples [G] of independent noise that tell as much as each group does.
+
+        n / (1 + (n − 1)ρ), where ρ is the share of the floor's variance that is no noise of the
+        sensors: an allowance for what bench and model have wrong may be the same error in every
+        window [Kish (1965), Survey Sampling, 5.4: the design effect].
+        """
+        counts = self.counts
+        noise = (np.concatenate(self.fit.sigma)[self.group] * self.row_weight) ** 2
+        share = np.bincount(self.group, noise, counts.size) / np.maximum(counts, 1.0)
+        each: Array = counts / (1.0 + np.maximum(counts - 1.0, 0.0) * (1.0 - share))
+        return each
+
+    @property
     def deviance(self) -> float:
         """−2 log likelihood, less constants, and the cost of the priors."""
         cost = float(self.prior_costs().sum())

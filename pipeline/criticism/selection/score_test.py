@@ -535,6 +535,9 @@ def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Stan
 def fall_below_floor(system: LinearSystem, before: Array, after: Array) -> float:
     """Fall of the deviance in signals that at some order have no excess that counts.
 
+    There an allowance for a bench's and a model's errors counts as one error of a group, whatever
+    its shape, and not as noise that windows average.
+
     Parameters
     ----------
     system
@@ -547,7 +550,7 @@ def fall_below_floor(system: LinearSystem, before: Array, after: Array) -> float
     """
     pool, worth = _pools(system, before)
     below = ~worth[pool]
-    counts = system.counts[below]
+    counts = system.independent_counts[below]
     return deviance_of(counts, before[below]) - deviance_of(counts, after[below])
 
 
