@@ -7,12 +7,20 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
+from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.settling import unexplained_voltage
 from pipeline.criticism.data.traces import smoothed, window_of
 from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values, between
 from pipeline.criticism.equation import Channel, Equation, NamedCombination, Observes, Sensing, Use
-from pipeline.criticism.machine.model import LATE_VOLTAGE, STATE, Model, Pieces, evaluate
+from pipeline.criticism.machine.model import (
+    ELECTRICAL,
+    LATE_VOLTAGE,
+    STATE,
+    Model,
+    Pieces,
+    evaluate,
+)
 from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
 from pipeline.criticism.signals.voltage import recorded_voltage
 from pipeline.numerics.projection import projection, window_starts
@@ -73,7 +81,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         weak=weak,
         blocks=in_time(weak.starts + window // 2, keep.size),
     )
-    return replace(segment, fixed={**segment.fixed, LATE_VOLTAGE: 1.0})
+    return replace(segment, fixed={**segment.fixed, LATE_VOLTAGE: 1.0, ELECTRICAL: 1.0})
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
@@ -113,10 +121,9 @@ def predicted(segment: Segment, x: Operating, _: Pieces, model: Model, values: V
 
     Notes
     -----
-    v_q = Im(R i + drops) + ω_e ψ_d with i_q = (J d²θ/dt² + drags)/(1.5 p ψ_d), where the current
-    settles much sooner than the speed. Drops and drags are those of a current by the smoothed
-    speed, for the second difference of an angle is mostly noise; R times the difference of both is
-    linear and stays.
+    v_q = Im(R i + L di/dt + drops) + ω_e ψ_d with i_q = (J d²θ/dt² + drags)/(1.5 p ψ_d). Drops and
+    drags are those of a current by the smoothed speed, for the second difference of an angle is
+    mostly noise; R times the difference of both is linear and stays.
 
     """
     bend = np.zeros(x.theta_rad.size)
@@ -130,8 +137,21 @@ def predicted(segment: Segment, x: Operating, _: Pieces, model: Model, values: V
         pieces = evaluate(model, driven, values)
     rough = (1.0 + values["lead_share"]) * values["r_ohm"] * values["j_kgm2"] / kt
     volts = pieces.drop_v + 1j * x.machine.pole_pairs * x.omega_rad_s * pieces.psi_wb.real
-    volts = volts + 1j * rough * (bend - smooth)
+    volts = volts + 1j * (rough * (bend - smooth) + _across_l(segment, bend, model, values))
     return recorded_voltage(volts, segment, driven, model, values, in_frame=True).imag[None]
+
+
+def _across_l(segment: Segment, bend: Array, model: Model, values: Values) -> Array:
+    """Voltage of the inductance [n] as the acceleration changes, L J d³θ/dt³/(1.5 p ψ).
+
+    With another delay and inertia it is nearly the same voltage, so L/R is a nuisance. R J/ψ is
+    that of the machine's scales: so the term is linear, and what it goes with stays apart from it.
+    """
+    scales = base_scales(model.machine)
+    kt = 1.5 * model.machine.pole_pairs * scales["psi_wb"]
+    per_jerk = values[ELECTRICAL] * scales["r_ohm"] * scales["j_kgm2"] / kt
+    change: Array = per_jerk * np.gradient(bend, segment.ts_s)
+    return change
 
 
 def _winding(segment: Segment, model: Model, values: Values) -> tuple[float, float]:
@@ -165,6 +185,7 @@ def _ka(segment: Segment, model: Model, values: Values) -> float:
     return r_ohm * values["j_kgm2"] / (1.5 * ke)
 
 
+_DETERMINES = ("r_ohm", "lead_share", "psi_wb", "j_kgm2", "b_nm_s_rad")
 _KT = "(1.5*pole_pairs*psi_wb)"
 _OF = ("r_ohm", "psi_wb")
 COMBINATIONS = (
@@ -185,7 +206,7 @@ COMBINATIONS = (
 
 EQUATION = Equation(
     name="driven",
-    words="v_q = Im(R i + drops) + ω_e ψ_d, i_q = (J dω/dt + drags)/(1.5 p ψ_d)",
+    words="v_q = Im(R i + L di/dt + drops) + ω_e ψ_d, i_q = (J dω/dt + drags)/(1.5 p ψ_d)",
     tests=("drive",),
     columns=("t_s", VOLTAGE),
     channels=(Channel(VOLTAGE, "voltage_v"),),
@@ -194,7 +215,7 @@ EQUATION = Equation(
     measured=measured,
     predicted=predicted,
     observes=Observes(
-        ("r_ohm", "lead_share", "psi_wb", "j_kgm2", "b_nm_s_rad", LATE_VOLTAGE, *STATE),
+        (*_DETERMINES, LATE_VOLTAGE, ELECTRICAL, *STATE),
         hooks=frozenset({"flux", "drop", "torque"}),
         sensors=frozenset({"angle", "voltage", "clock"}),
         form="neither",

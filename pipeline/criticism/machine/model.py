@@ -116,6 +116,7 @@ BASE: tuple[Constant, ...] = (
     _unlogged("unlogged_magnet_k", words="unrecorded magnet over ambient"),
     _of_log("late_speed_s", "s", "lateness of a speed that no angle is beside", curved=True),
     _of_log("late_voltage_s", "s", "by how much motion follows a voltage late", curved=True),
+    _of_log("electrical_s", "s", "L/R of a winding whose current is not logged"),
     _of_log("unsampled_share", "1", "change of flux that samples of a voltage miss"),
     _of_log("coast_dry_share", "1", "dry drags of coasts over others, less one"),
     _of_log("coast_viscous_share", "1", "viscous drag of coasts over others, less one"),
@@ -128,6 +129,8 @@ LATE_SPEED = "late_speed_s"
 """Nuisance of a log whose motion is known by an observer's or a tachometer's speed alone."""
 LATE_VOLTAGE = "late_voltage_s"
 """Nuisance of a log of voltage and motion that two computers, or a filter, put on one clock."""
+ELECTRICAL = "electrical_s"
+"""Nuisance of the same: the electrical time constant by which the current follows the voltage."""
 UNSAMPLED = "unsampled_share"
 """Nuisance of a voltage that is logged at instants, of what happens within a row."""
 COAST_SHARES = ("coast_dry_share", "coast_viscous_share")

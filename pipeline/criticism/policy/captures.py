@@ -325,6 +325,10 @@ class Priors:
         0.05, "s", "by how much motion follows a voltage late, where no current is logged",
         why="buses and filters of robots are up to 0.1 s late",
     )  # fmt: skip
+    electrical_s: float = chosen(
+        2e-3, "s", "L/R of a winding where no current is logged",
+        why="windings of small motors have 0.1 to 5 ms",
+    )  # fmt: skip
     unsampled_share: float = derived(
         10.0, "1", "change of flux within a row, as a sampled voltage shows it, over the true one",
         source="a sample before the current moves shows nothing; one at the jump of a loop that "

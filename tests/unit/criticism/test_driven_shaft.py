@@ -75,6 +75,33 @@ def test_the_feedforward_constants_are_known_and_nothing_else(seed: int, late_s:
     assert found.held_out < 2.0
 
 
+def test_a_winding_that_settles_little_sooner_than_its_shaft_makes_no_other_inertia() -> None:
+    """L/R of a hub motor is a third of its mechanical time constant: kA is that of the coast."""
+    j_kgm2, electrical_s, step_s = 2.4e-5, 2e-3, 1e-4
+    rng = np.random.default_rng(7)
+    levels = np.repeat(rng.uniform(0.5, 1.0, 100) * np.repeat([5.0, -5.0], 50), 600)
+    current, omega, theta = 0.0, 0.0, np.zeros(levels.size + 1)
+    for k, volts in enumerate(levels.tolist()):
+        current += step_s / electrical_s * ((volts - KE * omega) / R_OHM - current)
+        drag = COULOMB_NM * (np.sign(omega) or np.sign(current)) + VISCOUS * omega
+        omega += step_s / j_kgm2 * (KT * current - drag)
+        theta[k + 1] = theta[k] + step_s * omega
+    rows = np.arange(0, levels.size, 10)
+    encoder = 2 * np.pi / 16384
+    recorded = {
+        "t_s": rows * step_s,
+        "vq_v": levels[rows] + 2e-3 * rng.normal(size=rows.size),
+        "theta_mech_rad": np.round(theta[rows] / encoder) * encoder,
+    }
+    meta = CaptureMeta("m", "drive", voltage_kind="commanded", extra={})
+    capture = Capture("log.csv", "0", "verified", meta, (pl.DataFrame(recorded),))
+    found = compare(Campaign("m", (capture,)), ModelSpec(), Constants({}))
+    known = {one.expression.split(" ")[0]: one for one in found.combinations}
+    true = R_OHM * j_kgm2 / KT
+    assert abs(known["ka_v_s2_rad"].value - true) < 2.5 * known["ka_v_s2_rad"].u
+    assert known["ka_v_s2_rad"].u < 0.3 * true
+
+
 def test_of_stated_resistance_and_back_emf_the_inertia_follows() -> None:
     """The product is R J/ψ: with two of them stated, the third is measured."""
     # v = R i + Ke ω and T = 1.5 Ke i of the q axis: 1.5 times a brushed motor's resistance
