@@ -48,7 +48,7 @@ def missing_by(**reduced_chi2):
         labels=tuple((0, name, 0) for name in reduced_chi2),
         prior_precision=none,
         prior_gradient=none,
-        fit=Fit((log(),) * 3, model, dict(BASE), (), BASE),
+        fit=Fit((log(),) * 3, model, dict(BASE), (np.ones(len(reduced_chi2)),), BASE),
         model_column_count=none.size,
         made_at={},
     )
