@@ -11,18 +11,37 @@ from pipeline.criticism.machine.inverter import lost_shares, phases_of, turning,
 def _drop(x: Operating, q: Values) -> Complex:
     if not x.inverter:
         return np.zeros(x.omega_rad_s.shape, dtype=complex)
-    before, eps = x.i_a, x.eps_rad
-    if q["lag_s"]:
-        before = before - np.gradient(before) / x.ts_s * q["lag_s"]
-        eps = eps - x.machine.pole_pairs * x.omega_rad_s * q["lag_s"]
-    turn = x.once(eps, "turning", lambda: turning(eps))
-    phases = phases_of(before * turn)
+    given = _given(x, q) if q["given_v"] else 0.0
+    whole_v = q["loss_v"] + q["given_v"]
+    if q["given_v"] and x.supply.volts_v is not None:
+        x = x.fed(volts_v=x.supply.volts_v + given)
+    turn, phases, eps = _phases(x, q["lag_s"])
     if q["ripple"]:
-        shares = lost_shares(x, eps, phases, q["loss_v"], q["width_a"])
+        shares = lost_shares(x, eps, phases, whole_v, q["width_a"])
     else:
         shares = np.tanh(phases / q["width_a"])
-    rotor: Complex = q["loss_v"] * vector_of(shares) * np.conj(turn)
+    rotor: Complex = whole_v * vector_of(shares) * np.conj(turn) - given
     return rotor + q["on_v"] / x.machine.scales["current_a"] * x.i_a if q["on_v"] else rotor
+
+
+def _given(x: Operating, q: Values) -> Complex:
+    """Voltage [n, V] that a drive adds against its dead time: by the sign of each phase current
+    that it sampled a while before, in proportion to the current where that is small.
+    """
+    _, phases, _ = _phases(x, q["given_lag_s"])
+    turn = x.once(x.eps_rad, "turning", lambda: turning(x.eps_rad))
+    given: Complex = q["given_v"] * vector_of(np.tanh(phases / q["ramp_a"])) * np.conj(turn)
+    return given
+
+
+def _phases(x: Operating, lag_s: float) -> tuple[Complex, Array, Array]:
+    """Unit vector of the rotor [n], phase currents [3, n, A] and angle [n, rad], a lag before."""
+    before, eps = x.i_a, x.eps_rad
+    if lag_s:
+        before = before - np.gradient(before) / x.ts_s * lag_s
+        eps = eps - x.machine.pole_pairs * x.omega_rad_s * lag_s
+    turn = x.once(eps, "turning", lambda: turning(eps))
+    return turn, phases_of(before * turn), eps
 
 
 def _sampled(x: Operating, q: Values) -> Complex:
@@ -35,7 +54,7 @@ def _sampled(x: Operating, q: Values) -> Complex:
     supply, l_d, l_q = x.supply, x.base["ld_h"], x.base["lq_h"]
     if not (x.inverter and q["sampled"] and supply.vdc_v and l_d and l_q):
         return np.zeros(x.omega_rad_s.shape, dtype=complex)
-    early_s = 0.5 * q["sampled"] * q["loss_v"] * supply.pwm_s / supply.vdc_v
+    early_s = 0.5 * q["sampled"] * (q["loss_v"] + q["given_v"]) * supply.pwm_s / supply.vdc_v
     volts = x.base["r_ohm"] * x.i_a + 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
     fallen: Complex = early_s * volts
     return fallen.real / l_d + 1j * fallen.imag / l_q
@@ -60,7 +79,7 @@ EFFECT = Effect(
     "Sul, IEEE Trans. Ind. Appl. 32 (1996), zero current clamping; Mohan, Undeland & Robbins, "
     "Power Electronics, 3rd ed. (2003), ch. 2, drop of a switch that is on",
     parameters=(
-        Parameter("loss_v", "V", 0.01, 0.0005, "voltage_v", low=0.0, high=0.5),
+        Parameter("loss_v", "V", 0.01, 0.0005, "voltage_v", low=-0.5, high=0.5),
         Parameter(
             "width_a", "A", 0.02, 0.0, "current_a", low=0.0003, high=0.3, scan=(0.001, 0.01, 0.05)
         ),
@@ -87,6 +106,29 @@ EFFECT = Effect(
             words="of half a dead time, by which a current is sampled before the middle of a pulse",
         ),
         Parameter("lag_s", "s", 0.25, 0.0, "period_s", low=-1.0, high=1.0, scan=(0.0,)),
+        Parameter("given_v", "V", 0.01, 0.0, "voltage_v", low=0.0, high=0.5, optional=2),
+        Parameter(
+            "ramp_a",
+            "A",
+            0.02,
+            0.0,
+            "current_a",
+            low=0.0003,
+            high=0.5,
+            scan=(0.03,),
+            optional=2,
+        ),
+        Parameter(
+            "given_lag_s",
+            "s",
+            0.25,
+            0.0,
+            "period_s",
+            low=-1.0,
+            high=3.0,
+            scan=(0.0,),
+            optional=2,
+        ),
     ),
     signals=("vd_v", "vq_v"),
     alternatives={"copper_temperature": "several currents: dead time does not grow with current"},
