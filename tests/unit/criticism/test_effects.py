@@ -72,7 +72,8 @@ def test_dead_time_is_a_sign_for_each_phase_in_the_abc_frame():
     x = operating()
     x.ts_s = 1.0
     drop = LIBRARY["dead_time"].drop(
-        x, {"loss_v": 0.2, "width_a": 1e-6, "lag_s": 0.0, "on_v": 0.0, "ripple": 0.0}
+        x,
+        {"loss_v": 0.2, "width_a": 1e-6, "lag_s": 0.0, "on_v": 0.0, "ripple": 0.0, "given_v": 0.0},
     )
     stationary = (x.id_a + 1j * x.iq_a) * np.exp(1j * x.eps_rad)
     phases = [np.real(stationary * np.exp(-2j * np.pi * k / 3)) for k in range(3)]
@@ -84,10 +85,27 @@ def test_dead_time_is_a_sign_for_each_phase_in_the_abc_frame():
 
 def test_a_switch_that_is_on_drops_with_the_current():
     x = operating()
-    of = {"loss_v": 0.0, "width_a": 1.0, "lag_s": 0.0, "on_v": 0.3, "ripple": 0.0}
+    of = {"loss_v": 0.0, "width_a": 1.0, "lag_s": 0.0, "on_v": 0.3, "ripple": 0.0, "given_v": 0.0}
     drop = LIBRARY["dead_time"].drop(x, of)
     assert drop == pytest.approx(0.3 * x.i_a / x.machine.scales["current_a"])
     assert not np.any(LIBRARY["dead_time"].drop(replace(x, inverter=False), of))
+
+
+def test_a_compensation_gives_back_by_an_earlier_current_what_dead_time_takes():
+    """In full at large currents; of those that turned since its sample, in the wrong sense."""
+    x = operating()
+    of = {"loss_v": 0.2, "width_a": 1e-6, "lag_s": 0.0, "on_v": 0.0, "ripple": 0.0, "given_v": 0.0}
+    gives = of | {"loss_v": 0.0, "given_v": 0.2, "ramp_a": 1e-6, "given_lag_s": 0.0}
+    drop = LIBRARY["dead_time"].drop
+    whole, late_s = drop(x, of), 2e-4
+    assert np.abs(drop(x, gives)).max() < 1e-12
+    assert drop(x, gives | {"loss_v": 0.05}) == pytest.approx(0.25 * whole)
+    assert drop(x, gives | {"ramp_a": 1e9}) == pytest.approx(whole)
+    still = replace(x, id_a=np.full(x.id_a.size, 2.0), iq_a=np.full(x.id_a.size, 3.0), kept={})
+    before = replace(still, eps_rad=x.eps_rad - x.machine.pole_pairs * x.omega_rad_s * late_s)
+    turned = np.exp(1j * (before.eps_rad - x.eps_rad))
+    late = drop(still, of) - drop(before, of) * turned
+    assert drop(still, gives | {"given_lag_s": late_s}) == pytest.approx(late)
 
 
 @pytest.mark.parametrize(("pole_pairs", "slots", "order"), [(7, 12, 84), (20, 63, None)])

@@ -132,7 +132,14 @@ def test_without_switching_the_current_alone_decides():
 def test_where_a_drop_jumps_with_the_current_its_floor_is_that_jump():
     """A twentieth of the current decides of much of the loss there, and of nothing elsewhere."""
     model = Model(machine(), (effects()["dead_time"],))
-    of = {"loss_v": LOSS_V, "width_a": 1e-3, "on_v": 0.0, "ripple": 1.0, "lag_s": 0.0}
+    of = {
+        "loss_v": LOSS_V,
+        "width_a": 1e-3,
+        "on_v": 0.0,
+        "ripple": 1.0,
+        "lag_s": 0.0,
+        "given_v": 0.0,
+    }
     values = {**BASE, "ld_h": L_H, "lq_h": L_H}
     values |= {f"dead_time.{name}": value for name, value in of.items()}
 
