@@ -1,11 +1,20 @@
-"""Inverter dead time: a voltage against the sign of each phase current."""
+"""Inverter dead time, and what its compensation leaves: by the sign of each phase current."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
-from pipeline.criticism.machine.inverter import lost_shares, phases_of, turning, vector_of
+from pipeline.criticism.machine.inverter import (
+    lost_shares,
+    phases_of,
+    swept_shares,
+    turning,
+    vector_of,
+)
+
+_EDGES, _MOMENTS = 1.0, 2.0
+"""Choices of `ripple`."""
 
 
 def _drop(x: Operating, q: Values) -> Complex:
@@ -16,8 +25,10 @@ def _drop(x: Operating, q: Values) -> Complex:
     if q["given_v"] and x.supply.volts_v is not None:
         x = x.fed(volts_v=x.supply.volts_v + given)
     turn, phases, eps = _phases(x, q["lag_s"])
-    if q["ripple"]:
+    if q["ripple"] == _EDGES:
         shares = lost_shares(x, eps, phases, whole_v, q["width_a"])
+    elif q["ripple"] == _MOMENTS:
+        shares = swept_shares(x, eps, phases, q["width_a"])
     else:
         shares = np.tanh(phases / q["width_a"])
     rotor: Complex = whole_v * vector_of(shares) * np.conj(turn) - given
@@ -68,9 +79,10 @@ def _torque(x: Operating, q: Values) -> Array:
 
 EFFECT = Effect(
     name="dead_time",
-    words="each phase loses V tanh(i/width), in the limit V sign(i), i a lag before the sample, or "
-    "(ripple 1) what the edges of a switching period make of it; and on_v i/i_max in its switches; "
-    "current is sampled half a dead time before the middle of its pulses",
+    words="each phase loses (V + V_c) tanh(i/width), in the limit the sign of i, i a lag before "
+    "the sample, or what the edges (ripple 1) or moments (2) of a switching period make of it, of "
+    "which a compensation gives back V_c tanh(i/ramp), i its own lag before; and on_v i/i_max in "
+    "its switches; current is sampled half a dead time before the middle of its pulses",
     signature="voltage offset at small current, orders 6ε, the same at every speed",
     tests=("torque_map", "drive", "heat_run"),
     experiment="steps of current from a hundredth of rated current up, at low speed",
@@ -79,7 +91,17 @@ EFFECT = Effect(
     "Sul, IEEE Trans. Ind. Appl. 32 (1996), zero current clamping; Mohan, Undeland & Robbins, "
     "Power Electronics, 3rd ed. (2003), ch. 2, drop of a switch that is on",
     parameters=(
-        Parameter("loss_v", "V", 0.01, 0.0005, "voltage_v", low=-0.5, high=0.5),
+        Parameter(
+            "loss_v",
+            "V",
+            0.01,
+            0.0005,
+            "voltage_v",
+            low=-0.5,
+            high=0.5,
+            words="at a large current, less what a compensation gives back; below 0 of one that "
+            "gives back too much",
+        ),
         Parameter(
             "width_a", "A", 0.02, 0.0, "current_a", low=0.0003, high=0.3, scan=(0.001, 0.01, 0.05)
         ),
@@ -90,9 +112,10 @@ EFFECT = Effect(
             "1",
             1.0,
             0.0,
-            scan=(0.0, 1.0),
+            scan=(0.0, 1.0, 2.0),
             choice=True,
-            words="1: as pwm_hz, vdc_v and L switch it, 0: by the mean current alone",
+            words="as pwm_hz, vdc_v and L switch it, 1: by the current at the edges, as a dead "
+            "time acts, 2: by that of each moment, as thresholds of switches do; 0: by the mean current",
         ),
         Parameter(
             "sampled",
@@ -106,7 +129,17 @@ EFFECT = Effect(
             words="of half a dead time, by which a current is sampled before the middle of a pulse",
         ),
         Parameter("lag_s", "s", 0.25, 0.0, "period_s", low=-1.0, high=1.0, scan=(0.0,)),
-        Parameter("given_v", "V", 0.01, 0.0, "voltage_v", low=0.0, high=0.5, optional=2),
+        Parameter(
+            "given_v",
+            "V",
+            0.01,
+            0.0,
+            "voltage_v",
+            low=0.0,
+            high=0.5,
+            optional=2,
+            words="given back by the drive's compensation, of what loss_v lacks",
+        ),
         Parameter(
             "ramp_a",
             "A",
@@ -117,6 +150,7 @@ EFFECT = Effect(
             high=0.5,
             scan=(0.03,),
             optional=2,
+            words="over which the compensation changes over",
         ),
         Parameter(
             "given_lag_s",
@@ -128,6 +162,7 @@ EFFECT = Effect(
             high=3.0,
             scan=(0.0,),
             optional=2,
+            words="from the sample that a compensation takes its sign of to where it acts",
         ),
     ),
     signals=("vd_v", "vq_v"),

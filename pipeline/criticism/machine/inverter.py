@@ -1,4 +1,4 @@
-"""What dead time takes from the legs of a switching inverter."""
+"""What dead time and the thresholds of switches take from the legs of a switching inverter."""
 
 from __future__ import annotations
 
@@ -15,6 +15,11 @@ _SHARP = 1e-9
 _FAR = 20.0
 """Widths beyond which what smooths a step is below the rounding of doubles: e^-40 is 4e-18."""
 _SIN_120 = 0.5 * 3.0**0.5
+_LEGS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0]])
+"""Legs that are high, from the middle of a period's one zero vector to that of the other [4, 3], of
+legs in falling order of voltage."""
+_SHORT = 1e-3
+"""Widths below which a mean of tanh is that at the middle: what it lacks is 1e-7."""
 
 
 def turning(eps_rad: Array) -> Complex:
@@ -120,17 +125,11 @@ def lost_shares(
     Choi & Sul, IEEE Trans. Ind. Appl. 32 (1996), zero current clamping. doi:10.1109/28.502170
 
     """
-    inductance = 0.5 * (x.base["ld_h"] + x.base["lq_h"])
-    width = max(width_a, _SHARP)
-    supply = x.supply
-    switched = supply.pwm_s and supply.vdc_v and inductance > 0.0
-    known = switched and x.psi_wb is not None and loss_v > 0.0
-    if not known:
+    width, supply = max(width_a, _SHARP), x.supply
+    known = _switching(x, eps_rad)
+    if known is None or loss_v <= 0.0:
         return np.tanh(current_a / width)
-    induced = 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
-    turn = x.once(eps_rad, "turning", lambda: turning(eps_rad))
-    winding = phases_of((x.base["r_ohm"] * x.i_a + induced) * turn)
-    recorded = None if supply.volts_v is None else phases_of(supply.volts_v * turn)
+    inductance, winding, recorded = known
     late = keeps = (current_a > 0.0).astype(float)
     per_volt = supply.pwm_s / (2.0 * inductance)
     ramp = 4.0 / 3.0 * loss_v * per_volt
@@ -147,6 +146,87 @@ def lost_shares(
         keeps = _passed(fall + (low_after - 0.5) * ramp, ramp, width)
     share: Array = late + keeps - 1.0
     return share
+
+
+def swept_shares(x: Operating, eps_rad: Array, current_a: Array, width_a: float) -> Array:
+    """What thresholds of switches take from each leg [3, n], of what they take at a large current.
+
+    Parameters
+    ----------
+    x : Operating
+        As for `lost_shares`.
+    eps_rad : Array
+        Electrical angle [n, rad].
+    current_a : Array
+        Phase currents [3, n, A], means over a switching period.
+    width_a : float
+        Current [A] over which a threshold changes over.
+
+    Notes
+    -----
+    A threshold acts at each moment, against the current of that moment: the share is the mean over
+    a period of tanh(i(t)/width). Pulses are centred, so a current is at its mean in the middle of
+    both zero vectors. Between, it moves by (V_dc (s_k − Σ s_j/3) − e_k)/L with the legs s that are
+    high, e the voltage at the winding, and in the other half of the period the other way.
+
+    References
+    ----------
+    Holmes & Lipo, Pulse Width Modulation for Power Converters (2003), ch. 6.
+    doi:10.1109/9780470546284
+
+    """
+    width = max(width_a, _SHARP)
+    known = _switching(x, eps_rad)
+    if known is None:
+        return np.tanh(current_a / width)
+    inductance, winding, recorded = known
+    volts = winding if recorded is None else recorded
+    order = np.argsort(-volts, axis=0)
+    told, induced, mean = (
+        np.take_along_axis(one, order, axis=0) for one in (volts, winding, current_a / width)
+    )
+    duty = np.clip(0.5 + (told - 0.5 * (told[0] + told[2])) / x.supply.vdc_v, 0.0, 1.0)
+    lasts = -np.diff(duty, axis=0, prepend=1.0, append=0.0)
+    per_volt = 0.5 * x.supply.pwm_s / inductance / width
+    moved, shares = np.zeros_like(mean), np.zeros_like(mean)
+    for high, share in zip(_LEGS, lasts, strict=True):
+        drive = x.supply.vdc_v * (high - high.mean())[:, None] - induced
+        after = moved + per_volt * share * drive
+        shares += 0.5 * share * (_mean_tanh(mean + moved, mean + after))
+        shares += 0.5 * share * (_mean_tanh(mean - moved, mean - after))
+        moved = after
+    of_legs = np.empty_like(shares)
+    np.put_along_axis(of_legs, order, shares, axis=0)
+    return of_legs
+
+
+def _switching(x: Operating, eps_rad: Array) -> tuple[float, Array, Array | None] | None:
+    """Inductance [H], voltages at the winding and, where they were recorded, those that were asked
+    for [3, n]; None where it is not known how the inverter switches.
+    """
+    supply, inductance = x.supply, 0.5 * (x.base["ld_h"] + x.base["lq_h"])
+    if not (supply.pwm_s and supply.vdc_v and inductance > 0.0 and x.psi_wb is not None):
+        return None
+    induced = 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
+    turn = x.once(eps_rad, "turning", lambda: turning(eps_rad))
+    winding = phases_of((x.base["r_ohm"] * x.i_a + induced) * turn)
+    recorded = None if supply.volts_v is None else phases_of(supply.volts_v * turn)
+    return inductance, winding, recorded
+
+
+def _mean_tanh(one: Array, other: Array) -> Array:
+    """Mean of tanh between two arguments."""
+    apart = other - one
+    short = np.abs(apart) < _SHORT
+    rise = _log_cosh(other) - _log_cosh(one)
+    mean: Array = np.where(short, np.tanh(0.5 * (one + other)), rise / np.where(short, 1.0, apart))
+    return mean
+
+
+def _log_cosh(at: Array) -> Array:
+    """Integral of tanh, but for a constant."""
+    size = np.abs(at)
+    return size + np.log1p(np.exp(-2.0 * size))
 
 
 def _beside(volts: Array, loss_v: float, late: Array, side: float) -> tuple[Array, Array]:
