@@ -115,7 +115,7 @@ EFFECT = Effect(
             scan=(0.0, 1.0, 2.0),
             choice=True,
             words="as pwm_hz, vdc_v and L switch it, 1: by the current at the edges, as a dead "
-            "time acts, 2: by that of each moment, as thresholds of switches do; 0: by the mean current",
+            "time acts, 2: by that of each moment, as thresholds of switches do; 0: by the mean",
         ),
         Parameter(
             "sampled",
