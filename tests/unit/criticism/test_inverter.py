@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.criticism.effect import Supply
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.inverter import lost_shares
+from pipeline.criticism.machine.inverter import lost_shares, swept_shares
 from pipeline.criticism.machine.model import Model, evaluate
 from pipeline.criticism.regression.noise_floors import steep_drops
 from tests.unit.criticism.machines import BASE, machine, operating
@@ -112,6 +112,26 @@ def test_dead_time_fades_where_the_ripple_exceeds_the_current():
     assert lost_by(slow).imag.mean() > 0.85 * TEXTBOOK_V
     assert abs(lost_by(fast).mean()) < 0.05 * TEXTBOOK_V
     assert lost_by(large).imag.mean() == pytest.approx(TEXTBOOK_V, rel=0.03)
+
+
+def test_thresholds_act_by_the_current_of_each_moment():
+    """Of a period stepped through: where the ripple exceeds a current, its sense changes within."""
+    width, x = 0.05, point([0.0, -2.0, 0.0], [0.2, 0.1, 3.0], [80.0, 150.0, 30.0])
+    winding = phases(x, BASE["r_ohm"] * x.i_a + 7j * x.omega_rad_s * x.flux_wb)
+    middle = 0.5 * (winding.max(axis=0) + winding.min(axis=0))
+    duty = 0.5 + (winding - middle) / VDC_V
+    at = (np.arange(STEPS) + 0.5) / STEPS - 0.5
+    high = (np.abs(at)[:, None, None] < 0.5 * duty).astype(float)
+    volts = VDC_V * (high - high.mean(axis=1, keepdims=True)) - winding
+    ripple = np.cumsum(volts, axis=0) * PWM_S / STEPS / L_H
+    mean = phases(x, x.i_a)
+    current = mean + ripple - ripple.mean(axis=0)
+    assert (np.ptp(ripple, axis=0) > 2.0 * np.abs(mean)).any()
+    stepped = np.tanh(current / width).mean(axis=0)
+    assert swept_shares(x, x.eps_rad, mean, width) == pytest.approx(stepped, abs=0.01)
+    plain = swept_shares(x.fed(pwm_s=0.0), x.eps_rad, mean, width)
+    assert plain == pytest.approx(np.tanh(mean / width))
+    assert np.abs(plain - stepped).max() > 0.2
 
 
 def test_at_little_voltage_a_resting_current_loses_what_is_told():

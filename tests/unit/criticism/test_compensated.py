@@ -1,0 +1,84 @@
+"""A dead time that the drive compensates: what is left is near zero current alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.requested_model import fit_of
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.simulator.bench import CAMPAIGN, campaign
+from pipeline.simulator.design import Bench
+from tests.simulated import campaign_of, design
+from tests.unit.criticism.machines import LIBRARY, log, machine
+
+LOST_V, GIVEN_V, RAMP_A = 0.5, 0.45, 1.5
+MOTOR = replace(design("gimbal-5208"), effects={})
+SMALL = (-0.6, -0.2, -0.1, -0.05, -0.02, 0.02, 0.05, 0.1, 0.2, 0.6)
+PLAN = (
+    *(step for step in CAMPAIGN if step[0] in ("resistance_ab", "spin_down_cw")),
+    ("drive_0", "drive", {"load": 0.0}),
+    ("drive_1", "drive", {"load": 0.0}),
+    (
+        "torque_map",
+        "torque_map",
+        {"speed": 0.1, "id_levels": (0.0, -0.1), "iq_levels": SMALL, "dwell_s": 0.15},
+    ),
+)
+
+
+def compensated() -> Segment:
+    """A log of a drive that gives back, in proportion to small currents, what dead time takes."""
+    plain = log(noise=1.0)
+    recorded = plain.recorded
+    current = recorded["id_a"] + 1j * recorded["iq_a"]
+    left = np.zeros(current.size, dtype=complex)
+    for k in range(3):
+        axis = np.exp(1j * (7 * recorded["theta_mech_rad"] - k * 2.0 * np.pi / 3.0))
+        phase = (current * axis).real
+        lost = LOST_V * np.sign(phase) - GIVEN_V * np.clip(phase / RAMP_A, -1.0, 1.0)
+        left += 2.0 / 3.0 * lost / axis
+    volts = {"vd_v": recorded["vd_v"] + left.real, "vq_v": recorded["vq_v"] + left.imag}
+    return replace(plain, recorded={**recorded, **volts})
+
+
+def fitted(*left_out: int) -> LinearSystem:
+    """The log by a dead time, with the terms that are not left out."""
+    effect = replace(LIBRARY["dead_time"], left_out=left_out)
+    return fit_of([compensated()], Model(machine(), (effect,))).system
+
+
+@pytest.mark.slow
+def test_a_compensation_is_told_from_the_dead_time_that_it_gives_back() -> None:
+    """It ramps in a straight line, which a tanh is not: what is given is off by a third."""
+    system, plain = fitted(1), fitted(1, 2)
+    values = system.fit.values
+    assert values["dead_time.loss_v"] == pytest.approx(LOST_V - GIVEN_V, abs=0.02)
+    assert values["dead_time.given_v"] == pytest.approx(GIVEN_V, rel=0.5)
+    assert values["dead_time.ramp_a"] == pytest.approx(RAMP_A / 1.4, rel=0.2)
+    after, before = (float(one.reduced_chi2(one.residual).max()) for one in (system, plain))
+    assert after < 0.1 * before
+
+
+@pytest.mark.slow
+def test_what_a_compensation_leaves_is_a_dead_time() -> None:
+    """By the simulator, which ramps in a straight line: it was `unknown` without a name, 48 floors
+    off.
+    """
+    rated = MOTOR.current_rated_a
+    lost_v, given = 0.02 * MOTOR.vdc_v, 0.95
+    dead = {"size": lost_v, "knee_a": 0.01 * rated, "compensated": given, "ramp_a": 0.1 * rated}
+    motor = MOTOR.having(dead_time=dead)
+    found = diagnose(campaign_of(campaign(motor, Bench(), 4, PLAN)), ModelSpec(), Constants())
+    assert (found.verdict, found.missing) == ("missing", ("dead_time",))
+    before, after = (step.held_out for step in found.ladder)
+    assert after < 0.1 * before
+    loss_v = found.ladder[-1].parameters["dead_time.loss_v"].value
+    assert loss_v == pytest.approx((1.0 - given) * lost_v, abs=0.1 * lost_v)
