@@ -31,7 +31,15 @@ ARITHMETIC = {
     "discovery/matching_pursuit.py": {"_RIDGE"},  # against rounding
     "discovery/residual_inputs.py": {"_WIDE"},  # no bound
     "machine/iron.py": {"PARALLEL"},  # a choice of an effect
-    "machine/inverter.py": {"_FAR", "_OTHERS", "_ROUNDS", "_SHARP", "_SIN_120"},  # rounding; legs
+    "machine/inverter.py": {
+        "_FAR",
+        "_LEGS",
+        "_OTHERS",
+        "_ROUNDS",
+        "_SHARP",
+        "_SHORT",
+        "_SIN_120",
+    },  # rounding; legs
     "machine/model.py": {"BASE", "_STEP"},  # a centre of ±1/12; a complex step
     "machine/two_masses.py": {"LINEAR_COUPLING"},  # sizes that an effect states for itself
     "regression/bounds.py": {"_AT"},  # rounding

@@ -182,10 +182,10 @@ def swept_shares(x: Operating, eps_rad: Array, current_a: Array, width_a: float)
     inductance, winding, recorded = known
     volts = winding if recorded is None else recorded
     order = np.argsort(-volts, axis=0)
-    told, induced, mean = (
+    asked, induced, mean = (
         np.take_along_axis(one, order, axis=0) for one in (volts, winding, current_a / width)
     )
-    duty = np.clip(0.5 + (told - 0.5 * (told[0] + told[2])) / x.supply.vdc_v, 0.0, 1.0)
+    duty = np.clip(0.5 + (asked - 0.5 * (asked[0] + asked[2])) / x.supply.vdc_v, 0.0, 1.0)
     lasts = -np.diff(duty, axis=0, prepend=1.0, append=0.0)
     per_volt = 0.5 * x.supply.pwm_s / inductance / width
     moved, shares = np.zeros_like(mean), np.zeros_like(mean)
