@@ -142,8 +142,14 @@ def _run(
     registry: Registry | None,
     workers: WorkerPool,
     surveyed: Callable[[], object] = lambda: None,
+    *,
+    ahead: bool = False,
 ) -> Outcome:
-    """One run; `surveyed` is called when every file was looked at, before anything is written."""
+    """One run; `surveyed` is called when every file was looked at, before anything is written.
+
+    With `ahead` the residual tests that would be made beside the motors begin before it is called;
+    they write to the cache alone.
+    """
     watch = Stopwatch()
     folder, output = Path(settings.input), Path(settings.output)
     limits = limits_file(settings.limits, settings.config_dir)
@@ -152,12 +158,16 @@ def _run(
     with waiting("looking at the files of " + settings.input), watch.stage("survey"):
         ask = partial(_answers, settings, sources, workers, cache)
         files = survey(folder, sources, ask, recover=settings.recover)
+        plain = _jobs(settings, files, limits)
+        if ahead:
+            jobs = _with_revoked(plain, _revocations(registry))
+            beside = _tests_beside(settings, _due(jobs, cache), workers.count)
+            workers.begin_tasks(process_motor, beside)
         surveyed()
-    plain = _jobs(settings, files, limits)
     batch = _batch_key(settings, plain, files, registry)
     if (cached := _cached_outcome(settings, registry, cache, batch)) is not None:
         return replace(cached, timings=watch.table())
-    return _computed(settings, registry, (workers, cache, watch), files, plain)
+    return _computed(settings, registry, (workers, cache, watch), files, plain, begun=ahead)
 
 
 def _computed(
@@ -166,13 +176,17 @@ def _computed(
     means: tuple[WorkerPool, RunCache, Stopwatch],
     survey: Survey,
     plain: Sequence[MotorJob],
+    *,
+    begun: bool = False,
 ) -> Outcome:
-    """Motors worked on, registered and published; `plain` are the jobs without revocations."""
+    """Motors worked on, registered and published; `plain` are the jobs without revocations, `begun`
+    is whether the tests beside them have begun.
+    """
     (workers, cache, watch), output = means, Path(settings.output)
     revoked = _revocations(registry)
     jobs = _with_revoked(plain, revoked)
     with watch.stage("motors"):
-        results, died = _process(settings, jobs, workers, cache)
+        results, died = _process(settings, jobs, workers, cache, begun=begun)
     others = other_motors(output, [job.motor_id for job in jobs], prune=settings.prune)
     with watch.stage("registry"):
         registered = _register(registry, output, results)
@@ -381,7 +395,12 @@ def _cached_outcome(
 
 
 def _process(
-    settings: RunSettings, jobs: Sequence[MotorJob], workers: WorkerPool, cache: RunCache
+    settings: RunSettings,
+    jobs: Sequence[MotorJob],
+    workers: WorkerPool,
+    cache: RunCache,
+    *,
+    begun: bool,
 ) -> tuple[list[MotorResult], tuple[MachineError, ...]]:
     """The results in the order of the jobs, and an error for each unfinished one."""
     ends: list[Any] = [None] * len(jobs)
@@ -390,7 +409,7 @@ def _process(
             ends[number] = MotorResult(job.motor_id, done, {})
     due = [number for number, end in enumerate(ends) if end is None]
     motors = [jobs[number] for number in due]
-    beside = _tests_beside(settings, motors, workers.count)
+    beside = [] if begun else _tests_beside(settings, motors, workers.count)
 
     def advance(at: int, _: MotorResult | None) -> None:
         if at < len(due):
@@ -402,6 +421,11 @@ def _process(
         ends[number] = end
     died = tuple(end for end in ends if isinstance(end, MachineError))
     return [end for end in ends if isinstance(end, MotorResult)], died
+
+
+def _due(jobs: Sequence[MotorJob], cache: RunCache) -> list[MotorJob]:
+    """The jobs that are not cached."""
+    return [j for j in jobs if j.key is None or cache.finished(j.motor_id, j.key) is None]
 
 
 def _tests_beside(

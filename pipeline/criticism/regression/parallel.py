@@ -42,6 +42,26 @@ def by_threads(
         return tuple(pool.map(lambda one, with_: work(one, *with_), segments, arguments))
 
 
+def in_order(
+    work: Work, segments: Sequence[Segment], arguments: Sequence[tuple[Any, ...]]
+) -> tuple[Any, ...]:
+    """Maps a function over segments one after the other.
+
+    Where every core has a process of its own, threads add a fifth to the processor time.
+
+    Parameters
+    ----------
+    work
+        Function of a segment and its arguments.
+    segments
+        The segments.
+    arguments
+        Further arguments of each.
+
+    """
+    return tuple(work(one, *with_) for one, with_ in zip(segments, arguments, strict=True))
+
+
 _DOING: ContextVar[Doing] = ContextVar("doing", default=by_threads)
 
 

@@ -6,19 +6,24 @@ use 1.4 cores. Segments are sent once. A task is a few kilobytes, its result a f
 
 from __future__ import annotations
 
+import importlib
 import logging
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from multiprocessing import parent_process
+from multiprocessing.util import Finalize
 from typing import Any
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.regression.parallel import Work, by_threads, done_by
+from pipeline.criticism.regression.parallel import Work, by_threads, done_by, in_order
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 
 _log = logging.getLogger(__name__)
 _SEGMENTS: dict[int, Segment] = {}
 """In the worker: the segments that it was sent, by number."""
+_OWN: list[SegmentWorker] = []
+"""The worker that `open_own` has opened in this process."""
 
 
 class SegmentWorker:
@@ -110,15 +115,35 @@ def segment_worker(effects_path: str | None) -> Iterator[SegmentWorker]:
         yield SegmentWorker(pool.executor)
 
 
+def open_own() -> None:
+    """Opens a segment worker of this worker process, which ends with it; not on a single core, and
+    not in a driver.
+    """
+    if _OWN or core_count() < 2 or parent_process() is None:
+        return
+    stack = ExitStack()
+    _OWN.append(stack.enter_context(segment_worker(None)))
+    # before the queues of this process are closed (10), and before it waits for its children
+    Finalize(None, stack.close, exitpriority=100)
+
+
+def shared_or_in_order() -> AbstractContextManager[None]:
+    """Shares the work on a campaign's segments inside the block with the worker that `open_own` has
+    opened; without one, they are worked on one after the other.
+    """
+    return _OWN[0].campaign() if _OWN else done_by(in_order)
+
+
 def _forget() -> None:
     _SEGMENTS.clear()
 
 
 def _load_effects(effects_path: str | None) -> None:
-    """Imports the user's effects, so that they can be unpickled by name."""
+    """Imports the user's effects, so that they can be unpickled by name, and what works on them."""
     from pipeline.criticism.library.registry import effects
 
     effects(effects_path)
+    importlib.import_module("pipeline.criticism.diagnosis")
 
 
 def _map(

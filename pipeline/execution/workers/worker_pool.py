@@ -124,6 +124,23 @@ class WorkerPool:
             finish(index, self._retry_isolated(function, tasks[index], crash, index))
         return results
 
+    def begin_tasks(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> None:
+        """Begins tasks that nothing waits for: what they do is kept elsewhere, or is done again.
+
+        Parameters
+        ----------
+        function
+            What is done with a task; importable in a worker.
+        tasks
+            The tasks.
+
+        """
+        pool = self._workers()
+        for index, task in enumerate(tasks):
+            progress = str(self.progress_folder / f"{self._run}-ahead-{index}")
+            with suppress(*pool.died):
+                pool.executor.submit(perform, function, task, progress)
+
     def _run_round(
         self,
         function: Callable[[Any], Any],

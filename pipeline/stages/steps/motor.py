@@ -20,6 +20,7 @@ from pipeline.execution.jobs import Finished, MotorJob, MotorResult
 from pipeline.execution.tasks import work
 from pipeline.execution.tasks.model_tests import judged_model
 from pipeline.execution.tasks.start import starts_from_fits
+from pipeline.execution.workers.segment_worker import open_own, shared_or_in_order
 from pipeline.io.storage.publish import canonical_json, together
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
@@ -75,13 +76,15 @@ def test_model(job: MotorJob) -> None:
     if not captures or starts_from_fits(campaign):
         return
     verdicts = ModelMemory(job, stamp_of(job, campaign))
-    judged_model(campaign, job.model, Constants(), verdicts, job.diagnose)
+    with shared_or_in_order():
+        judged_model(campaign, job.model, Constants(), verdicts, job.diagnose)
 
 
 def import_all() -> None:
-    """Imports and finds what a worker needs for its first motor, a second's work."""
+    """Imports and starts what a worker needs for its first motor, two seconds' work."""
     from pipeline.criticism.library.registry import effects
 
+    open_own()
     for name in LATE_IMPORTS:
         importlib.import_module(name)
     estimators()
@@ -115,7 +118,8 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
                 shown = _shown(campaign, draft, checked.evidence)
                 for name, content in _capture_recordings(campaign, draft, shown, read):
                     _write_sealed(write, name, content)
-        judged = work.with_verdict(job, campaign, checked, verdicts, watch)
+        with shared_or_in_order():
+            judged = work.with_verdict(job, campaign, checked, verdicts, watch)
         findings = (*findings, *judged.findings)
         sheet = superseding(work.assemble(job, campaign, judged, stamp), job.revoked)
         if job.recordings:

@@ -14,6 +14,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
+from typing import Protocol
 
 from pipeline.io.ingest.arrivals import Arrivals, Snapshot, snapshot
 from pipeline.io.storage.datasheets import read_datasheets
@@ -27,7 +28,23 @@ LOOK_EVERY_S = 0.1
 """Between two looks at the folder; ten times the time of a look where that is more."""
 RETRY_S = 30.0
 """Until a pass is tried again that failed for the machine's sake, such as a full disk."""
-Pass = Callable[[Callable[[], object]], Outcome]
+
+
+class Pass(Protocol):
+    """One run of the folder."""
+
+    def __call__(self, surveyed: Callable[[], object], *, ahead: bool) -> Outcome:
+        """The outcome.
+
+        Parameters
+        ----------
+        surveyed
+            Called when every file was looked at, before anything is written.
+        ahead
+            Whether work that is kept in the cache alone begins before that.
+
+        """
+        ...
 
 
 class FolderChangedError(Exception):
@@ -40,13 +57,15 @@ class Watch:
 
     `perform` calls what it is given once it has looked at every file, before anything is written.
     It begins to look as soon as nothing changes any more, and what it is given waits until the
-    folder has rested for `settle_s`.
+    folder has rested for `settle_s`. Long work begins ahead of that, unless files came during the
+    pass before: it would be in the way of the next one.
     """
 
     settings: RunSettings
     perform: Pass
     workers: ExitStack
     arrivals: Arrivals = field(default_factory=Arrivals)
+    _calm: bool = True
     _inside: bool = False
     _ended: bool = False
     _shown: dict[str, str] = field(default_factory=dict)
@@ -102,13 +121,14 @@ class Watch:
         with waiting(f"watching {self.settings.input}"):
             now = self._at_rest(min(LOOK_EVERY_S, settle_s))
         try:
-            outcome = self.perform(lambda: self._at_rest(settle_s, now))
+            outcome = self.perform(lambda: self._at_rest(settle_s, now), ahead=self._calm)
         except FolderChangedError:
+            self._calm = False
             return Outcome()
         except MachineError as error:
             time.sleep(RETRY_S)
             return Outcome(errors=(f"error: {error}; trying again",))
-        self.arrivals.taken = now
+        self.arrivals.taken, self._calm = now, True
         return self._news(outcome)
 
     def _news(self, outcome: Outcome) -> Outcome:

@@ -91,7 +91,7 @@ def test_a_pass_begins_again_where_files_came_while_it_looked(settings: RunSetti
     """Expected: the pass in which a file came writes nothing, and the next one sees both."""
     written: list[int] = []
 
-    def perform(surveyed: Callable[[], object]) -> Outcome:
+    def perform(surveyed: Callable[[], object], *, ahead: bool) -> Outcome:
         files = sorted(Path(settings.input).iterdir())
         if not written and len(files) == 1:
             (Path(settings.input) / "b.csv").write_text("half a fi")
@@ -126,7 +126,7 @@ def test_a_file_that_comes_while_the_folder_settles_begins_the_pass_again(
         if time_s[0] > 0.5 and not late.exists():
             late.write_text("half a fi")
 
-    def perform(surveyed: Callable[[], object]) -> Outcome:
+    def perform(surveyed: Callable[[], object], *, ahead: bool) -> Outcome:
         looked_at_s.append(time_s[0])
         files = sorted(Path(settings.input).iterdir())
         surveyed()
@@ -145,7 +145,7 @@ def test_a_file_that_comes_while_the_folder_settles_begins_the_pass_again(
 def test_a_full_disk_is_told_and_tried_again(settings: RunSettings) -> None:
     passes: list[int] = []
 
-    def perform(surveyed: Callable[[], object]) -> Outcome:
+    def perform(surveyed: Callable[[], object], *, ahead: bool) -> Outcome:
         surveyed()
         passes.append(1)
         if len(passes) == 1:
@@ -163,7 +163,7 @@ def test_the_end_closes_the_workers(settings: RunSettings) -> None:
     workers = ExitStack()
     workers.callback(lambda: closed.append(True))
 
-    def perform(surveyed: Callable[[], object]) -> Outcome:
+    def perform(surveyed: Callable[[], object], *, ahead: bool) -> Outcome:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -175,7 +175,7 @@ def test_a_signal_between_two_passes_ends_the_next(settings: RunSettings) -> Non
     """While a line is printed nothing is torn: the watch ends where it would have gone on."""
     passes: list[int] = []
 
-    def perform(surveyed: Callable[[], object]) -> Outcome:
+    def perform(surveyed: Callable[[], object], *, ahead: bool) -> Outcome:
         passes.append(1)
         if len(passes) == 2:
             watching._signalled()
