@@ -139,7 +139,12 @@ class ModelTest:
 
 @dataclass(frozen=True, slots=True)
 class WarmUp:
-    """The start of a worker of a command that stays: everything that a motor needs is imported."""
+    """The start of a worker of a command that stays: everything that a motor needs is imported.
+
+    `shares` is whether it gets a process that does half of its residual tests.
+    """
+
+    shares: bool = False
 
     @property
     def name(self) -> str:

@@ -106,7 +106,8 @@ def main(settings: RunSettings) -> Outcome:
         if settings.watch:
             from pipeline.stages.steps.watch import Watch
 
-            workers.map_tasks(process_motor, [WarmUp()] * workers.count)
+            start = WarmUp(shares=settings.residual_test and workers.count > 1)
+            workers.map_tasks(process_motor, [start] * workers.count)
             perform = partial(_run, settings, registry, workers)
             return Watch(settings, perform, stack.pop_all()).begin()
         outcome = _run(settings, registry, workers)
@@ -133,7 +134,7 @@ def process_motor(job: MotorJob | ModelTest | WarmUp) -> MotorResult | None:
     if isinstance(job, ModelTest):
         motor.test_model(job.job)
     else:
-        motor.import_all()
+        motor.warm_up(job)
     return None
 
 

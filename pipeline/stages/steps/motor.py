@@ -16,7 +16,7 @@ from pipeline.execution.caches.model_memory import ModelMemory
 from pipeline.execution.caches.run_cache import note_motor
 from pipeline.execution.caches.stamp import stamp_of
 from pipeline.execution.caches.versions import datasheet_code
-from pipeline.execution.jobs import Finished, MotorJob, MotorResult
+from pipeline.execution.jobs import Finished, MotorJob, MotorResult, WarmUp
 from pipeline.execution.tasks import work
 from pipeline.execution.tasks.model_tests import judged_model
 from pipeline.execution.tasks.start import starts_from_fits
@@ -80,11 +80,12 @@ def test_model(job: MotorJob) -> None:
         judged_model(campaign, job.model, Constants(), verdicts, job.diagnose)
 
 
-def import_all() -> None:
-    """Imports and starts what a worker needs for its first motor, two seconds' work."""
+def warm_up(start: WarmUp) -> None:
+    """Imports and starts what a worker needs for its first motor, a second's work."""
     from pipeline.criticism.library.registry import effects
 
-    open_own()
+    if start.shares:
+        open_own()
     for name in LATE_IMPORTS:
         importlib.import_module(name)
     estimators()

@@ -14,10 +14,14 @@ from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.noise_floors import form_tolerance, noise_floor
-from pipeline.criticism.regression.parallel import by_threads, on_each
+from pipeline.criticism.regression.parallel import by_threads, in_order, on_each
 from pipeline.criticism.residuals.segments import segments
-from pipeline.execution.workers.pools import core_count
-from pipeline.execution.workers.segment_worker import segment_worker
+from pipeline.execution.workers.pools import Cluster, core_count, open_pool
+from pipeline.execution.workers.segment_worker import (
+    open_own,
+    segment_worker,
+    shared_or_in_order,
+)
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from tests.unit.criticism.machines import BASE, machine
 
@@ -64,6 +68,8 @@ def test_floors_are_the_same_bits_and_in_order(found) -> None:
     model = Model(machine(), (cogging,))
     arguments = [(model, {**BASE, **zero(cogging, model)}, seed) for seed in range(len(found))]
     alone = by_threads(noise_floor, found, arguments)
+    for one, two in zip(alone, in_order(noise_floor, found, arguments), strict=True):
+        np.testing.assert_array_equal(one, two)
     with segment_worker(None) as second, second.campaign():
         for _ in range(2):  # the second time the worker has the segments already
             for one, two in zip(alone, on_each(noise_floor, found, arguments), strict=True):
@@ -138,3 +144,29 @@ def test_an_error_of_the_work_itself_is_raised(found) -> None:
         pytest.raises(ZeroDivisionError, match=r"\.mcap"),
     ):
         on_each(broken, found, [(0,)] * len(found))
+
+
+def shared_in_a_worker(found) -> tuple[bool, ...]:
+    """Which segments a worker's own segment worker did; whose driver is a worker itself."""
+    open_own()
+    with shared_or_in_order():
+        return on_each(whose_grandchild, found, [(os.getpid(),)] * len(found))
+
+
+def whose_grandchild(segment, worker: int) -> bool:
+    return os.getpid() != worker
+
+
+@pytest.mark.slow
+@workers
+def test_a_worker_s_own_segment_worker_shares_its_work_and_ends_with_it(found) -> None:
+    """A worker waits for its children when it ends: one that was not told to end would hang it."""
+    with open_pool("local", Cluster())(1) as pool:
+        theirs = pool.executor.submit(shared_in_a_worker, found).result()
+    assert set(theirs) == {True, False}
+
+
+def test_in_a_driver_there_is_no_segment_worker_of_its_own(found) -> None:
+    open_own()
+    with shared_or_in_order():
+        assert not any(on_each(whose, found, [(0,)] * len(found)))

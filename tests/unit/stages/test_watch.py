@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from pipeline.execution.jobs import WarmUp
+from pipeline.execution.jobs import ModelTest, WarmUp
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.arrivals import Arrivals, snapshot
 from pipeline.records.errors import MachineError, UsageError
@@ -21,6 +23,8 @@ from pipeline.settings import RunSettings
 from pipeline.stages import run
 from pipeline.stages.steps import motor, watch
 from pipeline.stages.steps.watch import Watch
+
+DEMO = Path(__file__).parents[3] / "data" / "demo"
 
 
 def test_a_folder_rests_from_its_last_change_on() -> None:
@@ -89,9 +93,10 @@ def following(outcome: Outcome) -> Outcome:
 
 def test_a_pass_begins_again_where_files_came_while_it_looked(settings: RunSettings) -> None:
     """Expected: the pass in which a file came writes nothing, and the next one sees both."""
-    written: list[int] = []
+    written, hurried = list[int](), list[bool]()
 
     def perform(surveyed: Callable[[], object], *, ahead: bool) -> Outcome:
+        hurried.append(ahead)
         files = sorted(Path(settings.input).iterdir())
         if not written and len(files) == 1:
             (Path(settings.input) / "b.csv").write_text("half a fi")
@@ -109,6 +114,7 @@ def test_a_pass_begins_again_where_files_came_while_it_looked(settings: RunSetti
     third = following(second)
     assert written == [2, 3]
     assert third.errors == (), "it was told before"
+    assert hurried == [True, False, True], "nothing is begun ahead that the next pass waits for"
 
 
 def test_a_file_that_comes_while_the_folder_settles_begins_the_pass_again(
@@ -194,6 +200,38 @@ def test_a_signal_between_two_passes_ends_the_next(settings: RunSettings) -> Non
     assert len(passes) == 3
 
 
+def test_the_residual_test_begins_while_the_folder_settles(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: it is begun once, before the folder has settled; nothing but the cache is written
+    until it has.
+    """
+    folder, output = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    shutil.copy(DEMO / "G52-0601" / "resistance_ab.mcap", folder)
+    begun, worked = list[str](), list[str]()
+
+    def begin(_: WorkerPool, function: object, tasks: Sequence[ModelTest]) -> None:
+        begun.extend(task.name for task in tasks)
+
+    def here(_: WorkerPool, function: Any, tasks: Sequence[Any], *__: object) -> list[Any]:
+        worked.extend(task.name for task in tasks)
+        return [function(task) for task in tasks]
+
+    def settled() -> None:
+        assert begun == ["the residual test of motor G52-0601"]
+        assert {path.name for path in output.iterdir()} <= {".cache", ".work"}
+
+    monkeypatch.setattr(WorkerPool, "begin_tasks", begin)
+    monkeypatch.setattr(WorkerPool, "map_tasks", here)
+    keys = RunSettings(input=str(folder), output=str(output), report=False, recordings=False)
+    output.mkdir()
+    workers = WorkerPool(lambda _: nullcontext(), 2, output / ".work")
+    run._run(keys, None, workers, settled, ahead=True)
+    assert (output / "datasheets" / "G52-0601.json").is_file()
+    assert [name for name in worked if "G52" in name] == ["motor G52-0601"]
+
+
 @pytest.mark.parametrize("wrong", [{"settle_s": -1.0}, {"json": True}])
 def test_settings_that_no_watch_can_keep(settings: RunSettings, wrong: dict[str, object]) -> None:
     for name, value in wrong.items():
@@ -215,7 +253,7 @@ def test_a_watch_starts_every_worker_before_the_first_campaign(tmp_path: Path) -
         patch.setattr(watch, "end_at_once_or_next", lambda _: None)
         keys = RunSettings(input=str(tmp_path), output=str(tmp_path / "out"), watch=True, workers=3)
         assert run.main(keys).text.startswith("watching")
-    assert given == [WarmUp()] * 3
+    assert given == [WarmUp(shares=True)] * 3
     assert given[0].without("a.csv", "slow") == given[0]
     assert run.process_motor(WarmUp()) is None
     assert set(motor.LATE_IMPORTS) <= set(sys.modules)
