@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipeline.physics.notation import number_text, quantity, reading, significant
+from pipeline.physics.notation import MINUS, number_text, quantity, reading, significant
 from pipeline.records.comparison import Comparison, Dependence, SignalError
 from pipeline.records.error_map import ErrorMap
 from pipeline.records.model_verdict import number
@@ -103,7 +103,7 @@ def comparison_view(result: Comparison) -> ComparisonView:
                 m.parameter,
                 reading(m.before, m.u_before, m.unit).text(),
                 reading(m.after, m.u_after, m.unit).text(),
-                f"{m.in_u:+.1f}",
+                f"{m.in_u:+.1f}".replace("-", MINUS),
             )
             for m in sorted(moved, key=lambda m: -abs(m.in_u))
         ),
@@ -242,10 +242,9 @@ def _worst(error_map: ErrorMap) -> str:
         return ""
     _, row, column = max(sure)
     speed, current = error_map.x.edges[column : column + 2], error_map.y.edges[row : row + 2]
-    return (
-        f"; worst at {speed[0]:.3g} to {speed[1]:.3g} rad/s, {current[0]:.3g} to "
-        f"{current[1]:.3g} A: {quantity(float(error_map.mean[row, column]), error_map.unit, 2)}"
-    )
+    at = f"{speed[0]:.3g} to {speed[1]:.3g} rad/s, {current[0]:.3g} to {current[1]:.3g} A"
+    mean = quantity(float(error_map.mean[row, column]), error_map.unit, 2)
+    return f"; worst at {at.replace('-', MINUS)}: {mean}"
 
 
 def signal_title(row: ErrorRow) -> str:

@@ -20,6 +20,8 @@ _QUANTITIES = {
 }
 _QUALIFIERS = {"mech": "shaft", "elec": "electrical", "pair": "line"}
 _AXES = {"ia", "ib", "ic", "id", "iq", "va", "vb", "vc", "vd", "vq", "vab", "vbc", "vca", "vdc"}
+_BETWEEN = {"rab", "rbc", "rca", "lab", "lbc", "lca"}
+"""Resistances and inductances between two terminals."""
 _NAME = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")
 
 
@@ -37,6 +39,8 @@ def quantity_words(name: str) -> str:
     first, *rest = stem.split("_")
     if first in _AXES and not rest:
         return f"{first[0]}_{first[1:]}"
+    if first in _BETWEEN and not rest:
+        return f"{first[0].upper()}_{first[1:]}"
     quantity = _QUANTITIES.get(first, first)
     if first in _QUANTITIES and len(rest) == 1:
         return f"{_QUALIFIERS.get(rest[0], rest[0])} {quantity}"

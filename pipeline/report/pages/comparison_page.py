@@ -19,7 +19,7 @@ from pipeline.report.pages.page import render
 from pipeline.views.comparison import KINDS, comparison_view, ratio_of, signal_title
 from pipeline.views.constants import sentence
 from pipeline.views.ladder import CURRENT, SPEED, angle_of
-from pipeline.views.names import quantity_words
+from pipeline.views.names import in_words, quantity_words
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +55,7 @@ def render_comparison(
         headline=sentence(view.headline),
         links=link_block(links),
         title_of=signal_title,
+        places=[in_words(place) for place in view.places],
         maps=_maps(result),
         traces=[_trace(one) for one in _worst_traces(result)],
         earlier=earlier,

@@ -216,6 +216,7 @@ def test_symmetric_axis_has_zero_in_its_middle() -> None:
 def test_words_of_a_quantity() -> None:
     assert quantity_words("temp_magnet_degc") == "magnet temperature"
     assert quantity_words("order") == "order"
+    assert [quantity_words(n) for n in ("vab_v", "rab_ohm", "lca_h")] == ["v_ab", "R_ab", "L_ca"]
     assert quantity_words("theta_in_one_of_60_waves_rad") == "angle in one of 60 waves"
     text = "drag as a curve of omega_mech_rad_s times iq_a/(9.1 A), not of iq_abs_a"
     assert in_words(text) == "drag as a curve of shaft speed times i_q/(9.1 A), not of iq_abs_a"

@@ -262,9 +262,9 @@ def test_the_comparison_in_words_names_errors_places_and_moves() -> None:
     assert "with dead time the held-out error falls from 20 to 3.5" in rows[0]
     assert re.search(r"vq_v +35.4 mV +10.0 mV +3.5 +1 of 2 +b.mcap \(4.0\)", text)
     assert "iq_a, on its own" in text
-    assert "vq_v depends on iq_a (80 %); worst at 100 to 200 rad/s, -15 to -5 A: −210 mV" in text
+    assert "vq_v depends on iq_a (80 %); worst at 100 to 200 rad/s, −15 to −5 A: −210 mV" in text
     assert "vd_v depends" not in text, "it is below its floor"
-    assert re.search(r"r_ohm +320.0 ± 2.0 mΩ +310.0 ± 2.0 mΩ +-10.0", text)
+    assert re.search(r"r_ohm +320.0 ± 2.0 mΩ +310.0 ± 2.0 mΩ +−10.0", text)
     assert "1 parameter stayed within 3 u" in text
 
 
