@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pipeline.physics.notation import number_text, quantity
 from pipeline.records.model_verdict import ModelVerdict, number
 from pipeline.views.constants import sentence
+from pipeline.views.names import in_words
 
 TONES = {
     "adequate": "pass",
@@ -102,7 +103,7 @@ def _rows(model: ModelVerdict) -> list[tuple[str, str]]:
     rows.append(("largest residual of one signal", f"{number(model.residual)} noise floors"))
     if model.worst is not None:
         size = quantity(model.worst.size, model.worst.unit, 2)
-        rows.append(("where", f"{model.worst.description}, {size} beyond the noise"))
+        rows.append(("where", f"{in_words(model.worst.description)}, {size} beyond the noise"))
         rows.append(("places over their floor", str(model.over)))
     for effect, addition in model.missing.items():
         sizes = (f"{name} {number_text(*reading)}" for name, reading in addition.parameters.items())

@@ -59,7 +59,7 @@ FRICTION = Term(
     "constant", -5e3, 5e3,
 )  # fmt: skip
 FRICTION_NM = Term(
-    "holding_friction_nm", "N·m", "friction of slow motion, Kt times `holding_friction_a`",
+    "holding_friction_nm", "N·m", "friction of slow motion, Kt times its current",
     "constant", -1e4, 1e4,
 )  # fmt: skip
 OFFSET = Term(

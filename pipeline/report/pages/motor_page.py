@@ -20,9 +20,16 @@ from pipeline.report.charts.performance_chart import band_chart, efficiency_char
 from pipeline.report.pages.link_block import Link, link_block
 from pipeline.report.pages.page import render
 from pipeline.report.pages.status_block import status_block
-from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
+from pipeline.views.constants import GROUPS, KEY_CONSTANTS, OTHER, grouped
 from pipeline.views.model_words import model_words
-from pipeline.views.motor import CHECK_ORDER, LEAST_SHARE, check_number, motor_rows, ordered_checks
+from pipeline.views.motor import (
+    CHECK_ORDER,
+    LEAST_SHARE,
+    Row,
+    check_number,
+    motor_rows,
+    ordered_checks,
+)
 from pipeline.views.performance import performance_view
 
 
@@ -77,7 +84,7 @@ def render_motor(
         links=link_block(links),
         cards=[check for check in checks if check.status in ("fail", "marginal")],
         key_rows=[rows[n] for n in KEY_CONSTANTS if n in rows and rows[n].reading],
-        groups=[(title, [rows[n] for n in names]) for title, names in grouped(rows)],
+        groups=_groups(rows),
         least_share=LEAST_SHARE,
         checks=checks,
         check_counts=[(status, counts[status]) for status in CHECK_ORDER if counts[status]],
@@ -89,6 +96,18 @@ def render_motor(
         charts=[] if performance is None else _charts(performance),
         drawn={figure.estimator for figure in figures},
     )
+
+
+def _groups(rows: Mapping[str, Row]) -> list[tuple[str, list[Row], list[Row]]]:
+    """Title and rows of each group, and the rows that are folded away: further constants that are
+    not determined.
+    """
+    groups = []
+    for title, names in grouped(rows):
+        members = [rows[name] for name in names]
+        folded = [row for row in members if title == OTHER and not row.reading]
+        groups.append((title, [row for row in members if row not in folded], folded))
+    return groups
 
 
 def _charts(performance: Performance) -> list[tuple[str, str]]:

@@ -56,7 +56,7 @@ def test_nothing_was_found_wrong_is_said_of_a_test_that_was_passed(datasheet: Da
 
 def test_the_page_says_where_how_much_and_which_command(datasheet: Datasheet) -> None:
     page = render_motor(sheet_with(datasheet, OVER, "a <b>"), (), ())
-    assert "vd_v of drive_0.mcap by 76 noise floors, 900 mV beyond the noise" in page
+    assert "v_d of drive_0.mcap by 76 noise floors, 900 mV beyond the noise" in page
     assert "diagnose input=FOLDER motor=&#39;a &lt;b&gt;&#39;" in page
     assert "<td>31 noise floors</td>" in page
 

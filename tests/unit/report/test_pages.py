@@ -20,6 +20,7 @@ from pipeline.report.pages.fleet_page import page_of, render_fleet
 from pipeline.report.pages.motor_page import render_motor
 from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
 from pipeline.views.motor import conditions, kind_of, parts_of
+from tests.unit.report.conftest import flat
 
 VOID = {"meta", "br", "input", "path", "rect", "circle"}
 HOSTILE = '"><script>alert(1)</script>{{7*7}}<img src=x onerror=alert(2)>\u202e'
@@ -101,6 +102,16 @@ def test_the_table_of_constants_is_the_datasheet(
         assert float(parts[1]) ** 2 + float(parts[2]) ** 2 == pytest.approx(
             (estimate.u / factor) ** 2, rel=0.06
         )
+
+
+def test_further_constants_that_are_not_determined_are_folded_away(datasheet: Datasheet) -> None:
+    """Expected: those of the usual groups stay in sight, as a datasheet without them has a gap."""
+    further = not_identifiable("holding_offset_a", "A", "holding_current", "hold the rotor")
+    known = {**datasheet.constants, "holding_offset_a": further}
+    html = flat(render_motor(replace(datasheet, constants=known), (), ()))
+    before, _, folded = html.partition("<summary>1 more that these captures do not determine")
+    assert 'id="holding_offset_a"' in folded.partition("</details>")[0]
+    assert 'id="cogging_amplitude_nm"' in before
 
 
 def test_the_other_method_stands_under_the_published_one(
