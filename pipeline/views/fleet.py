@@ -14,7 +14,7 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import MODEL_REASON, number
 from pipeline.views.constants import KEY_CONSTANTS, PARTIAL_CONSTANTS, constant_words, symbol
 from pipeline.views.model_words import ModelWords, model_words
-from pipeline.views.names import quantity_words
+from pipeline.views.names import in_words, quantity_words
 from pipeline.views.reasons import Reason, shared_reasons
 from pipeline.views.status_text import status_lines
 
@@ -135,7 +135,7 @@ def _row(
     failed = tuple((c.name, c.status) for c in sheet.checks if c.status in ("fail", "marginal"))
     common = {reason.text: number for number, reason in enumerate(reasons, 1)}
     kinds = [(reason, kind_of_reason(sheet, reason)) for reason in current.why]
-    own = [_less_badge(reason, failed) for reason, kind in kinds if kind not in common]
+    own = [in_words(_less_badge(reason, failed)) for reason, kind in kinds if kind not in common]
     return MotorRow(
         sheet,
         current,

@@ -61,7 +61,7 @@ def model_words(model: ModelVerdict | None, motor_id: str) -> ModelWords:
         verdict=verdict,
         floors=floors,
         tone=TONES[model.verdict],
-        sentence=sentence(model.headline()),
+        sentence=in_words(sentence(model.headline())),
         over=_over(model),
         command=f"{model.command(motor_id)} output=OUTPUT"
         if model.tested and not model.passed
@@ -112,7 +112,7 @@ def _rows(model: ModelVerdict) -> list[tuple[str, str]]:
             others = ", ".join(addition.confused_with).replace("_", " ")
             rows.append(("which could as well be", f"{others}; to tell: {addition.experiment}"))
     if model.unknown:
-        rows.append(("not explained", model.unknown))
+        rows.append(("not explained", in_words(model.unknown)))
     if model.note:
         rows.append(("cannot be shown", model.note))
     return rows

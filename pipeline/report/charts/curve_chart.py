@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from html import escape
 
 import numpy as np
@@ -35,8 +36,8 @@ def curve_chart(variable: str, title: str, unit: str, points: Sequence[CurvePoin
     )
     x = axis_for(variable, float(at.min()), float(at.max()), LEFT, WIDTH - RIGHT, 6)
     reach = padded(min(float(low.min()), 0.0), max(float(high.max()), 0.0))
-    y = axis_for("curve", *reach, TOP + HEIGHT, TOP, 4)
     scale = scale_for(max(abs(reach[0]), abs(reach[1])), unit)
+    y = replace(axis_for("curve", *reach, TOP + HEIGHT, TOP, 4), scale=scale)
     x_px, up, down = x.pixels(at), y.pixels(high).tolist(), y.pixels(low).tolist()
     places = x_px.tolist()
     outline = [*zip(places, up, strict=True), *zip(places[::-1], down[::-1], strict=True)]
@@ -44,12 +45,11 @@ def curve_chart(variable: str, title: str, unit: str, points: Sequence[CurvePoin
     curve = zip(places, y.pixels(value).tolist(), strict=True)
     line = "M" + "L".join(f"{px:.1f} {py:.1f}" for px, py in curve)
     marks = [x_ticks(x, TOP + HEIGHT)]
-    for tick in y.ticks:
+    for tick, label in zip(y.ticks, y.labels(), strict=True):
         place = y.pixel(tick)
         marks.append(f'<path class="grid" d="M{LEFT:g} {place:.1f}H{WIDTH - RIGHT:g}"/>')
         marks.append(
-            f'<text class="tick y" x="{LEFT - 5:g}" y="{place + 4:.1f}">'
-            f"{scale.shown(tick):.3g}</text>"
+            f'<text class="tick y" x="{LEFT - 5:g}" y="{place + 4:.1f}">{label}</text>'
         )
     return (
         f'<svg class="heat" viewBox="0 0 {WIDTH:g} {TOP + HEIGHT + BOTTOM:g}" role="img" '

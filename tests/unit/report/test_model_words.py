@@ -80,7 +80,7 @@ def test_the_terminal_names_the_one_that_misses_most(datasheet: Datasheet) -> No
     less = replace(OVER, held_out=20.0)
     sheets = [sheet_with(datasheet, less, "one"), sheet_with(datasheet, OVER, "two")]
     text = summary([*sheets, sheet_with(datasheet, SOUND, "three")], (), "out", report=False)
-    assert "2 motors, two most: The standard model misses vd_v of drive_0.mcap" in text
+    assert "2 motors, two most: The standard model misses v_d of drive_0.mcap" in text
     rows = {line.split()[0]: line.split()[3:5] for line in text.splitlines()[2:8:2]}
     assert rows == {
         "one": ["missing,", "20"],
