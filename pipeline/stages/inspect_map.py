@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -88,7 +89,10 @@ def folder(settings: InspectSettings) -> Outcome:
     lines += [f"no table of numbers: {printable(path)}" for path in empty] + unread
     more = finish(settings, settings.file, unmapped, None, known)
     result = {"files": [file_record(one.file, one.report) for one in looked], **more.result}
-    return Outcome(more.exit_code, "\n".join(lines) + "\n" + more.text, more.errors, result=result)
+    text = "\n".join(lines) + "\n" + more.text
+    ready = known and not unmapped and not settings.map and not more.exit_code
+    next_ = f"run input={shlex.quote(settings.file)}" if ready else ""
+    return Outcome(more.exit_code, text, more.errors, result=result, next=next_)
 
 
 def _known_lines(known: Sequence[Looked]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,7 +65,9 @@ def main(settings: PlanSettings) -> Outcome:
         known = meant(settings.motor or "", (sheet.motor_id for sheet in sheets))
         raise UsageError(f"no motor {settings.motor!r} in {settings.output}", known)
     plans = [plan_of(sheet, required) for sheet in chosen]
-    return Outcome(text="\n\n".join(plan.text() for plan in plans), result=plans)
+    adding = next((s.model.adding() for s in chosen if s.model and s.model.adding()), "")
+    next_ = f"{adding} output={shlex.quote(settings.output)}" if adding else ""
+    return Outcome(text="\n\n".join(plan.text() for plan in plans), result=plans, next=next_)
 
 
 def _of_captures(settings: PlanSettings, folder: str, required: frozenset[str]) -> Outcome:
@@ -80,7 +83,7 @@ def _of_captures(settings: PlanSettings, folder: str, required: frozenset[str]) 
         known = Known(campaign.motor_id, constants.chosen(), checks, tests)
         plans.append(_planned(known, required))
     outcome = outcome_of(folder, read, [plan.text() for plan in plans], undecided=not plans)
-    return replace(outcome, result=plans)
+    return replace(outcome, result=plans, next=f"run input={shlex.quote(folder)}")
 
 
 def plan_of(sheet: Datasheet, required: frozenset[str]) -> Plan:

@@ -48,9 +48,7 @@ def curve_chart(variable: str, title: str, unit: str, points: Sequence[CurvePoin
     for tick, label in zip(y.ticks, y.labels(), strict=True):
         place = y.pixel(tick)
         marks.append(f'<path class="grid" d="M{LEFT:g} {place:.1f}H{WIDTH - RIGHT:g}"/>')
-        marks.append(
-            f'<text class="tick y" x="{LEFT - 5:g}" y="{place + 4:.1f}">{label}</text>'
-        )
+        marks.append(f'<text class="tick y" x="{LEFT - 5:g}" y="{place + 4:.1f}">{label}</text>')
     return (
         f'<svg class="heat" viewBox="0 0 {WIDTH:g} {TOP + HEIGHT + BOTTOM:g}" role="img" '
         f'aria-label="what is left over {escape(variable)}">{"".join(marks)}'

@@ -150,7 +150,8 @@ def test_plan_from_captures_is_that_of_a_run_of_them(
     for path in DEMO.glob("resistance*"):
         shutil.copyfile(path, folder / path.name)
     assert command_line(["plan", f"motor={DEMO.name}", f"input={folder}"]) == 0
-    planned = capsys.readouterr().out
+    planned, _, command = capsys.readouterr().out.partition("next: ")
+    assert command.endswith(f"run input={folder}\n")
     quiet = ["report=false", "recordings=false", "registry=null", "workers=1"]
     command_line(["run", f"input={folder}", f"output={output}", *quiet])
     capsys.readouterr()
