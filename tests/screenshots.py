@@ -70,10 +70,10 @@ def _dark(output: Path, into: Path) -> None:
         viewer.tab(1)
         _keep(into, "maps", viewer.picture())
         state = viewer.show(places["ladder"])
-        last = next(line for line in state.recordings[-1].timelines if line.name == "rung").end
+        last = next(line for line in state.recordings[-1].timelines if line.name == "step").end
         steps = []
         for name, step in (("ladder-first", 0), ("ladder-last", last or 0)):
-            viewer.client.set_time("rung", sequence=step)
+            viewer.client.set_time("step", sequence=step)
             steps.append(viewer.picture())
             _keep(into, name, steps[-1])
         (into / "ladder.png").write_bytes(_under_each_other(steps))

@@ -153,7 +153,7 @@ def test_the_ladders_map_has_colour_below_and_none_at_the_top(output: Path, view
     viewer.show(output / "recordings" / f"ladder-{FAULTY}.rrd")
     seen = []
     for step in (0, 1):
-        viewer.client.set_time("rung", sequence=step)
+        viewer.client.set_time("step", sequence=step)
         view = next(v.name for v in viewer.client.get_state().views if "mean error, full" in v.name)
         picture = pixels(viewer.picture(view))
         map_only = picture[:, : int(0.53 * picture.shape[1])]  # the colour bar is at the right

@@ -1,6 +1,6 @@
-"""The ladder as a Rerun recording: drag the timeline `rung` and the residual map goes quiet.
+"""The ladder as a Rerun recording: drag the timeline `step` and the residual map goes quiet.
 
-A recording holds, on the sequence timeline `rung` and for every SIGNAL whose error is known,
+A recording holds, on the sequence timeline `step` and for every SIGNAL whose error is known,
 
     /sheet                 what this step adds, with parameters and errors, as a markdown page
     /errors/SIGNAL         rms error of the steps up to here (bars), in /floor/SIGNAL their floor
@@ -206,7 +206,7 @@ def step_markdown(result: Diagnosis, place: int) -> str:
             lines += ["", f"Left over in {plain(one.signal)}: {plain(one.shape)}"]
         lines += [line for note in result.notes for line in ("", plain(note))]
     return "\n".join(
-        [*lines, "", "Drag the time cursor (timeline `rung`) to go from step to step.", ""]
+        [*lines, "", "Drag the time cursor (timeline `step`) to go from step to step.", ""]
     )
 
 

@@ -6,7 +6,7 @@ from pipeline.physics.notation import Scale, scale_for
 from pipeline.records.diagnosis import Diagnosis
 from pipeline.views.ladder import SPEED, angle_of, reaches
 
-TIMELINE = "rung"
+TIMELINE = "step"
 
 
 def map_reach(result: Diagnosis, signal: str) -> float:

@@ -284,7 +284,8 @@ def histogram_view(constant: ConstantResult) -> Any:
 
     """
     unit = constant_scale(constant).unit or "1"
-    name = f"{quantity_words(constant.name)} [{unit}], motors per bin: {constant.verdict}"
+    verdict = constant.verdict.replace("_", " ").lower()
+    name = f"{quantity_words(constant.name)} [{unit}], motors per bin: {verdict}"
     return bar_view(name, *(f"/hist/{constant.name}/{side}" for side in SIDES), legend=True)
 
 

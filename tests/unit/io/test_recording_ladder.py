@@ -26,7 +26,7 @@ from pipeline.views.ladder import ladder_view, mapped_signals
 from tests.unit.ladders import make_diagnosis, make_map
 
 
-def rows(path: Path, entity: str, index: str = "rung") -> Iterator[tuple[int, dict[str, Any]]]:
+def rows(path: Path, entity: str, index: str = "step") -> Iterator[tuple[int, dict[str, Any]]]:
     """Every row of an entity that is not static: its place and its components."""
     from rerun.chunk import RrdReader
 
