@@ -49,9 +49,10 @@ for (const frame of document.querySelectorAll("iframe")) {
     const inner = one.getBoundingClientRect(), outer = one.closest("svg").getBoundingClientRect();
     return inner.width > 0 && (inner.left < outer.left - 1 || inner.right > outer.right + 1);
   });
+  const bare = [...page.querySelectorAll("table.stack > tbody td:not([data-label]):not([colspan])")].filter((one) => one.closest("table").tHead);
   told[frame.title] = {
     width: frame.contentWindow.innerWidth, page: page.documentElement.scrollWidth, texts: page.querySelectorAll("svg text").length,
-    scrolling: scrolling.map(name), beyond: beyond.map(name), cut: cut.map(name),
+    scrolling: scrolling.map(name), beyond: beyond.map(name), cut: cut.map(name), bare: bare.map(name),
   };
 }
 document.body.innerHTML = `<pre id="told">${JSON.stringify(told).replace(/[&<>]/g, (c) => `&#${c.charCodeAt(0)};`)}</pre>`;
@@ -153,6 +154,14 @@ def test_no_label_of_a_drawing_is_cut_off(measured: dict[str, Any], name: str, w
     told = measured[f"{name} {width}"]
     assert told["texts"] > 0
     assert told["cut"] == []
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_each_cell_of_a_stacked_row_says_which_column_it_was(
+    measured: dict[str, Any], name: str
+) -> None:
+    """The page's script writes it: one that broke off on this page would leave it undone."""
+    assert measured[f"{name} {NARROW}"]["bare"] == []
 
 
 def test_what_is_too_wide_or_cut_off_is_seen(measured: dict[str, Any]) -> None:

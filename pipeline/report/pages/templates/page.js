@@ -1,6 +1,6 @@
 "use strict";
 // Read values off a chart: the drawn paths are the data, the svg says how pixels map to units.
-for (const svg of document.querySelectorAll("svg.chart")) {
+for (const svg of document.querySelectorAll("svg.chart[data-x]")) {
   const axis = (name) => svg.dataset[name].split(" ").map(Number);
   const [x0, x1, px0, px1] = axis("x"),
     [y0, y1, py0, py1] = axis("y");
