@@ -215,7 +215,7 @@ def verdict_markdown(result: LotRegression) -> str:
     lines += [f"- {plain(reason)}" for reason in result.reasons]
     if result.history != "sufficient":
         needed = result.limits.min_lots
-        lines.append(f"- {plain(result.history)}: the test over lots needs {needed} baseline lots")
+        lines.append(f"- insufficient history: the test over lots needs {needed} baseline lots")
     lines += [
         "",
         "| | constant | baseline | candidate | change ± U | p |",
