@@ -65,7 +65,7 @@ class Watch:
     perform: Pass
     workers: ExitStack
     arrivals: Arrivals = field(default_factory=Arrivals)
-    _calm: bool = True
+    _ahead: bool = True
     _inside: bool = False
     _ended: bool = False
     _shown: dict[str, str] = field(default_factory=dict)
@@ -121,14 +121,14 @@ class Watch:
         with waiting(f"watching {self.settings.input}"):
             now = self._at_rest(min(LOOK_EVERY_S, settle_s))
         try:
-            outcome = self.perform(lambda: self._at_rest(settle_s, now), ahead=self._calm)
+            outcome = self.perform(lambda: self._at_rest(settle_s, now), ahead=self._ahead)
         except FolderChangedError:
-            self._calm = False
+            self._ahead = False
             return Outcome()
         except MachineError as error:
             time.sleep(RETRY_S)
             return Outcome(errors=(f"error: {error}; trying again",))
-        self.arrivals.taken, self._calm = now, True
+        self.arrivals.taken, self._ahead = now, True
         return self._news(outcome)
 
     def _news(self, outcome: Outcome) -> Outcome:
