@@ -56,6 +56,7 @@ from pipeline.records.outcome import Outcome, Stopwatch, faults_of, first_that_a
 from pipeline.report.text.progress import progress
 from pipeline.report.text.waiting import waiting
 from pipeline.settings import RunSettings
+from pipeline.stages.steps.beside import due_jobs, beside_motors
 
 PROGRESS = ".work"
 COMMITTED = 50
@@ -162,7 +163,7 @@ def _run(
         plain = _jobs(settings, files, limits)
         if ahead:
             jobs = _with_revoked(plain, _revocations(registry))
-            beside = _tests_beside(settings, _due(jobs, cache), workers.count)
+            beside = beside_motors(settings, due_jobs(jobs, cache), workers.count)
             workers.begin_tasks(process_motor, beside)
         surveyed()
     batch = _batch_key(settings, plain, files, registry)
@@ -410,7 +411,7 @@ def _process(
             ends[number] = MotorResult(job.motor_id, done, {})
     due = [number for number, end in enumerate(ends) if end is None]
     motors = [jobs[number] for number in due]
-    beside = [] if begun else _tests_beside(settings, motors, workers.count)
+    beside = [] if begun else beside_motors(settings, motors, workers.count)
 
     def advance(at: int, _: MotorResult | None) -> None:
         if at < len(due):
@@ -422,21 +423,6 @@ def _process(
         ends[number] = end
     died = tuple(end for end in ends if isinstance(end, MachineError))
     return [end for end in ends if isinstance(end, MotorResult)], died
-
-
-def _due(jobs: Sequence[MotorJob], cache: RunCache) -> list[MotorJob]:
-    """The jobs that are not cached."""
-    return [j for j in jobs if j.key is None or cache.finished(j.motor_id, j.key) is None]
-
-
-def _tests_beside(
-    settings: RunSettings, motors: Sequence[MotorJob], workers: int
-) -> list[ModelTest]:
-    """Residual tests for the workers that would be idle; a motor finds its own in the cache."""
-    tested = settings.residual_test and settings.diagnose != "true" and settings.cache
-    if not tested or settings.executor != "local":
-        return []
-    return [ModelTest(job) for job in motors[: max(0, workers - len(motors))]]
 
 
 def _order(finding: Finding) -> tuple[str, str, str, tuple[int, int]]:

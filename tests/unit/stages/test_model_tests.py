@@ -25,7 +25,7 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.ledger import Revocation
 from pipeline.records.model_verdict import Excess, ModelVerdict
 from pipeline.settings import RunSettings
-from pipeline.stages import run
+from pipeline.stages.steps.beside import beside_motors
 
 CAMPAIGN = Campaign("m", (Capture("a.csv", "0", "verified", CaptureMeta("m", "drive"), ()),))
 FOUND = ModelVerdict(
@@ -179,7 +179,7 @@ def test_only_a_worker_that_would_be_idle_makes_a_test_beside(
     job: MotorJob, changes: dict[str, Any], motors: int, workers: int, beside: int
 ) -> None:
     jobs = [replace(job, motor_id=f"m{n}") for n in range(motors)]
-    found = run._tests_beside(replace(RunSettings(), **changes), jobs, workers)
+    found = beside_motors(replace(RunSettings(), **changes), jobs, workers)
     assert [one.job.motor_id for one in found] == [f"m{n}" for n in range(beside)]
     assert all(one.name == f"the residual test of {one.job.name}" for one in found)
     assert all(one.without("a.csv", "slow").job.refused == (("a.csv", "slow"),) for one in found)
