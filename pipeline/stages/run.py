@@ -56,7 +56,7 @@ from pipeline.records.outcome import Outcome, Stopwatch, faults_of, first_that_a
 from pipeline.report.text.progress import progress
 from pipeline.report.text.waiting import waiting
 from pipeline.settings import RunSettings
-from pipeline.stages.steps.beside import due_jobs, beside_motors
+from pipeline.stages.steps.beside import beside_motors, due_jobs
 
 PROGRESS = ".work"
 COMMITTED = 50
