@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.estimation.electrical.operating_points import Point, hold_s
+from pipeline.estimation.electrical.operating_points import Point
+from pipeline.estimation.electrical.sample_hold import hold_s
 from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import linear_fit
 

@@ -9,14 +9,16 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.estimation.electrical.magnet_temperature import assumed_temperature, magnet_source
+from pipeline.estimation.electrical.ripple_torque import SOURCE, ripple_of, winding_of
 from pipeline.estimation.electrical.terminals import bridged
 from pipeline.estimation.policy import policy
 from pipeline.estimation.uncertainty.instruments import current_source, torque_source
 from pipeline.estimation.uncertainty.instruments import voltage_source as source_of_voltage
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import find_plateaus, white_noise_sigma
-from pipeline.records.capture import Array, Capture, CaptureMeta
+from pipeline.records.capture import Array, Capture
 from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate
 
 MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
 TURN_RAD = 2.0 * np.pi
@@ -49,6 +51,9 @@ class Point:
         Where the point comes from.
     alpha_mech_rad_s2
         Acceleration of the shaft, of a bench that gives way; 0 where no motion was recorded.
+    ripple_nm, u_ripple_nm
+        Torque that harmonics of the currents make beside their means (`ripple_torque`), and its
+        standard uncertainty; 0 where it is not known.
 
     """
 
@@ -69,6 +74,13 @@ class Point:
     period_s: float
     capture: Capture
     alpha_mech_rad_s2: float = 0.0
+    ripple_nm: float = 0.0
+    u_ripple_nm: float = 0.0
+
+    @property
+    def torque_of_means_nm(self) -> float:
+        """Shaft torque less that of ripple: what the mean currents make, less drag."""
+        return self.torque_nm - self.ripple_nm
 
     @property
     def standing(self) -> bool:
@@ -107,6 +119,8 @@ class Point:
             vd_v=self.vd_v * voltage,
             vq_v=self.vq_v * voltage,
             torque_nm=self.torque_nm * torque,
+            ripple_nm=self.ripple_nm * current * voltage
+            + shift.get(SOURCE, 0.0) * self.u_ripple_nm,
             temp_magnet_degc=self.temp_magnet_degc + shift.get(magnet_source(self.capture), 0.0),
         )
 
@@ -141,7 +155,9 @@ class PointTable:
         return f"{len(self.points)} settled points; {dropped} of {self.rows} rows were transient"
 
 
-def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> PointTable:
+def operating_points(
+    captures: Sequence[Capture], pole_pairs: int | None, resistance: Estimate | None = None
+) -> PointTable:
     """Settled points of the captures; transients after each step of current or torque are left out.
 
     A stretch is settled where i_d, i_q and the torque all are; where the torque never is (it rings
@@ -154,6 +170,8 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
         Of a dynamometer that holds the speed while currents are stepped.
     pole_pairs
         For whole electrical cycles; None where not known.
+    resistance
+        Of a phase at 25 degC, for the torque of ripple; None where not known.
 
     Returns
     -------
@@ -161,6 +179,7 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
         Means with standard errors, and how many rows they rest on.
 
     """
+    winding = winding_of(pole_pairs, resistance)
     points: list[Point] = []
     total = 0
     for capture in captures:
@@ -170,8 +189,10 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
         if n < policy().evidence.rows:
             continue
         for rows in _stretches(data):
-            whole_cycles = _whole_cycles(rows, data, pole_pairs)
-            points.append(_point(capture, data, whole_cycles))
+            whole = _whole_cycles(rows, data, pole_pairs)
+            point = _point(capture, data, whole)
+            ripple, u = (0.0, 0.0) if point.standing else ripple_of(capture, data, whole, winding)
+            points.append(replace(point, ripple_nm=ripple, u_ripple_nm=u))
     numbered = _numbered(points)
     return PointTable(tuple(numbered), sum(p.rows for p in numbered), total)
 
@@ -225,7 +246,8 @@ def pole_pairs_of(known: Constants, nameplate: object) -> int | None:
 
 
 def _columns(capture: Capture) -> dict[str, Array]:
-    present = [n for n in (*MEANS, "t_s", "theta_mech_rad", "omega_mech_rad_s") if capture.has(n)]
+    wanted = (*MEANS, "t_s", "theta_mech_rad", "omega_mech_rad_s", "temp_winding_degc")
+    present = [n for n in wanted if capture.has(n)]
     data = capture.arrays(*present)
     blank = np.full(data["t_s"].size, np.nan)
     for name in (*MEANS, "theta_mech_rad", "omega_mech_rad_s"):
@@ -350,33 +372,6 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
         capture=capture,
         alpha_mech_rad_s2=alpha,
     )
-
-
-def hold_s(meta: CaptureMeta, period_s: float, omega_elec_rad_s: float) -> float:
-    """Time for which an inverter held a voltage vector still, of a log whose voltages are means.
-
-    Parameters
-    ----------
-    meta
-        Of the log: its PWM frequency, where stated.
-    period_s
-        Sampling period [s].
-    omega_elec_rad_s
-        Highest electrical speed [rad/s].
-
-    Returns
-    -------
-    float
-        The PWM period [s] of a log that is slower, which holds means in the rotor's frame; the
-        sampling period of one as fast; zero where the rotor turns further in a row than under one
-        vector of any inverter, in a log that states no PWM frequency.
-
-    """
-    inverter = policy().inverter
-    if meta.pwm_hz:
-        pwm_s = 1.0 / meta.pwm_hz
-        return pwm_s if pwm_s < inverter.slower_share * period_s else period_s
-    return period_s if abs(omega_elec_rad_s) * period_s < inverter.held_turn_rad else 0.0
 
 
 def _acceleration(t_s: Array, motion: Array, power: int) -> float:

@@ -9,7 +9,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.electrical.operating_points import hold_s, pole_pairs_of
+from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.electrical.sample_hold import hold_s
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit

@@ -10,10 +10,10 @@ import numpy as np
 from pipeline.estimation.electrical.flux_pairs import Flux, flux_pairs, frame_of, instant_voltage
 from pipeline.estimation.electrical.operating_points import (
     Point,
-    hold_s,
     operating_points,
     pole_pairs_of,
 )
+from pipeline.estimation.electrical.sample_hold import hold_s
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit

@@ -9,6 +9,8 @@ import numpy as np
 
 from pipeline.estimation.electrical.magnet_temperature import magnet_source, magnet_uncertainties
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.electrical.ripple_torque import SOURCE as RIPPLE
+from pipeline.estimation.electrical.ripple_torque import winding_of
 from pipeline.estimation.mechanical.drag import (
     DRAG_FORMS,
     DragFit,
@@ -61,6 +63,7 @@ AIDS = (
     "lq_h",
     "pole_pairs",
     "cogging_order",
+    "r_phase_ohm",
 )
 NUISANCES = (
     "offset", "load friction", "load lag", "current lag", "d current", "d current cos",
@@ -169,16 +172,17 @@ def driving_torque(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) 
     Parameters
     ----------
     rows
-        Window means of i_q, i_q (T_m - 25), i_d i_q and of the shaft torque.
+        Window means of i_q, i_q (T_m - 25), i_d i_q and of the shaft torque, and torque of ripple.
     torque
         What turns currents into torque.
     shift
         Gains of current and torque [1, relative], thermometers [K], and the moves of `kt`
-        [1, relative], `reluctance` [N·m/A²] and `magnet` [1/K].
+        [1, relative], `reluctance` [N·m/A²] and `magnet` [1/K]; of the torque of ripple, in its
+        standard uncertainties.
 
     Notes
     -----
-    T = K (1 + α (T_m - 25)) i_q + K_rel i_d i_q - T_load
+    T = K (1 + α (T_m - 25)) i_q + K_rel i_d i_q + T_h - T_load, T_h by `ripple_torque`.
 
     """
     metas = [capture.meta for capture in rows.captures]
@@ -192,6 +196,8 @@ def driving_torque(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) 
     driving_nm: Array = (
         kt * current * (rows.q_current_a + magnet * warm)
         + reluctance * current**2 * rows.product_a2
+        + rows.ripple_nm
+        + shift.get(RIPPLE, 0.0) * rows.u_ripple_nm
         - load * rows.load_nm
     )
     return driving_nm
@@ -276,11 +282,13 @@ def _setups_reason(setups: Sequence[Setup]) -> str:
 def _rows(known: Constants, campaign: Campaign) -> ShaftRows | None:
     """Rows of the drives that log their load, of all drives where none does; and of coast-downs."""
     orders, ripple = _orders(known, campaign)
+    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    winding = winding_of(pairs, known.best("r_phase_ohm"))
     logged = [c for c in campaign.of("drive", "spin_down") if not _loadless(c)]
-    rows = shaft_rows(logged, DRAG_FORMS, orders, ripple)
+    rows = shaft_rows(logged, DRAG_FORMS, orders, ripple, winding)
     if rows is not None and np.any(rows.kind == DRIVE):
         return rows
-    return shaft_rows(campaign.of("drive", "spin_down"), DRAG_FORMS, orders, ripple)
+    return shaft_rows(campaign.of("drive", "spin_down"), DRAG_FORMS, orders, ripple, winding)
 
 
 def _loadless(capture: Capture) -> bool:
@@ -364,6 +372,7 @@ def _estimates(
 
     gains = instrument_uncertainties(rows.captures, ("current", "torque"))
     gains |= magnet_uncertainties(c for c in rows.captures if c.meta.test == "drive")
+    gains |= {RIPPLE: 1.0} if np.any(rows.u_ripple_nm) else {}
     type_b = contributions(values, gains)
     per_kt, per_rel, per_alpha = _slopes(values, torque)
     logged = _load_logged(rows)

@@ -16,6 +16,7 @@ from pipeline.estimation.electrical.operating_points import (
     operating_points,
     pole_pairs_of,
 )
+from pipeline.estimation.electrical.ripple_torque import SOURCE as RIPPLE
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, angle_doubt, standstill_words
 from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d
@@ -96,7 +97,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     """
     captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "torque_shaft_nm")]
     pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
-    table = operating_points(captures, pairs)
+    table = operating_points(captures, pairs, known.best("r_phase_ohm"))
     points = [
         p for p in table.points if np.isfinite(p.torque_nm) and np.isfinite(p.temp_magnet_degc)
     ]
@@ -144,8 +145,9 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
 
     Notes
     -----
-    T = T0(speed) + K (1 + α (T_m - 25)) i_q + K_rel i_d i_q + ...,
-    K = 1.5 p ψ at 25 degC and K_rel = 1.5 p (L_d - L_q).
+    T = T0(speed) + K (1 + α (T_m - 25)) i_q + K_rel i_d i_q + T_h + ...,
+    K = 1.5 p ψ at 25 degC and K_rel = 1.5 p (L_d - L_q). T_h is what the harmonics of voltages and
+    currents make (`ripple_torque`), taken off before.
 
     References
     ----------
@@ -180,14 +182,16 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
 def _chosen(points: Sequence[Point], alpha_1_k: float, level: float) -> list[str]:
     base, candidates = torque(points, alpha_1_k)
     design = np.column_stack([*base.values()])
-    return needed_columns(design, candidates, _column(points, "torque_nm"), _sigma(points), level)
+    return needed_columns(
+        design, candidates, _column(points, "torque_of_means_nm"), _sigma(points), level
+    )
 
 
 def _regress(points: Sequence[Point], alpha_1_k: float, chosen: Sequence[str]) -> Regression:
     base, candidates = torque(points, alpha_1_k)
     design = np.column_stack([*base.values(), *(candidates[name] for name in chosen)])
     sigma = _sigma(points)
-    solution = linear_fit(design, _column(points, "torque_nm"), sigma)
+    solution = linear_fit(design, _column(points, "torque_of_means_nm"), sigma)
     scale = max(solution.chi2_dof, 0.0) if solution.dof > 0 else np.inf
     return Regression(
         (*base, *chosen),
@@ -264,7 +268,10 @@ def _type_b(
 ) -> list[list[Contribution]]:
     """What instruments and the magnet's temperature do to K, K_rel and both drags."""
     magnet = magnet_uncertainties({p.capture.path: p.capture for p in points}.values())
-    return contributions(partial(_values, points, chosen, alpha), {**gains, **magnet})
+    sources = {**gains, **magnet}
+    if any(p.u_ripple_nm for p in points):
+        sources[RIPPLE] = 1.0
+    return contributions(partial(_values, points, chosen, alpha), sources)
 
 
 def _per_alpha(points: Sequence[Point], chosen: Sequence[str], alpha: float) -> float:
@@ -388,7 +395,7 @@ def _note(
 def _evidence(
     points: Sequence[Point], model: Regression, alpha: float, chosen: Sequence[str]
 ) -> tuple[Evidence, ...]:
-    torque = _column(points, "torque_nm")
+    torque = _column(points, "torque_of_means_nm")
     fitted = torque - model.residuals
     i_q = _column(points, "iq_a")
     group = _column(points, "group")
@@ -415,8 +422,8 @@ ESTIMATOR = Estimator(
     tests=("torque_map",),
     experiment=EXPERIMENT,
     fit=fit,
-    uses=("pole_pairs", "temp_coeff_magnet_1_k", "lq_h", *HARMONICS),
-    aids=("lq_h",),
+    uses=("pole_pairs", "temp_coeff_magnet_1_k", "lq_h", "r_phase_ohm", *HARMONICS),
+    aids=("lq_h", "r_phase_ohm"),
     rank=5,
     terms=(RELUCTANCE,),
     clock_powers={"b_visc_nm_s_rad": 1},

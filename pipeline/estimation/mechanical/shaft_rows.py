@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.magnet_temperature import assumed_temperature
+from pipeline.estimation.electrical.ripple_torque import COLUMNS, Winding, ripple_of
 from pipeline.estimation.policy import policy
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
@@ -51,6 +52,9 @@ class ShaftRows:
         Window means of i_q, of i_q (T_m − 25 degC), and of i_d i_q.
     load_nm
         Window mean of the shaft torque.
+    ripple_nm, u_ripple_nm
+        Torque that harmonics of the currents make beside their means (`ripple_torque`), and its
+        standard uncertainty; 0 where it is not known.
     sense
         Window mean of the sign of the speed.
     columns
@@ -72,6 +76,8 @@ class ShaftRows:
     warm_current_k_a: Array
     product_a2: Array
     load_nm: Array
+    ripple_nm: Array
+    u_ripple_nm: Array
     speed_rad_s: Array
     sense: Array
     columns: Mapping[str, Array]
@@ -113,6 +119,7 @@ class _Part:
     direct: Array
     warm: Array
     load: Array
+    ripple: tuple[Array, Array]
 
 
 def shaft_rows(
@@ -120,6 +127,7 @@ def shaft_rows(
     speed_functions: Mapping[str, SpeedFunction],
     cogging_orders: Sequence[int] = (),
     ripple_orders: Sequence[int] = (),
+    winding: Winding | None = None,
 ) -> ShaftRows | None:
     """Rows of drive and spin_down captures, or None where none can be made.
 
@@ -137,6 +145,8 @@ def shaft_rows(
         By name: f(ω/ω_max) [n] of [n].
     cogging_orders, ripple_orders
         Orders a mechanical turn.
+    winding
+        For the torque of ripple; None where not known.
 
     Returns
     -------
@@ -144,7 +154,7 @@ def shaft_rows(
         Window means; None where no window is left.
 
     """
-    parts = [part for part in map(_part, captures) if part is not None]
+    parts = [part for part in (_part(c, winding) for c in captures) if part is not None]
     if not parts:
         return None
     fastest = max(float(np.max(np.abs(part.speed))) for part in parts)
@@ -164,6 +174,8 @@ def shaft_rows(
         warm_current_k_a=joined.pop("warm_current_k_a"),
         product_a2=joined.pop("product_a2"),
         load_nm=joined.pop("load_nm"),
+        ripple_nm=joined.pop("ripple_nm"),
+        u_ripple_nm=joined.pop("u_ripple_nm"),
         speed_rad_s=joined.pop("speed_rad_s"),
         sense=joined.pop("sense"),
         columns=joined,
@@ -173,7 +185,7 @@ def shaft_rows(
     return rows if rows.count else None
 
 
-def _part(capture: Capture) -> _Part | None:
+def _part(capture: Capture, winding: Winding | None) -> _Part | None:
     kind = COAST if capture.meta.test == "spin_down" else DRIVE
     angle = "theta_mech_rad" if capture.has("theta_mech_rad") else "omega_mech_rad_s"
     if not capture.has("t_s", angle) or (kind == DRIVE and not capture.has("iq_a")):
@@ -198,11 +210,51 @@ def _part(capture: Capture) -> _Part | None:
     except ValueError:
         return None
     current = data.get("iq_a", np.zeros(t.size))
+    extra = [
+        name for name in (*COLUMNS, "temp_winding_degc") if kind == DRIVE and capture.has(name)
+    ]
+    harmonic = {name: column[fine] for name, column in capture.arrays(*wanted, *extra).items()}
+    harmonic |= {"t_s": t, "theta_mech_rad": theta}
     return _Part(
         capture, kind, weak, theta, speed, current, data.get("id_a", current * 0.0),
         data.get("temp_magnet_degc", current * 0.0 + 25.0) - 25.0,
-        data.get("torque_shaft_nm", current * 0.0),
+        data.get("torque_shaft_nm", current * 0.0), _ripple(capture, weak, harmonic, winding),
     )  # fmt: skip
+
+
+def _ripple(
+    capture: Capture, weak: WeakRows, data: Mapping[str, Array], winding: Winding | None
+) -> tuple[Array, Array]:
+    """Torque of ripple in each window [w, N·m], and its standard uncertainty.
+
+    A step of the current in a window looks like a ripple, and a slow shaft shows no whole ripple in
+    it: what is far from windows of about its speed, or not there, is by T_h/ω of their median.
+
+    References
+    ----------
+    Hampel, J. Am. Stat. Assoc. 69(346), 1974, 383 (outliers by the median absolute deviation).
+
+    """
+    windows = zip(weak.starts, weak.starts + weak.sizes, strict=True)
+    each = np.array([ripple_of(capture, data, slice(a, b), winding) for a, b in windows])
+    speed = weak.integral(data["theta_mech_rad"], 1)
+    shown = np.flatnonzero(np.any(each != 0.0, axis=1))
+    if shown.size == 0:
+        return np.zeros(weak.count), np.zeros(weak.count)
+    per_speed = np.zeros_like(each)
+    per_speed[shown] = each[shown] / speed[shown, np.newaxis]
+    rising = shown[np.argsort(np.abs(speed[shown]))]
+    alike = np.array_split(rising, max(1, rising.size // policy().ripple_torque.alike))
+    at = [float(np.mean(np.abs(speed[rows]))) for rows in alike]
+    middle = np.array([np.median(per_speed[rows], axis=0) for rows in alike])
+    usual = np.array([np.interp(np.abs(speed), at, column) for column in middle.T]).T
+    off = np.abs(per_speed - usual)[:, 0]
+    spread = [np.median(off[rows]) for rows in alike]
+    far = off > policy().ripple_torque.outlier_mads * np.interp(np.abs(speed), at, spread)
+    far[np.setdiff1d(np.arange(weak.count), shown)] = True
+    per_speed[far] = usual[far]
+    torque, u = speed * per_speed.T
+    return torque, u
 
 
 def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
@@ -274,6 +326,8 @@ def _rows(
         "warm_current_k_a": weak.integral(part.current * part.warm),
         "product_a2": weak.integral(part.current * part.direct),
         "load_nm": weak.integral(part.load),
+        "ripple_nm": part.ripple[0],
+        "u_ripple_nm": part.ripple[1],
         "speed_rad_s": weak.integral(part.theta, 1),
         "sense": weak.integral(np.sign(part.speed)),
         **_nuisances(part),

@@ -108,7 +108,7 @@ def _ladder(
     from scipy.special import fdtrc
 
     at = len(columns) - 1
-    torque = np.array([p.torque_nm for p in rows])
+    torque = np.array([p.torque_of_means_nm for p in rows])
     counts = np.array([p.rows for p in rows], dtype=float)
     best: Slope | None = None
     for power in range(1, highest + 1, 2):

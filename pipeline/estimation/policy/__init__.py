@@ -27,6 +27,7 @@ from pipeline.estimation.policy.mechanical import (
     Cogging,
     Drag,
     Ripple,
+    RippleTorque,
     ShaftRows,
     TorqueMap,
     TorqueSlope,
@@ -63,6 +64,7 @@ class Policy:
     torque_map: TorqueMap = section(TorqueMap)
     torque_slope: TorqueSlope = section(TorqueSlope)
     ripple: Ripple = section(Ripple)
+    ripple_torque: RippleTorque = section(RippleTorque)
     cogging: Cogging = section(Cogging)
     heat_record: HeatRecord = section(HeatRecord)
     magnet: Magnet = section(Magnet)

@@ -198,6 +198,31 @@ class Ripple:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RippleTorque:
+    """Torque of ripple currents."""
+
+    apart_cycles: float = chosen(
+        2.0, "1", "cycles over the rows by which an order is apart from the mean and from its "
+        "mirror image",
+        why="one more than makes them independent, as the noise of the rows is then not enlarged",
+    )  # fmt: skip
+    alike: int = chosen(
+        12, "1", "windows of about one speed that are compared",
+        why="half of them may hold a step of the current",
+    )  # fmt: skip
+    outlier_mads: float = derived(
+        4.45, "1", "median absolute deviations beyond which a window is no steady ripple",
+        source="three standard deviations of normal noise, 1.4826 each (Hampel, J. Am. Stat. "
+        "Assoc. 69(346), 1974)",
+    )  # fmt: skip
+    drop_share: float = derived(
+        0.35, "1", "effective harmonics of a drop with the sign of each phase's current, in the "
+        "rotor's frame",
+        source="4/π times the root of the sum of 1/k², k = 5, 7, 11, 13",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Cogging:
     """Which orders of torque against angle are a motor's."""
 

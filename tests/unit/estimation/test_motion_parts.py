@@ -43,7 +43,8 @@ def rows_of(kinds, *, cluster=None, y=None):
         captures=(), capture=blank.astype(np.int64), kind=kind,
         cluster=(np.arange(kind.size) if cluster is None else cluster).astype(np.int64),
         time_s=blank, acceleration_rad_s2=blank if y is None else y, q_current_a=blank,
-        warm_current_k_a=blank, product_a2=blank, load_nm=blank, speed_rad_s=blank, sense=blank,
+        warm_current_k_a=blank, product_a2=blank, load_nm=blank, ripple_nm=blank,
+        u_ripple_nm=blank, speed_rad_s=blank, sense=blank,
         columns={}, fastest_rad_s=200.0, dropped=0,
     )  # fmt: skip
 

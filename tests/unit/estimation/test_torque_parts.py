@@ -94,7 +94,7 @@ def rows_of(captures, **columns):
     given = {"capture": np.zeros(size, dtype=np.int64), "kind": np.zeros(size, dtype=np.int64),
              "cluster": np.zeros(size, dtype=np.int64), **columns}  # fmt: skip
     names = ("time_s", "acceleration_rad_s2", "q_current_a", "warm_current_k_a", "product_a2",
-             "load_nm", "speed_rad_s", "sense")  # fmt: skip
+             "load_nm", "ripple_nm", "u_ripple_nm", "speed_rad_s", "sense")  # fmt: skip
     return ShaftRows(captures=tuple(captures), columns={}, fastest_rad_s=1.0, dropped=0,
                      **{n: blank for n in names if n not in given}, **given)  # fmt: skip
 

@@ -1,0 +1,213 @@
+"""Torque of ripple currents, which the means of the currents do not show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.electrical.sample_hold import hold_s
+from pipeline.estimation.policy import policy
+from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.records.capture import Array, Capture
+from pipeline.records.estimate import Estimate
+
+COLUMNS = ("id_a", "iq_a", "vd_v", "vq_v")
+ORDERS = (6, 12, 18, 24)
+"""Cycles an electrical turn of what harmonics of a balanced winding make in the rotor's frame."""
+SOURCE = "assumed:ripple_torque"
+"""Doubt of a torque of ripple, in its standard uncertainties."""
+Complex = NDArray[np.complexfloating]
+
+
+@dataclass(frozen=True, slots=True)
+class Winding:
+    """What the torque of ripple rests on beside the rows: resistance of a phase at 25 degC and its
+    relative standard uncertainty.
+    """
+
+    pole_pairs: int
+    r_phase_ohm: float
+    u_resistance: float = 0.0
+
+
+def winding_of(pole_pairs: int | None, resistance: Estimate | None) -> Winding | None:
+    """The winding, where both are known.
+
+    Parameters
+    ----------
+    pole_pairs
+        None where not known.
+    resistance
+        Of a phase at 25 degC [ohm]; None where not known.
+
+    """
+    if pole_pairs is None or resistance is None:
+        return None
+    return Winding(pole_pairs, resistance.number, resistance.u / resistance.number)
+
+
+def ripple_torque(
+    voltage_v: Complex, current_a: Complex, r_phase_ohm: float, omega_mech_rad_s: float
+) -> float:
+    r"""Mean torque that harmonics of voltage and current make on a shaft that turns steadily.
+
+    Parameters
+    ----------
+    voltage_v, current_a
+        Amplitudes d + j q at each order in the rotor's frame, none of them the mean [k, V, A].
+    r_phase_ohm
+        Of the winding as warm as it is [ohm].
+    omega_mech_rad_s
+        Speed [rad/s].
+
+    Returns
+    -------
+    float
+        [N·m], beside what the mean currents make; a brake has the sign against the speed.
+
+    Notes
+    -----
+    T_h ω = 1.5 Σ (Re v_k i_k* - R \|i_k\|²). What power comes in at the terminals is stored, lost
+    in copper or goes to the shaft. Over whole cycles nothing stays stored, and that of the means is
+    the torque of the means.
+
+    References
+    ----------
+    Krause, Wasynczuk, Sudhoff and Pekarek, Analysis of Electric Machinery and Drive Systems, 3rd
+    ed., 2013, 1.3 (energy balance) and 3.3 (power in a reference frame).
+
+    Examples
+    --------
+    A controller without integrator answers -2 V to each ampere of ripple, of 1 ohm.
+
+    >>> current = np.array([0.1 + 0.0j])
+    >>> round(ripple_torque(-2.0 * current, current, 1.0, 10.0), 6)
+    -0.0045
+
+    """
+    power = np.sum((voltage_v * current_a.conj()).real - r_phase_ohm * np.abs(current_a) ** 2)
+    return 1.5 * float(power) / omega_mech_rad_s
+
+
+def ripple_of(
+    capture: Capture, data: Mapping[str, Array], rows: slice, winding: Winding | None
+) -> tuple[float, float]:
+    """Torque of ripple over some rows of a drive, and its standard uncertainty.
+
+    Parameters
+    ----------
+    capture
+        Says what a voltage sample stands for.
+    data
+        Columns of equal length [n]: `COLUMNS`, `t_s`, `theta_mech_rad`; `temp_winding_degc`, where
+        it is there.
+    rows
+        Over which the shaft turns steadily.
+    winding
+        None where it is not known.
+
+    Returns
+    -------
+    torque_nm, u_nm : float
+        Zeros where a column is missing or the rows do not resolve the lowest order. The
+        uncertainty has the sign of the torque that a drop of an inverter would add; it is that of
+        a winding not as warm as taken, of a commanded voltage that is not at the terminals, and
+        of one that is half a period early or late.
+
+    """
+    names = (*COLUMNS, "t_s", "theta_mech_rad")
+    if winding is None or any(name not in data for name in names):
+        return 0.0, 0.0
+    columns = {name: data[name][rows] for name in names}
+    if not all(np.all(np.isfinite(column)) for column in columns.values()):
+        return 0.0, 0.0
+    ripple = _ripple(capture, columns, winding.pole_pairs)
+    if ripple is None:
+        return 0.0, 0.0
+    warmer, u_resistance = _winding_temperature(data, rows)
+    r = winding.r_phase_ohm * (1.0 + warmer)
+    torque = ripple_torque(ripple.voltage_v, ripple.current_a, r, ripple.omega_mech_rad_s)
+    noise = 1.5 * (ripple.noise_w - r * ripple.noise_a2) / ripple.omega_mech_rad_s
+    square = max(float(np.sum(np.abs(ripple.current_a) ** 2)) - ripple.noise_a2, 0.0)
+    doubts_w = [r * np.hypot(u_resistance, winding.u_resistance) * square]
+    if capture.meta.voltage_kind != "measured":
+        lost_v = policy().capture_spread.inverter * _bus_v(capture, columns)
+        products = ripple.voltage_v * ripple.current_a.conj()
+        late = float(np.sum(1j * ripple.pace_rad_s * products).real)
+        drop_v = policy().ripple_torque.drop_share * lost_v
+        doubts_w += [drop_v * float(np.sqrt(square)), 0.5 * ripple.hold_s * late]
+    u = 1.5 * float(np.linalg.norm(doubts_w)) / ripple.omega_mech_rad_s
+    return torque - noise, u
+
+
+@dataclass(frozen=True, slots=True)
+class _Ripple:
+    """Harmonics of some rows in the rotor's frame.
+
+    `noise_w` and `noise_a2` are what noise adds on average to Σ v_k i_k* and to Σ |i_k|².
+    """
+
+    voltage_v: Complex
+    current_a: Complex
+    pace_rad_s: Array
+    noise_w: float
+    noise_a2: float
+    hold_s: float
+    omega_mech_rad_s: float
+
+
+def _ripple(capture: Capture, columns: Mapping[str, Array], pole_pairs: int) -> _Ripple | None:
+    """The harmonics of rows; None where they do not resolve the lowest order."""
+    t, turned = columns["t_s"], pole_pairs * columns["theta_mech_rad"]
+    span_s, travel = float(t[-1] - t[0]), float(turned[-1] - turned[0])
+    apart = policy().ripple_torque.apart_cycles * 2.0 * np.pi
+    orders = [k for k in ORDERS if k * abs(travel) + 0.5 * apart < np.pi * (t.size - 1)]
+    if not orders or ORDERS[0] * abs(travel) < apart:
+        return None
+    signed = np.array([sign * k for k in orders for sign in (1, -1)])
+    signals = [columns["vd_v"] + 1j * columns["vq_v"], columns["id_a"] + 1j * columns["iq_a"]]
+    (voltage, current), noise = _amplitudes(np.column_stack(signals), turned - turned[0], t, signed)
+    omega, period_s = travel / span_s, span_s / (t.size - 1)
+    hold, timing = hold_s(capture.meta, period_s, omega), capture.meta.voltage_timing
+    if timing == "held":
+        voltage = voltage * np.exp(-0.5j * (signed + 1) * omega * hold)
+    if timing == "centred" and hold < period_s:
+        damping = np.sinc(0.5 * signed * omega * period_s / np.pi)
+        voltage, current, noise = voltage / damping, current / damping, noise / damping**2
+    noise_w, noise_a2 = noise.sum(axis=1)
+    return _Ripple(voltage, current, signed * omega, noise_w, noise_a2, hold, omega / pole_pairs)
+
+
+def _amplitudes(
+    signals: Complex, turned_rad: Array, t_s: Array, orders: NDArray[np.int64]
+) -> tuple[Complex, Array]:
+    """Amplitudes [2, k] of two signals [n, 2] at orders of an angle, beside a straight line; and
+    what noise adds on average to their product (real part) and to the second's square [2, k].
+    """
+    line = np.column_stack([np.ones(t_s.size), (t_s - t_s.mean()) / (t_s[-1] - t_s[0])])
+    design = np.hstack([line, np.exp(1j * np.outer(turned_rad, orders))])
+    to_rows = design.conj().T
+    parts: Complex = np.linalg.lstsq(to_rows @ design, to_rows @ signals, rcond=None)[0]
+    first, second = (signals - design @ parts).T
+    noise: Array = np.array([first @ second.conj(), second @ second.conj()]).real
+    noise /= (t_s.size - design.shape[1]) * t_s.size
+    return parts[2:].T, np.repeat(noise[:, np.newaxis], orders.size, axis=1)
+
+
+def _winding_temperature(data: Mapping[str, Array], rows: slice) -> tuple[float, float]:
+    """Share of resistance by which the winding is above that at 25 degC, and its uncertainty."""
+    spread = policy().capture_spread
+    logged = data.get("temp_winding_degc")
+    if logged is None or not np.any(np.isfinite(logged[rows])):
+        return 0.0, COPPER_COEFFICIENT_25_1_K * policy().magnet.unlogged_k
+    warmer = COPPER_COEFFICIENT_25_1_K * (float(np.nanmean(logged[rows])) - 25.0)
+    return warmer, spread.resistance_temperature_known
+
+
+def _bus_v(capture: Capture, columns: Mapping[str, Array]) -> float:
+    """Voltage of the DC link; where it is not stated, the least that makes these."""
+    largest = float(np.max(np.hypot(columns["vd_v"], columns["vq_v"])))
+    return capture.meta.vdc_v or float(np.sqrt(3.0)) * largest

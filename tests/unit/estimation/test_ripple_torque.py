@@ -1,0 +1,208 @@
+"""Torque of ripple currents: harmonics of an EMF whose currents brake, by closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.estimation.electrical.operating_points import operating_points
+from pipeline.estimation.electrical.ripple_torque import (
+    SOURCE,
+    Winding,
+    ripple_of,
+    ripple_torque,
+    winding_of,
+)
+from pipeline.estimation.estimators.torque_map import ESTIMATOR as TORQUE_MAP
+from pipeline.estimation.mechanical.shaft_rows import shaft_rows
+from pipeline.records.constants import Constants
+from tests.unit.estimation.signals import capture, estimates, known_value
+
+R_OHM, L_H, PSI_WB, PAIRS, GAIN_OHM = 0.6, 1.3e-3, 0.055, 22, 1.7
+WINDING = Winding(PAIRS, R_OHM)
+KNOWN = Constants(
+    (
+        known_value("pole_pairs", float(PAIRS)),
+        known_value("r_phase_ohm", R_OHM, unit="ohm"),
+    )
+)
+EMF = {6: 0.05 - 0.02j, -6: -0.03 + 0.04j, 12: 0.01j}
+"""Harmonics of the EMF in the rotor's frame over that of the magnet's fundamental."""
+
+
+def harmonics(omega_rad_s: float) -> tuple[dict[int, complex], dict[int, complex], float]:
+    """Voltages [V] and currents [A] by order, and their torque [N·m].
+
+    v = R i + L di/dt + j ω L i + e, and a controller that answers v = -G i. The flux that makes the
+    EMF turns Re(e i*) into torque.
+    """
+    w = PAIRS * omega_rad_s
+    current = {
+        k: -w * PSI_WB * e / (R_OHM + GAIN_OHM + 1j * (k + 1) * w * L_H) for k, e in EMF.items()
+    }
+    power = sum((w * PSI_WB * EMF[k] * np.conj(i)).real for k, i in current.items())
+    return {k: -GAIN_OHM * i for k, i in current.items()}, current, 1.5 * power / omega_rad_s
+
+
+def columns(omega_rad_s, *, seconds=0.2, rate=16e3, rows=1, iq=3.0, noise=0.0, seed=0):
+    """A steady shaft logged every `rows` periods of its PWM, as means of that many."""
+    t = np.arange(round(seconds * rate / rows) * rows) / rate
+    theta = omega_rad_s * t
+    voltage, current, _ = harmonics(omega_rad_s)
+
+    def logged(parts, mean):
+        whole = mean + sum(a * np.exp(1j * k * PAIRS * theta) for k, a in parts.items())
+        means = whole.reshape(-1, rows).mean(axis=1)
+        rng = np.random.default_rng(seed)
+        return means + noise * (
+            rng.standard_normal(means.size) + 1j * rng.standard_normal(means.size)
+        )
+
+    v, i = logged(voltage, 5.0j), logged(current, 1j * iq)
+    clock, angle = (x.reshape(-1, rows).mean(axis=1) for x in (t, theta))
+    return {"t_s": clock, "theta_mech_rad": angle, "vd_v": v.real, "vq_v": v.imag,
+            "id_a": i.real, "iq_a": i.imag}  # fmt: skip
+
+
+def found(data, rows=slice(None), **meta):
+    meta = {"voltage_kind": "measured", "voltage_timing": "centred", "pwm_hz": 16e3, **meta}
+    return ripple_of(capture("drive", **meta), data, rows, WINDING)
+
+
+@pytest.mark.parametrize("omega", [4.2, -11.2, 15.0])
+def test_the_power_of_harmonics_is_what_the_flux_of_harmonics_makes(omega: float) -> None:
+    voltage, current, expected = harmonics(omega)
+    orders = list(EMF)
+    v, i = (np.array([one[k] for k in orders]) for one in (voltage, current))
+    assert ripple_torque(v, i, R_OHM, omega) == pytest.approx(expected, rel=1e-9)
+    assert expected * omega < 0.0
+
+
+@pytest.mark.parametrize("rows", [1, 4, 8])
+@pytest.mark.parametrize("omega", [6.0, -11.2])
+def test_of_rows_whether_samples_or_means(omega: float, rows: int) -> None:
+    torque, u = found(columns(omega, rows=rows))
+    assert torque == pytest.approx(harmonics(omega)[2], rel=2e-3)
+    # a winding that was not measured, by 10 K or so
+    assert 0.0 < abs(u) < 0.05 * abs(torque)
+
+
+def test_a_held_voltage_is_that_of_the_middle_of_its_period() -> None:
+    data, rate = columns(11.2, rate=4e3), 4e3
+    middle = data["theta_mech_rad"] + 0.5 * 11.2 / rate
+    voltage, _, expected = harmonics(11.2)
+    # the vector that stands still over a period, in the frame of its beginning
+    turn = np.exp(0.5j * PAIRS * 11.2 / rate)
+    v = turn * (5.0j + sum(a * np.exp(1j * k * PAIRS * middle) for k, a in voltage.items()))
+    data |= {"vd_v": v.real, "vq_v": v.imag}
+    held = found(data, voltage_timing="held", pwm_hz=rate)[0]
+    assert held == pytest.approx(expected, rel=2e-3)
+    assert abs(found(data, voltage_timing="instant", pwm_hz=rate)[0] / expected - 1.0) > 0.01
+
+
+def test_a_warm_winding_takes_more_of_the_power() -> None:
+    data = columns(8.0)
+    _, current, expected = harmonics(8.0)
+    square = sum(abs(i) ** 2 for i in current.values())
+    warm = found(data | {"temp_winding_degc": np.full(data["t_s"].size, 65.0)})
+    more = 1.5 * R_OHM * 40.0 * 3.85e-3 * square / 8.0
+    assert warm[0] == pytest.approx(expected - more, rel=2e-3)
+    assert abs(warm[1]) < abs(found(data)[1])
+
+
+def test_noise_of_voltage_and_current_alike_makes_no_torque() -> None:
+    """A controller answers noise too. What it adds on average to a product of two is taken off."""
+    torques = np.array(
+        [found(columns(8.0, noise=0.5, seconds=0.1, rows=8, seed=k))[0] for k in range(100)]
+    )
+    u = torques.std() / np.sqrt(torques.size)
+    assert torques.mean() == pytest.approx(harmonics(8.0)[2], abs=3.0 * u)
+    # what was taken off: 2 σ² / 200 rows at each of eight orders, of v i* and of i i*
+    assert u < 0.25 * 1.5 * 8.0 * (1.0 - R_OHM) * 2.0 * 0.5**2 / 200.0 / 8.0
+
+
+def test_a_commanded_voltage_leaves_what_a_dead_time_takes() -> None:
+    """Sign of the current of each phase, 1 V of a link of 50 V: 0.35 V of harmonics."""
+    data = columns(8.0)
+    _, current, _ = harmonics(8.0)
+    rms = np.sqrt(sum(abs(i) ** 2 for i in current.values()))
+    measured, commanded = (
+        found(data, voltage_kind=kind, vdc_v=50.0) for kind in ("measured", "commanded")
+    )
+    assert commanded[0] == measured[0]
+    assert commanded[1] == pytest.approx(1.5 * 0.35 * rms / 8.0, rel=0.05)
+    assert found(data, voltage_kind="commanded", vdc_v=100.0)[1] > 1.9 * commanded[1]
+
+
+def test_what_shows_no_ripple_torque() -> None:
+    data = columns(8.0)
+    blind = {name: column for name, column in data.items() if name != "vd_v"}
+    hidden = data | {"iq_a": np.where(np.arange(data["iq_a"].size) == 5, np.nan, data["iq_a"])}
+    # a third of a radian of the electrical angle: one ripple is not whole
+    short = slice(0, 40)
+    assert found(blind) == found(hidden) == found(data, short) == (0.0, 0.0)
+    assert ripple_of(capture("drive"), data, slice(None), None) == (0.0, 0.0)
+    assert winding_of(None, KNOWN.best("r_phase_ohm")) is None
+    assert winding_of(PAIRS, None) is None
+
+
+def test_windows_with_a_step_of_the_current_or_a_slow_shaft_take_that_of_their_speed() -> None:
+    """A step looks like ripple: alone, T_h of its window is off by more than T_h."""
+    data = columns(9.0, seconds=3.0, rows=8)
+    steps = np.where((data["t_s"] // 0.1) % 2 == 0, 2.0, -2.0)
+    data["iq_a"] = data["iq_a"] + steps
+    data["vd_v"] = data["vd_v"] - PAIRS * 9.0 * L_H * steps
+    data["vq_v"] = data["vq_v"] + R_OHM * steps + 3.0 * np.gradient(steps)
+    made = capture("drive", voltage_kind="measured", voltage_timing="centred", pwm_hz=16e3, **data)
+    rows = shaft_rows([made], {}, winding=WINDING)
+    assert rows is not None
+    expected = harmonics(9.0)[2]
+    off = np.abs(rows.ripple_nm / expected - 1.0)
+    assert off.max() < 0.2
+    alone = [found(data, slice(k, k + 40))[0] / expected - 1.0 for k in range(0, 5960, 20)]
+    assert np.max(np.abs(alone)) > 1.0
+    without = shaft_rows([made], {})
+    assert without is not None
+    assert not np.any(without.ripple_nm)
+
+
+def torque_maps(speeds=(11.2, -11.2, 13.0, -13.0, 15.0, -15.0), b=0.01, coulomb=0.3):
+    """Stretches of q current at held speeds, the transducer reading what ripple takes."""
+    kt, made = 1.5 * PAIRS * PSI_WB, []
+    rng = np.random.default_rng(1)
+    for number, omega in enumerate(speeds):
+        steps = [columns(omega, seconds=0.25, rows=8, iq=iq) for iq in (-15.0, 0.0, 15.0)]
+        t = np.arange(sum(s["t_s"].size for s in steps)) * 8.0 / 16e3
+        data = {name: np.concatenate([s[name] for s in steps]) for name in steps[0]}
+        turned = np.concatenate(
+            [s["theta_mech_rad"] + k * 0.25 * omega for k, s in enumerate(steps)]
+        )
+        torque = kt * data["iq_a"] + harmonics(omega)[2] - coulomb * np.sign(omega) - b * omega
+        torque = torque + 1e-3 * rng.standard_normal(t.size)
+        data |= {"t_s": t, "theta_mech_rad": turned, "torque_shaft_nm": torque}
+        made.append(capture("torque_map", f"map_{number}", voltage_kind="measured", pwm_hz=16e3,
+                            voltage_timing="centred", ambient_degc=25.0, **data))  # fmt: skip
+    return made
+
+
+def test_drag_of_a_torque_map_is_without_the_brake_of_ripple() -> None:
+    """Ripple brakes by 0.034 N·m at each of these speeds, which looked like dry friction.
+
+    Without a resistance nothing can be taken off.
+    """
+    maps = torque_maps()
+    points = operating_points(maps, PAIRS, KNOWN.best("r_phase_ohm")).points
+    assert [p.ripple_nm for p in points] == pytest.approx(
+        [harmonics(p.omega_mech_rad_s)[2] for p in points], rel=0.01
+    )
+    one = points[0].shifted({SOURCE: 1.0, "current@s": 0.01})
+    assert one.ripple_nm == pytest.approx(1.01 * points[0].ripple_nm + points[0].u_ripple_nm)
+    result = estimates(TORQUE_MAP, *maps, known=KNOWN)
+    viscous, coulomb = result["b_visc_nm_s_rad"], result["torque_coulomb_nm"]
+    assert viscous.number == pytest.approx(0.01, abs=2.0 * viscous.u)
+    assert coulomb.number == pytest.approx(0.3, abs=2.0 * coulomb.u)
+    assert coulomb.u < 0.005
+    assert SOURCE in {part.source for part in viscous.budget}
+    unknown = Constants((KNOWN.best("pole_pairs"),))
+    braked = estimates(TORQUE_MAP, *maps, known=unknown)["torque_coulomb_nm"]
+    assert braked.number > 0.33
