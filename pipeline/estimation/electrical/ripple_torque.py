@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.sample_hold import hold_s
@@ -15,8 +17,10 @@ from pipeline.records.capture import Array, Capture
 from pipeline.records.estimate import Estimate
 
 COLUMNS = ("id_a", "iq_a", "vd_v", "vq_v")
+NEEDED = (*COLUMNS, "t_s", "theta_mech_rad")
 ORDERS = (6, 12, 18, 24)
 """Cycles an electrical turn of what harmonics of a balanced winding make in the rotor's frame."""
+SIGNED = np.concatenate([ORDERS, np.negative(ORDERS)])
 SOURCE = "assumed:ripple_torque"
 """Doubt of a torque of ripple, in its standard uncertainties."""
 Complex = NDArray[np.complexfloating]
@@ -118,58 +122,144 @@ def ripple_of(
         of one that is half a period early or late.
 
     """
-    names = (*COLUMNS, "t_s", "theta_mech_rad")
-    if winding is None or any(name not in data for name in names):
+    if winding is None:
         return 0.0, 0.0
-    columns = {name: data[name][rows] for name in names}
-    if not all(np.all(np.isfinite(column)) for column in columns.values()):
-        return 0.0, 0.0
-    ripple = _ripple(capture, columns, winding.pole_pairs)
+    ripple = _ripple(capture, data, rows, winding)
     if ripple is None:
         return 0.0, 0.0
-    warmer, u_resistance = _winding_temperature(data, rows)
-    r = winding.r_phase_ohm * (1.0 + warmer)
-    torque = ripple_torque(ripple.voltage_v, ripple.current_a, r, ripple.omega_mech_rad_s)
-    noise = 1.5 * (ripple.noise_w - r * ripple.noise_a2) / ripple.omega_mech_rad_s
-    square = max(float(np.sum(np.abs(ripple.current_a) ** 2)) - ripple.noise_a2, 0.0)
-    doubts_w = [r * np.hypot(u_resistance, winding.u_resistance) * square]
-    if capture.meta.voltage_kind != "measured":
-        lost_v = policy().capture_spread.inverter * _bus_v(capture, columns)
-        products = ripple.voltage_v * ripple.current_a.conj()
-        late = float(np.sum(1j * ripple.pace_rad_s * products).real)
-        drop_v = policy().ripple_torque.drop_share * lost_v
-        doubts_w += [drop_v * float(np.sqrt(square)), 0.5 * ripple.hold_s * late]
-    u = 1.5 * float(np.linalg.norm(doubts_w)) / ripple.omega_mech_rad_s
-    return torque - noise, u
+    return _torque(ripple, capture, {n: column[rows] for n, column in data.items()}, winding)
+
+
+def ripple_by_speed(
+    capture: Capture, data: Mapping[str, Array], winding: Winding | None
+) -> tuple[Array, Array, Array]:
+    """Torque of ripple over speed, of a drive whose speed and mean current change.
+
+    Parameters
+    ----------
+    capture, data, winding
+        As of `ripple_of`.
+
+    Returns
+    -------
+    speed_rad_s, torque_nm_s, u_nm_s : array [g]
+        Rising speeds, and torque and its standard uncertainty over speed there; empty where no
+        rows show any.
+
+    Notes
+    -----
+    A ripple keeps its phase on the rotor, from window to window. A step of the current and noise,
+    which look like ripple in one window, do not: amplitudes over speed are medians of windows of
+    about one speed.
+
+    """
+    blank = np.zeros(0)
+    if winding is None or any(name not in data for name in NEEDED):
+        return blank, blank, blank
+    windows = _windows(winding.pole_pairs * data["theta_mech_rad"])
+    each = [r for r in (_ripple(capture, data, rows, winding) for rows in windows) if r is not None]
+    each.sort(key=lambda ripple: ripple.omega_mech_rad_s)
+    back = [ripple for ripple in each if ripple.omega_mech_rad_s < 0.0]
+    middles = _middles(back) + _middles(each[len(back) :])
+    if not middles:
+        return blank, blank, blank
+    speeds = np.array([ripple.omega_mech_rad_s for ripple in middles])
+    both = np.array([_torque(ripple, capture, data, winding) for ripple in middles])
+    return speeds, both[:, 0] / speeds, both[:, 1] / speeds
+
+
+def _windows(turned_rad: Array) -> list[slice]:
+    """Rows, one after the other, of some ripples each and twice as many as unknowns."""
+    travel = policy().ripple_torque.window_cycles * 2.0 * np.pi / ORDERS[0]
+    least = 2 * (2 + SIGNED.size)
+    path = np.cumsum(np.abs(np.diff(turned_rad, prepend=turned_rad[0])))
+    edges = [0]
+    for edge in np.searchsorted(path, np.arange(travel, path[-1], travel)):
+        if edge - edges[-1] >= least:
+            edges.append(int(edge))
+    windows = [slice(a, b) for a, b in pairwise(edges)]
+    return [rows for rows in windows if _steady(turned_rad[rows])]
+
+
+def _steady(turned_rad: Array) -> bool:
+    """Whether the shaft turns about as far in either half of these rows."""
+    first, middle, last = turned_rad[[0, turned_rad.size // 2, -1]]
+    share = (middle - first) / (last - first) if last != first else 0.0
+    least = policy().ripple_torque.half_share
+    return bool(least < share < 1.0 - least)
 
 
 @dataclass(frozen=True, slots=True)
 class _Ripple:
-    """Harmonics of some rows in the rotor's frame.
+    """Harmonics of some rows in the rotor's frame at ± `ORDERS`; 0 where they are not resolved.
 
     `noise_w` and `noise_a2` are what noise adds on average to Σ v_k i_k* and to Σ |i_k|².
     """
 
     voltage_v: Complex
     current_a: Complex
-    pace_rad_s: Array
     noise_w: float
     noise_a2: float
     hold_s: float
     omega_mech_rad_s: float
 
 
-def _ripple(capture: Capture, columns: Mapping[str, Array], pole_pairs: int) -> _Ripple | None:
+def _middles(rising: Sequence[_Ripple]) -> list[_Ripple]:
+    """Ripples of the mean speeds of neighbours of one sense: medians of amplitudes over speed."""
+    if not rising:
+        return []
+    count = min(policy().ripple_torque.alike, len(rising))
+    speeds = np.array([r.omega_mech_rad_s for r in rising])
+    at = sliding_window_view(speeds, count).mean(axis=1)
+
+    def middle(amplitudes: list[Complex]) -> Complex:
+        views = sliding_window_view(np.array(amplitudes) / speeds[:, np.newaxis], count, axis=0)
+        medians = np.median(views.real, axis=2) + 1j * np.median(views.imag, axis=2)
+        return at[:, np.newaxis] * medians
+
+    voltage, current = middle([r.voltage_v for r in rising]), middle([r.current_a for r in rising])
+    hold = rising[0].hold_s
+    return [_Ripple(v, i, 0.0, 0.0, hold, w) for v, i, w in zip(voltage, current, at, strict=True)]
+
+
+def _torque(
+    ripple: _Ripple, capture: Capture, data: Mapping[str, Array], winding: Winding
+) -> tuple[float, float]:
+    """Torque of a ripple and its standard uncertainty [N·m]."""
+    omega = ripple.omega_mech_rad_s
+    warmer, u_resistance = _winding_temperature(data)
+    r = winding.r_phase_ohm * (1.0 + warmer)
+    torque = ripple_torque(ripple.voltage_v, ripple.current_a, r, omega)
+    noise = 1.5 * (ripple.noise_w - r * ripple.noise_a2) / omega
+    square = max(float(np.sum(np.abs(ripple.current_a) ** 2)) - ripple.noise_a2, 0.0)
+    doubts_w = [r * np.hypot(u_resistance, winding.u_resistance) * square]
+    if capture.meta.voltage_kind != "measured":
+        lost_v = policy().capture_spread.inverter * _bus_v(capture, data)
+        drop_v = policy().ripple_torque.drop_share * lost_v
+        products = ripple.voltage_v * ripple.current_a.conj()
+        late = winding.pole_pairs * omega * float(np.sum(1j * SIGNED * products).real)
+        doubts_w += [drop_v * float(np.sqrt(square)), 0.5 * ripple.hold_s * late]
+    return torque - noise, 1.5 * float(np.linalg.norm(doubts_w)) / omega
+
+
+def _ripple(
+    capture: Capture, data: Mapping[str, Array], rows: slice, winding: Winding
+) -> _Ripple | None:
     """The harmonics of rows; None where they do not resolve the lowest order."""
-    t, turned = columns["t_s"], pole_pairs * columns["theta_mech_rad"]
+    if any(name not in data for name in NEEDED):
+        return None
+    columns = {name: data[name][rows] for name in NEEDED}
+    if not all(np.all(np.isfinite(column)) for column in columns.values()):
+        return None
+    t, turned = columns["t_s"], winding.pole_pairs * columns["theta_mech_rad"]
     span_s, travel = float(t[-1] - t[0]), float(turned[-1] - turned[0])
     apart = policy().ripple_torque.apart_cycles * 2.0 * np.pi
-    orders = [k for k in ORDERS if k * abs(travel) + 0.5 * apart < np.pi * (t.size - 1)]
-    if not orders or ORDERS[0] * abs(travel) < apart:
+    seen = np.abs(SIGNED) * abs(travel) + 0.5 * apart < np.pi * (t.size - 1)
+    if not np.any(seen) or ORDERS[0] * abs(travel) < apart:
         return None
-    signed = np.array([sign * k for k in orders for sign in (1, -1)])
+    signed = SIGNED[seen]
     signals = [columns["vd_v"] + 1j * columns["vq_v"], columns["id_a"] + 1j * columns["iq_a"]]
-    (voltage, current), noise = _amplitudes(np.column_stack(signals), turned - turned[0], t, signed)
+    (voltage, current), noise = _amplitudes(np.column_stack(signals), turned, t, signed)
     omega, period_s = travel / span_s, span_s / (t.size - 1)
     hold, timing = hold_s(capture.meta, period_s, omega), capture.meta.voltage_timing
     if timing == "held":
@@ -178,7 +268,10 @@ def _ripple(capture: Capture, columns: Mapping[str, Array], pole_pairs: int) -> 
         damping = np.sinc(0.5 * signed * omega * period_s / np.pi)
         voltage, current, noise = voltage / damping, current / damping, noise / damping**2
     noise_w, noise_a2 = noise.sum(axis=1)
-    return _Ripple(voltage, current, signed * omega, noise_w, noise_a2, hold, omega / pole_pairs)
+    amplitudes = np.zeros((2, SIGNED.size), dtype=np.complex128)
+    amplitudes[:, seen] = voltage, current
+    voltage, current = amplitudes
+    return _Ripple(voltage, current, noise_w, noise_a2, hold, omega / winding.pole_pairs)
 
 
 def _amplitudes(
@@ -197,17 +290,17 @@ def _amplitudes(
     return parts[2:].T, np.repeat(noise[:, np.newaxis], orders.size, axis=1)
 
 
-def _winding_temperature(data: Mapping[str, Array], rows: slice) -> tuple[float, float]:
+def _winding_temperature(data: Mapping[str, Array]) -> tuple[float, float]:
     """Share of resistance by which the winding is above that at 25 degC, and its uncertainty."""
     spread = policy().capture_spread
     logged = data.get("temp_winding_degc")
-    if logged is None or not np.any(np.isfinite(logged[rows])):
+    if logged is None or not np.any(np.isfinite(logged)):
         return 0.0, COPPER_COEFFICIENT_25_1_K * policy().magnet.unlogged_k
-    warmer = COPPER_COEFFICIENT_25_1_K * (float(np.nanmean(logged[rows])) - 25.0)
+    warmer = COPPER_COEFFICIENT_25_1_K * (float(np.nanmean(logged)) - 25.0)
     return warmer, spread.resistance_temperature_known
 
 
 def _bus_v(capture: Capture, columns: Mapping[str, Array]) -> float:
     """Voltage of the DC link; where it is not stated, the least that makes these."""
-    largest = float(np.max(np.hypot(columns["vd_v"], columns["vq_v"])))
+    largest = float(np.nanmax(np.hypot(columns["vd_v"], columns["vq_v"])))
     return capture.meta.vdc_v or float(np.sqrt(3.0)) * largest

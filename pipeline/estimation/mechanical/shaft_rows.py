@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.magnet_temperature import assumed_temperature
-from pipeline.estimation.electrical.ripple_torque import COLUMNS, Winding, ripple_of
+from pipeline.estimation.electrical.ripple_torque import COLUMNS, Winding, ripple_by_speed
 from pipeline.estimation.policy import policy
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
@@ -227,34 +227,17 @@ def _ripple(
 ) -> tuple[Array, Array]:
     """Torque of ripple in each window [w, N·m], and its standard uncertainty.
 
-    A step of the current in a window looks like a ripple, and a slow shaft shows no whole ripple in
-    it: what is far from windows of about its speed, or not there, is by T_h/ω of their median.
-
-    References
-    ----------
-    Hampel, J. Am. Stat. Assoc. 69(346), 1974, 383 (outliers by the median absolute deviation).
-
+    Over speed it may be anything from none to twice as much at rest, rectangular (GUM 4.3.7), of
+    that at the speed next to a window's at which ripple was seen.
     """
-    windows = zip(weak.starts, weak.starts + weak.sizes, strict=True)
-    each = np.array([ripple_of(capture, data, slice(a, b), winding) for a, b in windows])
-    speed = weak.integral(data["theta_mech_rad"], 1)
-    shown = np.flatnonzero(np.any(each != 0.0, axis=1))
-    if shown.size == 0:
+    at, *per_speed = ripple_by_speed(capture, data, winding)
+    if at.size == 0:
         return np.zeros(weak.count), np.zeros(weak.count)
-    per_speed = np.zeros_like(each)
-    per_speed[shown] = each[shown] / speed[shown, np.newaxis]
-    rising = shown[np.argsort(np.abs(speed[shown]))]
-    alike = np.array_split(rising, max(1, rising.size // policy().ripple_torque.alike))
-    at = [float(np.mean(np.abs(speed[rows]))) for rows in alike]
-    middle = np.array([np.median(per_speed[rows], axis=0) for rows in alike])
-    usual = np.array([np.interp(np.abs(speed), at, column) for column in middle.T]).T
-    off = np.abs(per_speed - usual)[:, 0]
-    spread = [np.median(off[rows]) for rows in alike]
-    far = off > policy().ripple_torque.outlier_mads * np.interp(np.abs(speed), at, spread)
-    far[np.setdiff1d(np.arange(weak.count), shown)] = True
-    per_speed[far] = usual[far]
-    torque, u = speed * per_speed.T
-    return torque, u
+    speed = weak.integral(data["theta_mech_rad"], 1)
+    torque, u = (speed * np.interp(speed, at, column) for column in per_speed)
+    near = at[np.abs(speed[:, np.newaxis] - at).argmin(axis=1)]
+    apart = np.minimum(np.abs(speed / near - 1.0), 1.0)
+    return torque, np.copysign(np.hypot(u, apart * torque / np.sqrt(3.0)), speed)
 
 
 def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:

@@ -204,16 +204,19 @@ class RippleTorque:
     apart_cycles: float = chosen(
         2.0, "1", "cycles over the rows by which an order is apart from the mean and from its "
         "mirror image",
-        why="one more than makes them independent, as the noise of the rows is then not enlarged",
+        why="twice what makes them independent; the noise of the rows is then not enlarged",
+    )  # fmt: skip
+    window_cycles: float = chosen(
+        3.0, "1", "cycles of the lowest order in a window of a drive",
+        why="one more than they need, and short, as a drive's speed changes",
+    )  # fmt: skip
+    half_share: float = derived(
+        0.4, "1", "of the travel of a window, that either half of its time has to have",
+        source="the power of a ripple goes with the square of speed: its mean is then off by 5 %",
     )  # fmt: skip
     alike: int = chosen(
-        12, "1", "windows of about one speed that are compared",
+        12, "1", "neighbours in speed, whose median the ripple of a drive is",
         why="half of them may hold a step of the current",
-    )  # fmt: skip
-    outlier_mads: float = derived(
-        4.45, "1", "median absolute deviations beyond which a window is no steady ripple",
-        source="three standard deviations of normal noise, 1.4826 each (Hampel, J. Am. Stat. "
-        "Assoc. 69(346), 1974)",
     )  # fmt: skip
     drop_share: float = derived(
         0.35, "1", "effective harmonics of a drop with the sign of each phase's current, in the "

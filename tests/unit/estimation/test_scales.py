@@ -102,7 +102,7 @@ def known(name: str) -> Constants:
 
 
 def scaled(made: Campaign, factors: Mapping[str, float]) -> Campaign:
-    """The campaign with each column times the factor of its unit."""
+    """The campaign with each column, and the DC link, times the factor of its unit."""
 
     def table(one: pl.DataFrame) -> pl.DataFrame:
         units = {n: COLUMNS[n].unit for n in one.columns if n in COLUMNS}
@@ -112,7 +112,14 @@ def scaled(made: Campaign, factors: Mapping[str, float]) -> Campaign:
 
     return Campaign(
         made.motor_id,
-        tuple(replace(c, tables=tuple(table(t) for t in c.tables)) for c in made.captures),
+        tuple(
+            replace(
+                c,
+                meta=replace(c.meta, vdc_v=c.meta.vdc_v and c.meta.vdc_v * factors.get("V", 1.0)),
+                tables=tuple(table(t) for t in c.tables),
+            )
+            for c in made.captures
+        ),
     )
 
 
