@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.estimation.electrical.magnet_temperature import assumed_temperature, magnet_source
-from pipeline.estimation.electrical.ripple_torque import SOURCE, ripple_of, winding_of
+from pipeline.estimation.electrical.ripple_torque import RIPPLE, ripple_of, winding_of
 from pipeline.estimation.electrical.terminals import bridged
 from pipeline.estimation.policy import policy
 from pipeline.estimation.uncertainty.instruments import current_source, torque_source
@@ -120,7 +120,7 @@ class Point:
             vq_v=self.vq_v * voltage,
             torque_nm=self.torque_nm * torque,
             ripple_nm=self.ripple_nm * current * voltage
-            + shift.get(SOURCE, 0.0) * self.u_ripple_nm,
+            + shift.get(RIPPLE, 0.0) * self.u_ripple_nm,
             temp_magnet_degc=self.temp_magnet_degc + shift.get(magnet_source(self.capture), 0.0),
         )
 

@@ -17,11 +17,12 @@ from pipeline.records.capture import Array, Capture
 from pipeline.records.estimate import Estimate
 
 COLUMNS = ("id_a", "iq_a", "vd_v", "vq_v")
+WARMTH = "temp_winding_degc"
 NEEDED = (*COLUMNS, "t_s", "theta_mech_rad")
 ORDERS = (6, 12, 18, 24)
 """Cycles an electrical turn of what harmonics of a balanced winding make in the rotor's frame."""
 SIGNED = np.concatenate([ORDERS, np.negative(ORDERS)])
-SOURCE = "assumed:ripple_torque"
+RIPPLE = "assumed:ripple_torque"
 """Doubt of a torque of ripple, in its standard uncertainties."""
 Complex = NDArray[np.complexfloating]
 
@@ -130,14 +131,12 @@ def ripple_of(
     return _torque(ripple, capture, {n: column[rows] for n, column in data.items()}, winding)
 
 
-def ripple_by_speed(
-    capture: Capture, data: Mapping[str, Array], winding: Winding | None
-) -> tuple[Array, Array, Array]:
+def ripple_by_speed(capture: Capture, winding: Winding | None) -> tuple[Array, Array, Array]:
     """Torque of ripple over speed, of a drive whose speed and mean current change.
 
     Parameters
     ----------
-    capture, data, winding
+    capture, winding
         As of `ripple_of`.
 
     Returns
@@ -154,8 +153,12 @@ def ripple_by_speed(
 
     """
     blank = np.zeros(0)
-    if winding is None or any(name not in data for name in NEEDED):
+    if winding is None or not capture.has(*NEEDED):
         return blank, blank, blank
+    extra = [WARMTH] if capture.has(WARMTH) else []
+    data = capture.arrays(*NEEDED, *extra)
+    finite = np.all([np.isfinite(data[name]) for name in NEEDED], axis=0)
+    data = {name: column[finite] for name, column in data.items()}
     windows = _windows(winding.pole_pairs * data["theta_mech_rad"])
     each = [r for r in (_ripple(capture, data, rows, winding) for rows in windows) if r is not None]
     each.sort(key=lambda ripple: ripple.omega_mech_rad_s)
@@ -215,7 +218,7 @@ def _middles(rising: Sequence[_Ripple]) -> list[_Ripple]:
     def middle(amplitudes: list[Complex]) -> Complex:
         views = sliding_window_view(np.array(amplitudes) / speeds[:, np.newaxis], count, axis=0)
         medians = np.median(views.real, axis=2) + 1j * np.median(views.imag, axis=2)
-        return at[:, np.newaxis] * medians
+        return np.asarray(at[:, np.newaxis] * medians)
 
     voltage, current = middle([r.voltage_v for r in rising]), middle([r.current_a for r in rising])
     hold = rising[0].hold_s
@@ -293,7 +296,7 @@ def _amplitudes(
 def _winding_temperature(data: Mapping[str, Array]) -> tuple[float, float]:
     """Share of resistance by which the winding is above that at 25 degC, and its uncertainty."""
     spread = policy().capture_spread
-    logged = data.get("temp_winding_degc")
+    logged = data.get(WARMTH)
     if logged is None or not np.any(np.isfinite(logged)):
         return 0.0, COPPER_COEFFICIENT_25_1_K * policy().magnet.unlogged_k
     warmer = COPPER_COEFFICIENT_25_1_K * (float(np.nanmean(logged)) - 25.0)

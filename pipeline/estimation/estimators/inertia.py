@@ -9,8 +9,7 @@ import numpy as np
 
 from pipeline.estimation.electrical.magnet_temperature import magnet_source, magnet_uncertainties
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
-from pipeline.estimation.electrical.ripple_torque import SOURCE as RIPPLE
-from pipeline.estimation.electrical.ripple_torque import winding_of
+from pipeline.estimation.electrical.ripple_torque import RIPPLE, winding_of
 from pipeline.estimation.mechanical.drag import (
     DRAG_FORMS,
     DragFit,
@@ -196,8 +195,7 @@ def driving_torque(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) 
     driving_nm: Array = (
         kt * current * (rows.q_current_a + magnet * warm)
         + reluctance * current**2 * rows.product_a2
-        + rows.ripple_nm
-        + shift.get(RIPPLE, 0.0) * rows.u_ripple_nm
+        + (rows.ripple_nm + shift.get(RIPPLE, 0.0) * rows.u_ripple_nm)
         - load * rows.load_nm
     )
     return driving_nm
@@ -281,14 +279,13 @@ def _setups_reason(setups: Sequence[Setup]) -> str:
 
 def _rows(known: Constants, campaign: Campaign) -> ShaftRows | None:
     """Rows of the drives that log their load, of all drives where none does; and of coast-downs."""
-    orders, ripple = _orders(known, campaign)
     pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
-    winding = winding_of(pairs, known.best("r_phase_ohm"))
+    forms = DRAG_FORMS, *_orders(known, pairs), winding_of(pairs, known.best("r_phase_ohm"))
     logged = [c for c in campaign.of("drive", "spin_down") if not _loadless(c)]
-    rows = shaft_rows(logged, DRAG_FORMS, orders, ripple, winding)
+    rows = shaft_rows(logged, *forms)
     if rows is not None and np.any(rows.kind == DRIVE):
         return rows
-    return shaft_rows(campaign.of("drive", "spin_down"), DRAG_FORMS, orders, ripple, winding)
+    return shaft_rows(campaign.of("drive", "spin_down"), *forms)
 
 
 def _loadless(capture: Capture) -> bool:
@@ -349,10 +346,9 @@ def _torque(known: Constants) -> Torque | None:
     return Torque(kt.number, kt.budget, 0.0, (), *magnet, words, reluctance_known=False)
 
 
-def _orders(known: Constants, campaign: Campaign) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _orders(known: Constants, pairs: int | None) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Orders a turn of cogging, and of the torque ripple that six-fold back-EMF harmonics make."""
     order = known.best("cogging_order")
-    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
     cogging = () if order is None else (round(order.number),)
     return cogging, () if pairs is None else (6 * pairs,)
 

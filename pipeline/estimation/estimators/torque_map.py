@@ -16,7 +16,7 @@ from pipeline.estimation.electrical.operating_points import (
     operating_points,
     pole_pairs_of,
 )
-from pipeline.estimation.electrical.ripple_torque import SOURCE as RIPPLE
+from pipeline.estimation.electrical.ripple_torque import RIPPLE
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, angle_doubt, standstill_words
 from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.magnet_temperature import assumed_temperature
-from pipeline.estimation.electrical.ripple_torque import COLUMNS, Winding, ripple_by_speed
+from pipeline.estimation.electrical.ripple_torque import Winding, ripple_by_speed
 from pipeline.estimation.policy import policy
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
@@ -210,30 +210,23 @@ def _part(capture: Capture, winding: Winding | None) -> _Part | None:
     except ValueError:
         return None
     current = data.get("iq_a", np.zeros(t.size))
-    extra = [
-        name for name in (*COLUMNS, "temp_winding_degc") if kind == DRIVE and capture.has(name)
-    ]
-    harmonic = {name: column[fine] for name, column in capture.arrays(*wanted, *extra).items()}
-    harmonic |= {"t_s": t, "theta_mech_rad": theta}
     return _Part(
         capture, kind, weak, theta, speed, current, data.get("id_a", current * 0.0),
         data.get("temp_magnet_degc", current * 0.0 + 25.0) - 25.0,
-        data.get("torque_shaft_nm", current * 0.0), _ripple(capture, weak, harmonic, winding),
+        data.get("torque_shaft_nm", current * 0.0),
+        _ripple(capture, winding, weak.integral(theta, 1)),
     )  # fmt: skip
 
 
-def _ripple(
-    capture: Capture, weak: WeakRows, data: Mapping[str, Array], winding: Winding | None
-) -> tuple[Array, Array]:
-    """Torque of ripple in each window [w, N·m], and its standard uncertainty.
+def _ripple(capture: Capture, winding: Winding | None, speed: Array) -> tuple[Array, Array]:
+    """Torque of ripple at each window's speed [w], and its standard uncertainty [w, N·m].
 
     Over speed it may be anything from none to twice as much at rest, rectangular (GUM 4.3.7), of
     that at the speed next to a window's at which ripple was seen.
     """
-    at, *per_speed = ripple_by_speed(capture, data, winding)
+    at, *per_speed = ripple_by_speed(capture, winding)
     if at.size == 0:
-        return np.zeros(weak.count), np.zeros(weak.count)
-    speed = weak.integral(data["theta_mech_rad"], 1)
+        return np.zeros(speed.size), np.zeros(speed.size)
     torque, u = (speed * np.interp(speed, at, column) for column in per_speed)
     near = at[np.abs(speed[:, np.newaxis] - at).argmin(axis=1)]
     apart = np.minimum(np.abs(speed / near - 1.0), 1.0)

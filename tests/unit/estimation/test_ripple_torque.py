@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.estimation.electrical.operating_points import operating_points
 from pipeline.estimation.electrical.ripple_torque import (
-    SOURCE,
+    RIPPLE,
     Winding,
     ripple_of,
     ripple_torque,
@@ -223,14 +223,14 @@ def test_drag_of_a_torque_map_is_without_the_brake_of_ripple() -> None:
     assert [p.ripple_nm for p in points] == pytest.approx(
         [harmonics(p.omega_mech_rad_s)[2] for p in points], rel=0.01
     )
-    one = points[0].shifted({SOURCE: 1.0, "current@s": 0.01})
+    one = points[0].shifted({RIPPLE: 1.0, "current@s": 0.01})
     assert one.ripple_nm == pytest.approx(1.01 * points[0].ripple_nm + points[0].u_ripple_nm)
     result = estimates(TORQUE_MAP, *maps, known=KNOWN)
     viscous, coulomb = result["b_visc_nm_s_rad"], result["torque_coulomb_nm"]
     assert viscous.number == pytest.approx(0.01, abs=2.0 * viscous.u)
     assert coulomb.number == pytest.approx(0.3, abs=2.0 * coulomb.u)
     assert coulomb.u < 0.005
-    assert SOURCE in {part.source for part in viscous.budget}
+    assert RIPPLE in {part.source for part in viscous.budget}
     unknown = Constants((KNOWN.best("pole_pairs"),))
     braked = estimates(TORQUE_MAP, *maps, known=unknown)["torque_coulomb_nm"]
     assert braked.number > 0.33
