@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -128,7 +128,8 @@ def ripple_of(
     ripple = _ripple(capture, data, rows, winding)
     if ripple is None:
         return 0.0, 0.0
-    return _torque(ripple, capture, {n: column[rows] for n, column in data.items()}, winding)
+    (there,) = _beyond_noise([ripple])
+    return _torque(there, capture, {n: column[rows] for n, column in data.items()}, winding)
 
 
 def ripple_by_speed(capture: Capture, winding: Winding | None) -> tuple[Array, Array, Array]:
@@ -163,7 +164,7 @@ def ripple_by_speed(capture: Capture, winding: Winding | None) -> tuple[Array, A
     each = [r for r in (_ripple(capture, data, rows, winding) for rows in windows) if r is not None]
     each.sort(key=lambda ripple: ripple.omega_mech_rad_s)
     back = [ripple for ripple in each if ripple.omega_mech_rad_s < 0.0]
-    middles = _middles(back) + _middles(each[len(back) :])
+    middles = _beyond_noise(_middles(back) + _middles(each[len(back) :]))
     if not middles:
         return blank, blank, blank
     speeds = np.array([ripple.omega_mech_rad_s for ripple in middles])
@@ -196,53 +197,69 @@ def _steady(turned_rad: Array) -> bool:
 class _Ripple:
     """Harmonics of some rows in the rotor's frame at ± `ORDERS`; 0 where they are not resolved.
 
-    `noise_w` and `noise_a2` are what noise adds on average to Σ v_k i_k* and to Σ |i_k|².
+    `noise_a2` [k] is the variance of each current.
     """
 
     voltage_v: Complex
     current_a: Complex
-    noise_w: float
-    noise_a2: float
+    noise_a2: Array
     hold_s: float
     omega_mech_rad_s: float
 
 
 def _middles(rising: Sequence[_Ripple]) -> list[_Ripple]:
     """Ripples of the mean speeds of neighbours of one sense: medians of amplitudes over speed."""
-    if not rising:
+    count = policy().ripple_torque.alike
+    if len(rising) < count:
         return []
-    count = min(policy().ripple_torque.alike, len(rising))
     speeds = np.array([r.omega_mech_rad_s for r in rising])
-    at = sliding_window_view(speeds, count).mean(axis=1)
+    at = sliding_window_view(speeds, count).mean(axis=1)[:, np.newaxis]
 
-    def middle(amplitudes: list[Complex]) -> Complex:
+    def middle(amplitudes: list[Complex]) -> tuple[Complex, Array]:
         views = sliding_window_view(np.array(amplitudes) / speeds[:, np.newaxis], count, axis=0)
-        medians = np.median(views.real, axis=2) + 1j * np.median(views.imag, axis=2)
-        return np.asarray(at[:, np.newaxis] * medians)
+        both = [np.median(part, axis=2) for part in (views.real, views.imag)]
+        off = [
+            np.median(np.abs(part - one[:, :, np.newaxis]), axis=2)
+            for part, one in zip((views.real, views.imag), both, strict=True)
+        ]
+        variance = 0.5 * np.pi / count * 1.4826**2 * (off[0] ** 2 + off[1] ** 2)
+        return np.asarray(at * (both[0] + 1j * both[1])), np.asarray(at**2 * variance)
 
-    voltage, current = middle([r.voltage_v for r in rising]), middle([r.current_a for r in rising])
+    voltage, _ = middle([r.voltage_v for r in rising])
+    current, noise = middle([r.current_a for r in rising])
     hold = rising[0].hold_s
-    return [_Ripple(v, i, 0.0, 0.0, hold, w) for v, i, w in zip(voltage, current, at, strict=True)]
+    columns = zip(voltage, current, noise, at[:, 0], strict=True)
+    return [_Ripple(v, i, noise_a2, hold, w) for v, i, noise_a2, w in columns]
+
+
+def _beyond_noise(each: Sequence[_Ripple]) -> list[_Ripple]:
+    """The same without the orders whose current is none beyond noise in most of them."""
+    least = policy().evidence.sigmas ** 2
+    seen = [np.abs(ripple.current_a) ** 2 > least * ripple.noise_a2 for ripple in each]
+    there = np.median(seen, axis=0) == 1.0 if seen else np.zeros(0)
+    return [
+        replace(one, voltage_v=there * one.voltage_v, current_a=there * one.current_a)
+        for one in each
+    ]
 
 
 def _torque(
     ripple: _Ripple, capture: Capture, data: Mapping[str, Array], winding: Winding
 ) -> tuple[float, float]:
     """Torque of a ripple and its standard uncertainty [N·m]."""
-    omega = ripple.omega_mech_rad_s
+    voltage, current, omega = ripple.voltage_v, ripple.current_a, ripple.omega_mech_rad_s
     warmer, u_resistance = _winding_temperature(data)
     r = winding.r_phase_ohm * (1.0 + warmer)
-    torque = ripple_torque(ripple.voltage_v, ripple.current_a, r, omega)
-    noise = 1.5 * (ripple.noise_w - r * ripple.noise_a2) / omega
-    square = max(float(np.sum(np.abs(ripple.current_a) ** 2)) - ripple.noise_a2, 0.0)
+    torque = ripple_torque(voltage, current, r, omega)
+    square = float(np.sum(np.abs(current) ** 2))
     doubts_w = [r * np.hypot(u_resistance, winding.u_resistance) * square]
     if capture.meta.voltage_kind != "measured":
         lost_v = policy().capture_spread.inverter * _bus_v(capture, data)
         drop_v = policy().ripple_torque.drop_share * lost_v
-        products = ripple.voltage_v * ripple.current_a.conj()
-        late = winding.pole_pairs * omega * float(np.sum(1j * SIGNED * products).real)
+        late = float(np.sum(1j * SIGNED * voltage * current.conj()).real)
+        late *= winding.pole_pairs * omega
         doubts_w += [drop_v * float(np.sqrt(square)), 0.5 * ripple.hold_s * late]
-    return torque - noise, 1.5 * float(np.linalg.norm(doubts_w)) / omega
+    return torque, 1.5 * float(np.linalg.norm(doubts_w)) / omega
 
 
 def _ripple(
@@ -270,27 +287,27 @@ def _ripple(
     if timing == "centred" and hold < period_s:
         damping = np.sinc(0.5 * signed * omega * period_s / np.pi)
         voltage, current, noise = voltage / damping, current / damping, noise / damping**2
-    noise_w, noise_a2 = noise.sum(axis=1)
     amplitudes = np.zeros((2, SIGNED.size), dtype=np.complex128)
     amplitudes[:, seen] = voltage, current
+    noise_a2 = np.zeros(SIGNED.size)
+    noise_a2[seen] = noise
     voltage, current = amplitudes
-    return _Ripple(voltage, current, noise_w, noise_a2, hold, omega / winding.pole_pairs)
+    return _Ripple(voltage, current, noise_a2, hold, omega / winding.pole_pairs)
 
 
 def _amplitudes(
     signals: Complex, turned_rad: Array, t_s: Array, orders: NDArray[np.int64]
 ) -> tuple[Complex, Array]:
     """Amplitudes [2, k] of two signals [n, 2] at orders of an angle, beside a straight line; and
-    what noise adds on average to their product (real part) and to the second's square [2, k].
+    the variance of those of the second [k].
     """
     line = np.column_stack([np.ones(t_s.size), (t_s - t_s.mean()) / (t_s[-1] - t_s[0])])
     design = np.hstack([line, np.exp(1j * np.outer(turned_rad, orders))])
     to_rows = design.conj().T
     parts: Complex = np.linalg.lstsq(to_rows @ design, to_rows @ signals, rcond=None)[0]
-    first, second = (signals - design @ parts).T
-    noise: Array = np.array([first @ second.conj(), second @ second.conj()]).real
-    noise /= (t_s.size - design.shape[1]) * t_s.size
-    return parts[2:].T, np.repeat(noise[:, np.newaxis], orders.size, axis=1)
+    remainder = (signals - design @ parts)[:, 1]
+    variance = float(np.vdot(remainder, remainder).real) / (t_s.size - design.shape[1])
+    return parts[2:].T, np.full(orders.size, variance / t_s.size)
 
 
 def _winding_temperature(data: Mapping[str, Array]) -> tuple[float, float]:
