@@ -54,6 +54,48 @@ FORMS = ("windage", *STRIBECK)
 
 
 @dataclass(frozen=True, slots=True)
+class Design:
+    """A design matrix and the names of its columns.
+
+    Attributes
+    ----------
+    columns
+        The matrix [w, k].
+    names
+        Names of the columns [k].
+
+    """
+
+    columns: Array
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(
+        cls,
+        first: Sequence[Array],
+        names: tuple[str, ...],
+        candidates: Mapping[str, Array],
+        chosen: Sequence[str],
+    ) -> Design:
+        """The first columns, and the chosen ones of the candidates behind them.
+
+        Parameters
+        ----------
+        first
+            The first columns, one or more an array.
+        names
+            Their names.
+        candidates
+            Further columns [w] by name.
+        chosen
+            Which of these join.
+
+        """
+        columns = np.column_stack([*first, *(candidates[name] for name in chosen)])
+        return cls(columns, (*names, *chosen))
+
+
+@dataclass(frozen=True, slots=True)
 class DragFit:
     """The equation of motion A = g T − Σ a_m f_m(ω) − nuisances, fitted to weak-form rows.
 
@@ -222,26 +264,23 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
     bumps = {n: candidates[n] for n in STRIBECK}
     chosen += needed_columns(start, bumps, y, sigma, level, 1, tau)
     chosen = _without_dip(chosen, base, candidates, y, sigma)
-    design = np.column_stack([base, *(candidates[n] for n in chosen)])
-    names = ("torque", "coulomb", "viscous", *chosen)
-    sigma = _balanced(rows, design, y)
+    design = Design.of([base], ("torque", "coulomb", "viscous"), candidates, chosen)
+    sigma = _balanced(rows, design.columns, y)
     without_forms = [n for n in chosen if n not in FORMS]
-    curve = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in without_forms)])
-    curve_names = ("torque", *CURVE, *without_forms)
-    free = _form_fails(rows, design, names, curve, curve_names, y, level) or _implausible(
-        rows, design, names, y, sigma
-    )
+    first = [driving_nm, *curve_columns]
+    curve = Design.of(first, ("torque", *CURVE), candidates, without_forms)
+    free = _form_fails(rows, design, curve, y, level) or _implausible(rows, design, y, sigma)
     if free:
-        design, names = curve, curve_names
-        sigma = _balanced(rows, design, y)
-    fit = linear_fit(design, y, sigma)
-    covariance, dof = _covariance(rows, design, fit, sigma)
+        design = curve
+        sigma = _balanced(rows, design.columns, y)
+    fit = linear_fit(design.columns, y, sigma)
+    covariance, dof = _covariance(rows, design.columns, fit, sigma)
     u_form, reasons = _form(fit.coefficients, free, rows)
     if not free:
         u_form = _shape_doubt(base, candidates, chosen, fit.coefficients, y, sigma)
     return DragFit(
-        names, fit.coefficients, covariance, fit.residuals, dof, free, u_form, reasons,
-        design, sigma, y, rows.fastest_rad_s,
+        design.names, fit.coefficients, covariance, fit.residuals, dof, free, u_form, reasons,
+        design.columns, sigma, y, rows.fastest_rad_s,
     )  # fmt: skip
 
 
@@ -377,15 +416,7 @@ def _balanced(rows: ShaftRows, design: Array, y: Array) -> Array:
     return sigma
 
 
-def _form_fails(
-    rows: ShaftRows,
-    design: Array,
-    names: Sequence[str],
-    curve: Array,
-    curve_names: Sequence[str],
-    y: Array,
-    level: float,
-) -> bool:
+def _form_fails(rows: ShaftRows, design: Design, curve: Design, y: Array, level: float) -> bool:
     """Whether a free drag curve explains the rows better, beyond chance and beyond what matters.
 
     Coast-downs show drag alone, so where there are enough of them they decide: the form fails if
@@ -395,20 +426,20 @@ def _form_fails(
     """
     coasting = rows.kind == COAST
     if coasts_decide(rows):
-        straight_fit = linear_fit(design, y, _balanced(rows, design, y))
+        straight_fit = linear_fit(design.columns, y, _balanced(rows, design.columns, y))
         rms = np.sqrt(np.mean(straight_fit.residuals[coasting] ** 2))
         return bool(rms > policy().drag.material_share * np.sqrt(np.mean(y[coasting] ** 2)))
-    sigma = _balanced(rows, curve, y)
-    loose, strict = linear_fit(curve, y, sigma), linear_fit(design, y, sigma)
+    sigma = _balanced(rows, curve.columns, y)
+    loose, strict = linear_fit(curve.columns, y, sigma), linear_fit(design.columns, y, sigma)
     costs = [float(np.sum((f.residuals / sigma) ** 2)) for f in (loose, strict)]
     tau = autocorrelation_time(loose.residuals / sigma, policy().evidence.memory_rows)
-    free = max((y.size - curve.shape[1]) / tau, 1.0)
+    dof = y.size - len(curve.names)
+    free = max(dof / tau, 1.0)
     extra = max(len(CURVE) - 2, 1)
-    statistic = (costs[1] - costs[0]) / extra / tau / (costs[0] / (y.size - curve.shape[1]))
+    statistic = (costs[1] - costs[0]) / extra / tau / (costs[0] / dof)
     if fdtrc(extra, free, max(statistic, 0.0)) >= level:
         return False
-    curved = _drag_part(curve, loose, curve_names)
-    straight = _drag_part(design, strict, names)
+    curved, straight = _drag_part(curve, loose), _drag_part(design, strict)
     return bool(
         np.std(curved - straight) > policy().drag.material_share * np.sqrt(np.mean(curved**2))
     )
@@ -450,20 +481,18 @@ def _shape_doubt(
     return np.array(apart) / 2.0
 
 
-def _implausible(
-    rows: ShaftRows, design: Array, names: Sequence[str], y: Array, sigma: Array
-) -> bool:
+def _implausible(rows: ShaftRows, design: Design, y: Array, sigma: Array) -> bool:
     """Whether the fitted drag is no friction: a negative Coulomb or viscous part."""
-    fit = linear_fit(design, y, sigma)
-    u = np.sqrt(np.diag(_covariance(rows, design, fit, sigma)[0]))
-    parts = [names.index("coulomb"), names.index("viscous")]
+    fit = linear_fit(design.columns, y, sigma)
+    u = np.sqrt(np.diag(_covariance(rows, design.columns, fit, sigma)[0]))
+    parts = [design.names.index("coulomb"), design.names.index("viscous")]
     return any(fit.coefficients[k] < -policy().evidence.sigmas * u[k] for k in parts)
 
 
-def _drag_part(design: Array, fit: LinearFit, names: Sequence[str]) -> Array:
+def _drag_part(design: Design, fit: LinearFit) -> Array:
     """Drag [w] in torque that a fit gives each row: its drag columns over g."""
-    places = [k for k, name in enumerate(names) if name in _DRAG_NAMES]
-    drag: Array = design[:, places] @ fit.coefficients[places] / fit.coefficients[0]
+    places = [k for k, name in enumerate(design.names) if name in _DRAG_NAMES]
+    drag: Array = design.columns[:, places] @ fit.coefficients[places] / fit.coefficients[0]
     return drag
 
 

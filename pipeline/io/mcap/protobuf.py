@@ -74,7 +74,8 @@ class ProtobufDecoder:
             return leaves
         pass_ = _Pass(batch.buffer, wanted)
         owner = np.arange(batch.start.size, dtype=np.int64)
-        pass_.message(self.plan, "", batch.start, batch.start + batch.length, owner, owner.size)
+        spans = _Spans(batch.start, batch.start + batch.length, owner)
+        pass_.message(self.plan, "", spans, owner.size)
         return pass_.leaves
 
     def _evenly(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf] | None:
@@ -106,6 +107,15 @@ class ProtobufDecoder:
         return leaves
 
 
+@dataclass(frozen=True, slots=True)
+class _Spans:
+    """Bytes [start, end) of messages, and the row that each belongs to."""
+
+    start: Integers
+    end: Integers
+    owner: Integers
+
+
 class _Pass:
     """One decoding of one batch."""
 
@@ -119,13 +129,11 @@ class _Pass:
         self,
         plan: Message,
         prefix: str,
-        start: Integers,
-        end: Integers,
-        owner: Integers,
+        spans: _Spans,
         rows: int,
         counts: Integers | None = None,
     ) -> None:
-        """Decode the spans [start, end) into leaves of `rows` values; `owner` is each span's row.
+        """Decode spans into leaves of `rows` values.
 
         `counts` [messages] is given below a repeated message, whose elements are the rows.
         """
@@ -134,9 +142,9 @@ class _Pass:
             for number, part in plan.fields.items()
             if any(map(self.wanted, _names(part, prefix)))
         }
-        events = self.occurrences(plan, fields, start, end, owner)
+        events = self.occurrences(plan, fields, spans)
         present = np.zeros(rows, bool)
-        present[owner] = True
+        present[spans.owner] = True
         for number, part in fields.items():
             of_field = events[number]
             if isinstance(part, Message):
@@ -151,18 +159,15 @@ class _Pass:
                 raise _bad(f"has the array {prefix + part.name!r} inside an array")
 
     def occurrences(
-        self,
-        plan: Message,
-        fields: dict[int, Scalar | Message],
-        start: Integers,
-        end: Integers,
-        owner: Integers,
+        self, plan: Message, fields: dict[int, Scalar | Message], spans: _Spans
     ) -> dict[int, _Events]:
         """Occurrences of `fields`: messages of the common shapes at once, the rest by cursor."""
+        start, end, owner = spans.start, spans.end, spans.owner
         if np.any(np.diff(owner) <= 0):
-            return self.events(fields, start, end, owner)
+            return self.events(fields, spans)
         places, unmatched = shaped_rows(self.raw, plan, start, end - start)
-        events = self.events(fields, start[unmatched], end[unmatched], owner[unmatched])
+        by_cursor = _Spans(start[unmatched], end[unmatched], owner[unmatched])
+        events = self.events(fields, by_cursor)
         for number, part in fields.items():
             for rows, at in places.get(number, ()):
                 if isinstance(part, Scalar):
@@ -176,21 +181,20 @@ class _Pass:
         owner, start, length = _joined(events)
         prefix = f"{prefix}{part.name}."
         if not part.repeated:
-            self.message(part, prefix, start, start + length, owner, rows, counts)
+            self.message(part, prefix, _Spans(start, start + length, owner), rows, counts)
             return
         if counts is not None:
             raise _bad(f"has the array {prefix[:-1]!r} inside an array")
         order = np.argsort(owner, kind="stable")
         elements = np.arange(order.size, dtype=np.int64)
         per_message = np.bincount(owner, minlength=rows).astype(np.int64)
-        start, length = start[order], length[order]
-        self.message(part, prefix, start, start + length, elements, order.size, per_message)
+        spans = _Spans(start[order], start[order] + length[order], elements)
+        self.message(part, prefix, spans, order.size, per_message)
 
-    def events(
-        self, fields: dict[int, Scalar | Message], start: Integers, end: Integers, owner: Integers
-    ) -> dict[int, _Events]:
+    def events(self, fields: dict[int, Scalar | Message], spans: _Spans) -> dict[int, _Events]:
         """Step all cursors through their spans and note the occurrences of `fields`."""
         events = {number: _Events() for number in fields}
+        start, end = spans.start, spans.end
         if np.any(end < start) or np.any(end > self.raw.size):
             raise _bad("is longer than its record")
         cursor = start.copy()
@@ -208,13 +212,13 @@ class _Pass:
                 if tag >> 3 == 0:
                     raise _bad("has a field numbered 0")
                 if repeats >= _RUN_AFTER and wire in _WIDTH and isinstance(part, Scalar):
-                    self.runs(events[tag >> 3], tag, rows, value, cursor, end, owner)
+                    self.runs(events[tag >> 3], tag, rows, value, cursor, spans)
                     continue
                 extent, stop = self.extent(wire, value, end[rows])
                 if part is not None:
                     _check_wire(part, wire)
                     at = value if wire != LENGTH else stop - extent
-                    events[tag >> 3].add(owner[rows], at, extent, wire)
+                    events[tag >> 3].add(spans.owner[rows], at, extent, wire)
                 cursor[rows] = stop
             active = active[cursor[active] < end[active]]
         return events
@@ -267,13 +271,12 @@ class _Pass:
         rows: Integers,
         value: Integers,
         cursor: Integers,
-        end: Integers,
-        owner: Integers,
+        spans: _Spans,
     ) -> None:
         """An unpacked array: per message, all following items of the same tag at once."""
         width = _WIDTH[tag & 7]
         for row, at in zip(rows.tolist(), value.tolist(), strict=True):
-            begin, stop = int(cursor[row]), int(end[row])
+            begin, stop = int(cursor[row]), int(spans.end[row])
             stride = at - begin + width
             most = (stop - begin) // stride
             if most == 0:
@@ -285,7 +288,7 @@ class _Pass:
             count = most if equal.all() else int(np.argmin(equal))
             places = at + stride * np.arange(count, dtype=np.int64)
             size = np.full(count, width, np.int64)
-            events.add(np.full(count, owner[row]), places, size, tag & 7)
+            events.add(np.full(count, spans.owner[row]), places, size, tag & 7)
             cursor[row] = begin + count * stride
 
     def singular(

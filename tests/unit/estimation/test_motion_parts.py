@@ -17,6 +17,7 @@ from pipeline.estimation.mechanical.drag import (
     DRAG_FORMS,
     KNOTS,
     STRIBECK,
+    Design,
     DragFit,
     _balanced,
     _drag_part,
@@ -204,7 +205,7 @@ def test_an_excess_below_coulomb_friction_is_left_out() -> None:
 def test_the_drag_of_a_fit_in_torque() -> None:
     design = np.column_stack([np.ones(4), np.arange(4.0), np.full(4, 2.0), np.full(4, 9.0)])
     fit = linear_fit(np.eye(4), np.array([4.0, 8.0, 0.4, 7.0]))
-    found = _drag_part(design, fit, ("torque", "coulomb", "viscous", "offset"))
+    found = _drag_part(Design(design, ("torque", "coulomb", "viscous", "offset")), fit)
     assert found == pytest.approx((8.0 * np.arange(4.0) + 0.8) / 4.0)
 
 
