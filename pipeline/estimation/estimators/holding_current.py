@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -103,7 +103,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     positions = even_positions(turns)
     residuals = held_out_residual(turns, [line.order for line in [*lines, *slow]])
     rms_a = None if residuals is None else float(np.sqrt(np.mean(residuals**2)))
-    estimates = _cogging(captures, spec, lines, rms_a, positions, known, campaign)
+    waves = _Waves(captures, spec, lines, positions, rms_a)
+    estimates = _cogging(waves, known, campaign)
     if residuals is None or rms_a is None:
         note = f"angles do not cover the turn densely enough to hold sectors out; {EXPERIMENT}"
         residual = METHOD.missing(RESIDUAL.name, note)
@@ -227,27 +228,32 @@ def held_out_residual(turns: Sequence[Turn], orders: Sequence[int]) -> Array | N
     return residuals
 
 
-def _cogging(
-    captures: Sequence[Capture],
-    spec: Spectrum,
-    lines: Sequence[OrderLine],
-    rms_a: float | None,
-    positions: int | None,
-    known: Constants,
-    campaign: Campaign,
-) -> tuple[Estimate, ...]:
-    names = COGGING
+@dataclass(frozen=True, slots=True)
+class _Waves:
+    """The q current over angle: its spectrum, the orders that stand out, the number of even
+    `positions` that it was held at, and what is left in held-out sectors [A rms].
+    """
+
+    captures: Sequence[Capture]
+    spectrum: Spectrum
+    lines: Sequence[OrderLine]
+    positions: int | None
+    rms_a: float | None
+
+
+def _cogging(waves: _Waves, known: Constants, campaign: Campaign) -> tuple[Estimate, ...]:
+    names, captures, lines = COGGING, waves.captures, waves.lines
     if not lines:
-        limit = detection_limit(spec)
+        limit = detection_limit(waves.spectrum)
         note = f"no order found; an amplitude above {limit:.2g} A would have been"
         return tuple(METHOD.absent(n, note) for n in names)
     note = f"A by order: {name_orders(lines, known, campaign)}"
-    if rms_a is not None:
-        note += f"; {rms_a:.3g} A rms left in held-out sectors"
-    leading, alias = _true_order(lines[0].order, positions, known, campaign)
+    if waves.rms_a is not None:
+        note += f"; {waves.rms_a:.3g} A rms left in held-out sectors"
+    leading, alias = _true_order(lines[0].order, waves.positions, known, campaign)
     note += alias
     order = METHOD.measured(names[0], leading, captures=captures, notes=note)
-    order = replace(order, bounds=(1.0, float(spec.orders[-1])))
+    order = replace(order, bounds=(1.0, float(waves.spectrum.orders[-1])))
     read = (
         METHOD.scatter(names[1], lines[0].u, lines[0].dof),
         *_gains(captures, lines[0].amplitude),

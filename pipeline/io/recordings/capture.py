@@ -38,6 +38,7 @@ from pipeline.io.recordings.datasheet_page import capture_markdown
 from pipeline.io.recordings.error_map import send_frame, send_map
 from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
+    Bars,
     recording,
     send_axis_ends,
     send_bars,
@@ -172,13 +173,13 @@ def _send_maps(stream: RecordingStream, maps: ResidualMaps) -> None:
     edges = np.degrees(np.array(maps.turn.x.edges))
     shown = np.nan_to_num(maps.turn.mean) / 10.0**scale.exponent
     width = float(edges[1] - edges[0])
-    send_bars(stream, f"/angle/{maps.signal}", shown, edges[:-1], width, RESIDUAL)
+    send_bars(stream, f"/angle/{maps.signal}", Bars(shown, edges[:-1], width, RESIDUAL))
     most = scale.shown(max(maps.turn.reach, maps.floor))
     send_axis_ends(stream, f"/angle_axis/{maps.signal}", (most, -most), edges[-1])
     if maps.orders.size:
         places = np.arange(1.0, maps.orders.size + 1.0) - 0.4
         amplitudes = maps.orders / 10.0**scale.exponent
-        send_bars(stream, f"/orders/{maps.signal}", amplitudes, places, 0.8, MODEL)
+        send_bars(stream, f"/orders/{maps.signal}", Bars(amplitudes, places, 0.8, MODEL))
         send_axis_ends(stream, f"/orders_axis/{maps.signal}", (most,), places[-1] + 1.0)
 
 

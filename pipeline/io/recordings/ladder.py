@@ -32,7 +32,7 @@ from pipeline.io.recordings.ladder_scales import (
     map_reach,
 )
 from pipeline.io.recordings.seal import write_checksummed
-from pipeline.io.recordings.stream import recording, send_axis_ends, send_bars, send_property
+from pipeline.io.recordings.stream import Bars, recording, send_axis_ends, send_bars, send_property
 from pipeline.io.recordings.views import (
     MEASURED,
     MODEL,
@@ -125,8 +125,8 @@ def _send_errors(stream: RecordingStream, result: Diagnosis, signal: str) -> Non
     for entity, values, colour in (("errors", rmse, MODEL), ("floor", floor, MEASURED)):
         for step in range(rmse.size):
             shown = np.where(places <= step, values, 0.0)
-            entity_path = f"/{entity}/{signal}"
-            send_bars(stream, entity_path, shown, places, 0.7, colour, (TIMELINE, step))
+            bars = Bars(shown, places, 0.7, colour)
+            send_bars(stream, f"/{entity}/{signal}", bars, (TIMELINE, step))
     over = rmse / np.maximum(floor, 1e-300)
     columns = rr.Scalars.columns(scalars=over)
     _send(stream, f"/over/{signal}", range(rmse.size), columns)
@@ -145,15 +145,8 @@ def _send_maps(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
             edges = np.degrees(np.array(turn.x.edges))
             shown = np.nan_to_num(turn.mean) / 10.0 ** angle_scale(result, signal).exponent
             width = float(edges[1] - edges[0])
-            send_bars(
-                stream,
-                f"/angle/{signal}",
-                shown,
-                edges[:-1],
-                width,
-                RESIDUAL,
-                (TIMELINE, place),
-            )
+            bars = Bars(shown, edges[:-1], width, RESIDUAL)
+            send_bars(stream, f"/angle/{signal}", bars, (TIMELINE, place))
 
 
 def _send_angle_ends(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
@@ -169,8 +162,8 @@ def _send_spread(stream: RecordingStream, result: Diagnosis, signal: str) -> Non
                 edges = np.array(spread.edges)
                 share = 100.0 * np.array(spread.count) / max(sum(spread.count), 1)
                 width = float(edges[1] - edges[0])
-                at = (TIMELINE, place)
-                send_bars(stream, f"/spread/{signal}", share, edges[:-1], width, MEASURED, at)
+                bars = Bars(share, edges[:-1], width, MEASURED)
+                send_bars(stream, f"/spread/{signal}", bars, (TIMELINE, place))
 
 
 def step_markdown(result: Diagnosis, place: int) -> str:

@@ -39,6 +39,7 @@ from pipeline.io.recordings.lots_traces import (
 )
 from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
+    Bars,
     Trace,
     recording,
     send_bars,
@@ -144,7 +145,7 @@ def _send_histograms(stream: RecordingStream, constant: ConstantResult) -> None:
     width = float(edges[1] - edges[0])
     for side in SIDES:
         entity = f"/hist/{constant.name}/{side}"
-        send_bars(stream, entity, counts[side], edges[:-1], width, COLOURS[side])
+        send_bars(stream, entity, Bars(counts[side], edges[:-1], width, COLOURS[side]))
 
 
 def _send_drift(stream: RecordingStream, constant: ConstantResult) -> None:
@@ -161,7 +162,7 @@ def _send_orders(stream: RecordingStream, result: LotRegression) -> None:
         if of_side:
             values = 1e3 * np.array([level.mean for level in of_side])
             edges = np.array([float(level.order) for level in of_side]) + shift
-            send_bars(stream, f"/orders/{side}", values, edges, width, COLOURS[side])
+            send_bars(stream, f"/orders/{side}", Bars(values, edges, width, COLOURS[side]))
 
 
 def _send_motors(stream: RecordingStream, result: LotRegression) -> None:

@@ -33,6 +33,7 @@ from pipeline.io.recordings.fleet_columns import APPLICATION, CAPTURE, SHOWN, ST
 from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.stream import (
     ROW,
+    Bars,
     Trace,
     recording,
     send_bars,
@@ -244,14 +245,15 @@ def _send_cogging(stream: RecordingStream, evidence: Sequence[Evidence]) -> None
             low = series.x <= HIGHEST_ORDER
             if low.any():
                 values, edges = 1e3 * series.measured[low], series.x[low] - 0.4
-                send_bars(stream, "/cogging/orders", values, edges, 0.8, MODEL)
+                send_bars(stream, "/cogging/orders", Bars(values, edges, 0.8, MODEL))
         else:
             wave, edges = _wave(one)
             width = 360.0 / WAVE_CELLS
-            send_bars(stream, "/cogging/wave", wave, edges, width, RESIDUAL)
+            send_bars(stream, "/cogging/wave", Bars(wave, edges, width, RESIDUAL))
             order = 1 + int(np.argmax(np.abs(np.fft.rfft(wave))[1:]))
             cells = max(WAVE_CELLS * PREVIEW_PERIODS // order, 2)
-            send_bars(stream, "/preview/cogging", wave[:cells], edges[:cells], width, RESIDUAL)
+            preview = Bars(wave[:cells], edges[:cells], width, RESIDUAL)
+            send_bars(stream, "/preview/cogging", preview)
 
 
 def _wave(evidence: Evidence) -> tuple[Array, Array]:

@@ -259,14 +259,31 @@ def send_property(stream: RecordingStream, name: str, values: dict[str, Any]) ->
         stream.send_property(name, rr.AnyValues(**stated))
 
 
+@dataclass(frozen=True, slots=True)
+class Bars:
+    """Bars of one width and colour.
+
+    Attributes
+    ----------
+    values
+        Heights [B].
+    left
+        Left edges [B].
+    width
+        Of each bar.
+    colour
+        Of all bars.
+
+    """
+
+    values: Array
+    left: Array
+    width: float
+    colour: Colour
+
+
 def send_bars(
-    stream: RecordingStream,
-    entity: str,
-    values: Array,
-    left: Array,
-    width: float,
-    colour: Colour,
-    at: tuple[str, int] | None = None,
+    stream: RecordingStream, entity: str, bars: Bars, at: tuple[str, int] | None = None
 ) -> None:
     """Sends bars of one width.
 
@@ -276,14 +293,8 @@ def send_bars(
         The recording.
     entity
         Where they lie.
-    values
-        Heights [B].
-    left
-        Left edges [B].
-    width
-        Of each bar.
-    colour
-        Of all bars.
+    bars
+        Heights, left edges, width and colour.
     at
         A timeline and a place on it; None for all times.
 
@@ -291,11 +302,14 @@ def send_bars(
     import rerun as rr
 
     if at is None:
-        bars = rr.BarChart(values, abscissa=left, color=colour, widths=[width])
-        stream.log(entity, bars, static=True)
+        shown = rr.BarChart(bars.values, abscissa=bars.left, color=bars.colour, widths=[bars.width])
+        stream.log(entity, shown, static=True)
         return
     columns = rr.BarChart.columns(
-        values=tensor(values), abscissa=tensor(left), color=[colour], widths=[width]
+        values=tensor(bars.values),
+        abscissa=tensor(bars.left),
+        color=[bars.colour],
+        widths=[bars.width],
     )
     index = rr.TimeColumn(at[0], sequence=[at[1]])
     rr.send_columns(entity, indexes=[index], columns=columns, recording=stream)
