@@ -39,7 +39,7 @@ class Point:
         stands.
     id_a, iq_a, vd_v, vq_v, torque_nm
         Means in the frame of the drive [A, V, N·m].
-    u_torque_nm, u_vd_v, u_vq_v
+    u_vd_v, u_vq_v
         Standard errors of the means, correlation included.
     temp_magnet_degc
         Mean, or assumed.
@@ -65,7 +65,6 @@ class Point:
     vd_v: float
     vq_v: float
     torque_nm: float
-    u_torque_nm: float
     u_vd_v: float
     u_vq_v: float
     temp_magnet_degc: float
@@ -350,7 +349,7 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
     if travel[0] < still.still_turn and (not has_angle or travel[1] < still.still_capture_turn):
         omega = 0.0
     means = {name: float(np.mean(data[name][rows])) for name in MEANS}
-    u = {name: _error_of_mean(data[name][rows]) for name in ("torque_shaft_nm", "vd_v", "vq_v")}
+    u = {name: _error_of_mean(data[name][rows]) for name in ("vd_v", "vq_v")}
     if not np.isfinite(means["temp_magnet_degc"]):
         means["temp_magnet_degc"] = assumed_temperature(capture)
     return Point(
@@ -362,7 +361,6 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
         vd_v=means["vd_v"],
         vq_v=means["vq_v"],
         torque_nm=means["torque_shaft_nm"],
-        u_torque_nm=u["torque_shaft_nm"],
         u_vd_v=u["vd_v"],
         u_vq_v=u["vq_v"],
         temp_magnet_degc=means["temp_magnet_degc"],

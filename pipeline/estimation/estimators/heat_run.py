@@ -47,7 +47,6 @@ class Line:
     r25_ohm: float
     slope_ohm_k: float
     covariance: Array
-    temp_mean_degc: float
     span_k: float
     rise_rate_1_s: float
     dof: float
@@ -139,7 +138,6 @@ def _line(record: HeatRecord) -> Line | None:
         float(fit.coefficients[0]),
         float(fit.coefficients[1]),
         fit.covariance * tau,
-        float(excess.mean()) + 25.0,
         float(np.ptp(excess)),
         max(-float(rate.coefficients[1]), 0.0),
         max(fit.dof / tau, 1.0),

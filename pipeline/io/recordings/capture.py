@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import islice
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,7 +36,6 @@ from pipeline.io.recordings.capture_traces import (
 from pipeline.io.recordings.capture_views import Shown, capture_layout
 from pipeline.io.recordings.datasheet_page import capture_markdown
 from pipeline.io.recordings.error_map import send_frame, send_map
-from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
     Bars,
     recording,
@@ -57,37 +56,6 @@ if TYPE_CHECKING:
 
 MOST_MAPS = 2
 MAP_WORDS = ("speed [rad/s]", "iq [A]")
-
-
-def write_recording(
-    capture: Capture,
-    evidence: Sequence[Evidence],
-    path: Path,
-    datasheet: Datasheet | None = None,
-    findings: Sequence[Finding] = (),
-) -> None:
-    """Writes the recording of one capture with its layout, whole or not at all.
-
-    Parameters
-    ----------
-    capture
-        The capture.
-    evidence
-        Plots of the fits, of the whole campaign too: what was fitted to other captures is left out.
-    path
-        The .rrd file.
-    datasheet
-        Shown as a page; None without one.
-    findings
-        Shown as a log.
-
-    Raises
-    ------
-    MachineError
-        The disk refuses.
-
-    """
-    write_checksummed(path, recording_bytes(capture, evidence, datasheet, findings))
 
 
 def recording_bytes(

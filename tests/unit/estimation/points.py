@@ -20,7 +20,7 @@ def point(iq, id_=0.0, *, w=W, group=0, source=MAP, period=1e-4, rows=100, u=0.0
     values = {
         "group": group, "rows": rows, "omega_mech_rad_s": w, "id_a": id_, "iq_a": iq,
         "vd_v": R * id_ - omega * psi_q, "vq_v": R * iq + omega * psi_d,
-        "torque_nm": 1.5 * P * (psi_d * iq - psi_q * id_), "u_torque_nm": 0.0, "u_vd_v": u,
+        "torque_nm": 1.5 * P * (psi_d * iq - psi_q * id_), "u_vd_v": u,
         "u_vq_v": 2.0 * u, "temp_magnet_degc": 25.0, "cos_turn": 0.0, "sin_turn": 0.0,
         "period_s": period, "capture": source,
     }  # fmt: skip

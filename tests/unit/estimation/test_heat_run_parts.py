@@ -35,7 +35,6 @@ def test_the_line_of_a_heat_run() -> None:
     assert line.r25_ohm == pytest.approx(0.4, rel=1e-3)
     assert line.slope_ohm_k == pytest.approx(0.4 * 0.0039, rel=5e-3)
     assert line.span_k == pytest.approx(np.ptp(record.temp_winding_degc))
-    assert line.temp_mean_degc == pytest.approx(record.temp_winding_degc.mean())
     assert line.rise_rate_1_s == pytest.approx(1.0 / 60.0, rel=2e-2)
     excess = record.temp_winding_degc - 25.0
     fit = linear_fit(np.column_stack([np.ones(300), excess]), record.r_phase_ohm)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.io.recordings.capture import identity, write_recording
+from pipeline.io.recordings.capture import identity, recording_bytes
 from pipeline.io.recordings.capture_traces import (
     LONG_ROWS,
     TABLE_ROWS,
@@ -20,7 +21,7 @@ from pipeline.io.recordings.capture_traces import (
 from pipeline.io.recordings.capture_views import further_views, loupe_views, main_views
 from pipeline.io.recordings.datasheet_page import capture_markdown, sheet_markdown
 from pipeline.io.recordings.readback import entities
-from pipeline.io.recordings.seal import seal_of, verify
+from pipeline.io.recordings.seal import seal_of, verify, write_checksummed
 from pipeline.io.recordings.stream import digest
 from pipeline.records.capture import Capture, CaptureMeta
 from pipeline.records.datasheet import Check, Datasheet
@@ -79,6 +80,16 @@ FINDINGS = (
     Finding(PATH, "warning", "gap", "12 samples are missing", "look at the cable", (400, 412)),
     Finding(PATH, "refused", "odd", "odd", "ask"),
 )
+
+
+def write_recording(
+    capture: Capture,
+    evidence: Sequence[Evidence],
+    path: Path,
+    datasheet: Datasheet | None = None,
+    findings: Sequence[Finding] = (),
+) -> None:
+    write_checksummed(path, recording_bytes(capture, evidence, datasheet, findings))
 
 
 def read_back(path: Path, entity: str) -> pl.DataFrame:
