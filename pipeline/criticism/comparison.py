@@ -23,7 +23,13 @@ from pipeline.criticism.regression.linear_system import LinearSystem, linear_sys
 from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.selection.missing_data import at_ambient, idle, loaded, mixed, unused
+from pipeline.criticism.selection.missing_data import (
+    loaded_drives,
+    mixed_coasts,
+    unlogged_temperatures,
+    unusable_captures,
+    unused_captures,
+)
 from pipeline.criticism.selection.pruning import trimmed
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.validation.error_maps import all_maps
@@ -69,12 +75,12 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     """
     machine = machine_of(campaign, start, policy_of(model.policy))
     if machine is None:
-        return _nothing(campaign, model, model.effects, PAIRLESS)
+        return _no_comparison(campaign, model, model.effects, PAIRLESS)
     cut_segments = segments(campaign, machine)
     stated_model = model_of(model, machine)
     names = tuple(effect.name for effect in stated_model.effects)
     if not cut_segments:
-        return _nothing(campaign, model, names, *idle(campaign, machine))
+        return _no_comparison(campaign, model, names, *unusable_captures(campaign, machine))
     base = fit_of(cut_segments, stated_model)
     system = linear_system(trimmed(base.system, names).fit)
     held_out = leave_out(system)
@@ -105,15 +111,15 @@ def _notes(campaign: Campaign, system: LinearSystem, held_out: HeldOut) -> tuple
     """What a reader should know of the captures of a comparison."""
     machine = system.fit.machine
     return (
-        *unused(campaign, system.segments),
-        *loaded(campaign, machine),
-        *mixed(campaign, machine),
-        *at_ambient(system.fit),
+        *unused_captures(campaign, system.segments),
+        *loaded_drives(campaign, machine),
+        *mixed_coasts(campaign, machine),
+        *unlogged_temperatures(system.fit),
         *against_stated(system, held_out),
     )
 
 
-def _nothing(
+def _no_comparison(
     campaign: Campaign, model: ModelSpec, names: tuple[str, ...], *notes: str
 ) -> Comparison:
     """No errors, and why there are none."""

@@ -30,13 +30,13 @@ from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import Ladder, SearchResult, search_ladder
 from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
 from pipeline.criticism.selection.missing_data import (
-    at_ambient,
-    idle,
-    loaded,
-    mixed,
-    unexcited,
-    unrecorded,
-    unused,
+    loaded_drives,
+    mixed_coasts,
+    unexcited_effects,
+    unlogged_temperatures,
+    unrecorded_signals,
+    unusable_captures,
+    unused_captures,
 )
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of, frame_notes
@@ -129,7 +129,11 @@ def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> BaseFit 
     cut_segments = segments(campaign, machine)
     if _enough(cut_segments):
         return fit_of(cut_segments, model_of(model, machine))
-    return TOO_LITTLE if cut_segments else "; ".join((TOO_LITTLE, *idle(campaign, machine)))
+    return (
+        TOO_LITTLE
+        if cut_segments
+        else "; ".join((TOO_LITTLE, *unusable_captures(campaign, machine)))
+    )
 
 
 def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagnosis, BaseFit]:
@@ -156,7 +160,7 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
     ladder, last = end.ladder, end.ladder.steps[-1].system
     offered = candidates(library, last.fit.model)
     ranking = _ranking(ladder, offered, library)
-    not_excited = unexcited(campaign, library, ladder.steps[-1], offered)
+    not_excited = unexcited_effects(campaign, library, ladder.steps[-1], offered)
     verdict = _verdict_of(end, not_excited)
     combinations = reported_combinations(last, ladder.held_out[-1])
     diagnosis = Diagnosis(
@@ -188,10 +192,10 @@ def _notes(
     ladder, last = end.ladder, end.ladder.steps[-1].system
     stateless = verdict == "unknown" and not (end.sketch or end.change or end.freed)
     return (
-        *unused(campaign, last.segments),
-        *loaded(campaign, machine),
-        *mixed(campaign, machine),
-        *at_ambient(last.fit),
+        *unused_captures(campaign, last.segments),
+        *loaded_drives(campaign, machine),
+        *mixed_coasts(campaign, machine),
+        *unlogged_temperatures(last.fit),
         *against_stated(last, ladder.held_out[-1]),
         *hum_notes(ladder.base.hum),
         *frame_notes(last.segments),
@@ -202,7 +206,7 @@ def _notes(
         *(note for note in ladder.cut.values() if note),
         *_one_capture_notes(ladder),
         *((_STATELESS,) if stateless else ()),
-        *(unrecorded(campaign, last.segments) if verdict == "unknown" else ()),
+        *(unrecorded_signals(campaign, last.segments) if verdict == "unknown" else ()),
         *ladder.held_out[0].notes,
     )
 

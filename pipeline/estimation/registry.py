@@ -47,10 +47,10 @@ def homes() -> Mapping[str, str]:
         Dotted names of modules, of this package and of others.
 
     """
-    return {one.name: one.module for one in _found()}
+    return {one.name: one.module for one in _plug_ins()}
 
 
-def _found() -> tuple[PlugIn, ...]:
+def _plug_ins() -> tuple[PlugIn, ...]:
     return discover("pipeline.estimation.estimators", "ESTIMATOR", Estimator)
 
 
@@ -64,7 +64,7 @@ def estimators() -> tuple[Estimator, ...]:
         In an order in which each comes after those that it uses; by rank and name otherwise.
 
     """
-    plug_ins: dict[str, Estimator] = {one.name: one.value for one in _found()}
+    plug_ins: dict[str, Estimator] = {one.name: one.value for one in _plug_ins()}
     givers: dict[str, list[str]] = {}
     for estimator in plug_ins.values():
         for constant in estimator.gives:

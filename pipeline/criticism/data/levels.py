@@ -33,7 +33,7 @@ def set_levels(current: Array, policy: Tables) -> NDArray[np.int64]:
 
     """
     gaps = np.diff(np.sort(current))
-    gaps = gaps[gaps > _apart(current, 0.0)]
+    gaps = gaps[gaps > _least_gap(current, 0.0)]
     for least in np.unique(np.append(gaps, 0.0)):
         levels = levels_of(current, float(least))
         count = int(levels.max(initial=0)) + 1
@@ -71,12 +71,12 @@ def levels_of(current: Array, least: float = 0.0) -> NDArray[np.int64]:
 
     """
     order = np.argsort(current, kind="stable")
-    jumps = np.diff(current[order]) > _apart(current, least)
+    jumps = np.diff(current[order]) > _least_gap(current, least)
     number = np.concatenate([[0], np.cumsum(jumps)])
     levels = np.empty(current.size, dtype=np.int64)
     levels[order] = number
     return levels
 
 
-def _apart(current: Array, least: float) -> float:
+def _least_gap(current: Array, least: float) -> float:
     return max(1e-2 * float(np.ptp(current)), least)

@@ -86,7 +86,7 @@ def separations(
         columns = _nearest(effect, other, wide, offered)
         if columns is None:
             continue
-        now, places = _now(effect, columns, wide)
+        now, places = _normal_matrix(effect, columns, wide)
         freedom = effect.dof(wide.fit.machine)
         base = _power(_noncentrality(now), freedom, policy)
         ranked = sorted(
@@ -118,7 +118,7 @@ def _nearest(
     best, least = None, np.inf
     for candidate, places in placed(wide, offered):
         if candidate.effect.name == other:
-            undetected = _noncentrality(_now(effect, places, wide)[0])
+            undetected = _noncentrality(_normal_matrix(effect, places, wide)[0])
             if undetected < least:
                 best, least = places, undetected
     return best
@@ -134,7 +134,7 @@ def _amplitudes(effect: Effect, wide: LinearSystem) -> Array:
     return np.array([names.get(column.name, 0.0) for column in wide.columns])
 
 
-def _now(
+def _normal_matrix(
     effect: Effect, alternative: NDArray[np.int64], wide: LinearSystem
 ) -> tuple[Array, NDArray[np.int64]]:
     """Normal matrix of [d, the model's other columns, the alternative's], and their places."""

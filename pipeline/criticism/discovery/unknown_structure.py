@@ -129,7 +129,7 @@ def _ranked(
     model_columns = wide.model_columns
     baseline = wide.normal_equations(model_columns).best()
     residual, base = wide.after(model_columns, baseline.step), baseline.deviance
-    missed = _missed(wide) if in_parts else None
+    missed = _segments_over_floor(wide) if in_parts else None
     units = _units(wide, model_columns, residual, missed)
     reference = _held_out(wide, model_columns, residual, np.zeros(model_columns.size), units)
     excess = float(wide.counts @ np.log(np.maximum(wide.reduced_chi2(residual), 1.0)))
@@ -188,7 +188,7 @@ def _simplest(candidates: Sequence[RankedInput], policy: Policy) -> RankedInput:
     return min((one for one in simple if one.held_out_gain >= level), key=lambda one: one.place)
 
 
-def _missed(system: LinearSystem) -> NDArray[np.int64]:
+def _segments_over_floor(system: LinearSystem) -> NDArray[np.int64]:
     """Numbers of the segments in which a fit leaves something that is reported."""
     significant = np.flatnonzero(significant_groups(system))
     return np.unique([system.labels[place][0] for place in significant])

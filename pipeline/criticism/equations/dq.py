@@ -221,7 +221,9 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
         mean = mean * np.exp(1j * segment.instrument.frame * turn)
     commanded = segment.instrument.meter == "gain_commanded"
     if commanded and (lag := values["frame_lag_s"]):
-        mean = mean * np.exp(1j * lag * x.once(x.theta_rad, "behind", lambda: _behind(segment, x)))
+        mean = mean * np.exp(
+            1j * lag * x.once(x.theta_rad, "behind", lambda: _frame_lag(segment, x))
+        )
     if shift:
         psi = ahead(pieces.psi_wb) if is_held else pieces.psi_wb
         mean = mean - shift * 1j * psi * np.gradient(x.machine.pole_pairs * x.omega_rad_s)
@@ -251,7 +253,7 @@ def _pace(
     return difference(x.machine.pole_pairs * x.theta_rad, segment.ts_s), turn
 
 
-def _behind(segment: Segment, x: Operating) -> Array:
+def _frame_lag(segment: Segment, x: Operating) -> Array:
     """Angle [n, rad/s] by which a voltage vector is behind its logged frame for every second that
     the drive's speed lags: a vector is computed one and a half periods before its middle.
     """

@@ -81,7 +81,7 @@ def effect_tables(
         else:
             machine = Machine(pole_pairs, None, model.scales)
             q = dict.fromkeys(_names(library[name], machine), 0.0) | known
-            tables_of_effect = _tables(library[name], _anywhere(machine, base), q)
+            tables_of_effect = _tables(library[name], _over_all_ranges(machine, base), q)
             tables += tables_of_effect
             if not tables_of_effect:
                 without[name] = _why_not(library[name])
@@ -99,7 +99,7 @@ def _why_not(effect: Effect) -> str:
     return "it needs more than a table over speed, angle or currents"
 
 
-def _anywhere(machine: Machine, base: Mapping[str, float]) -> Operating:
+def _over_all_ranges(machine: Machine, base: Mapping[str, float]) -> Operating:
     """States of the machine all over its range [n], no two variables in step."""
     rng = np.random.default_rng(1)
     current, speed = machine.scales["current_a"], machine.scales["speed_rad_s"]

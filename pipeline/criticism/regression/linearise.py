@@ -328,11 +328,11 @@ class _Sampler:
         if column.effect is None:
             return self._base(column)
         if self.observes.form == "neither":
-            return self._anew(column, column.effect)
+            return self._by_residual(column, column.effect)
         if not observes(self.segment, column.effect):
             return None
         if column.effect.hook == "sensor":
-            return self._anew(column, column.effect)
+            return self._by_residual(column, column.effect)
         return self._hook(column, column.effect)
 
     def _residual(self, model: Model, values: Values) -> Array:
@@ -386,7 +386,7 @@ class _Sampler:
         after = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(after - self.start) / column.step
 
-    def _anew(self, column: Column, effect: Effect) -> Array | None:
+    def _by_residual(self, column: Column, effect: Effect) -> Array | None:
         inside = effect in self.model.effects
         model = self.model if inside else self.model.with_effects(effect)
         start = self._start(column, effect)

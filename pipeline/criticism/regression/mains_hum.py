@@ -103,7 +103,7 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
             and not spectrum.repeats_at(f)
         ]
         for channel, one in _as_sensed(segment, model, values).items():
-            most = (policy.largest * _whole(channel, model.machine)) ** 2
+            most = (policy.largest * _rated_size(channel, model.machine)) ** 2
             for freq, pairs in zip(lines, spectrum.lines(one, lines, most), strict=True):
                 powers[segment.kind, channel, freq].append(pairs)
                 if pairs[0] > policy.stands_out * pairs[1]:
@@ -318,7 +318,7 @@ class _Spectrum:
         return float(np.abs(sums.sum()) ** 2 / size.sum()) / max(power, 1e-300)
 
 
-def _whole(channel: str, machine: Machine) -> float:
+def _rated_size(channel: str, machine: Machine) -> float:
     """The machine's own voltage or torque [the channel's unit]; of other signals no end."""
     scale = {"v": "voltage_v", "nm": "torque_nm"}.get(channel.rsplit("_", 1)[-1], "")
     return machine.scales.get(scale, math.inf)

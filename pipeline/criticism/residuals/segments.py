@@ -57,7 +57,9 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
     # a table that other captures can predict is held out as a whole
     undivided = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
     cut_segments = [replace(s, blocks=None) if s.kind in undivided else s for s in cut_segments]
-    return tuple(replace(s, fixed={**s.fixed, **_beside(s, cut_segments)}) for s in cut_segments)
+    return tuple(
+        replace(s, fixed={**s.fixed, **_shares_of_repeats(s, cut_segments)}) for s in cut_segments
+    )
 
 
 def mixed_setups(campaign: Campaign, machine: Machine) -> tuple[Setup, ...]:
@@ -98,7 +100,7 @@ def _cut(capture: Capture, machine: Machine) -> Iterator[Segment]:
             yield replace(segment, fixed={**segment.fixed, **lacks})
 
 
-def _beside(segment: Segment, others: Sequence[Segment]) -> dict[str, float]:
+def _shares_of_repeats(segment: Segment, others: Sequence[Segment]) -> dict[str, float]:
     """The nuisances of a coast or an open-circuit spin beside other tests of drags or magnet."""
     shares, constant, signals = _REPEATED.get(segment.test, ((), "", set()))
     shown = any(

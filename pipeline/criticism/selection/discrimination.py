@@ -119,10 +119,12 @@ def settled(effect: Effect, discrimination: Discrimination) -> Effect:
         What its discriminator gave.
 
     """
-    return replace(effect, parameters=tuple(_known(p, discrimination) for p in effect.parameters))
+    return replace(
+        effect, parameters=tuple(_with_known_size(p, discrimination) for p in effect.parameters)
+    )
 
 
-def _known(p: Parameter, discrimination: Discrimination) -> Parameter:
+def _with_known_size(p: Parameter, discrimination: Discrimination) -> Parameter:
     if p.name not in discrimination.values:
         return p
     if p.amplitude:

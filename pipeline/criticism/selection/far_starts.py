@@ -115,21 +115,25 @@ def _best_ends(base: LinearSystem, offered: Sequence[Candidate]) -> list[_End]:
         if p.starts
     ]
     nearest = [
-        _least(ends)
-        for ends in _ends(base, [[_Trial(*one, start) for start in one[1].starts] for one in tried])
+        _best_end(ends)
+        for ends in _refitted_ends(
+            base, [[_Trial(*one, start) for start in one[1].starts] for one in tried]
+        )
     ]
-    beside = _ends(
+    beside = _refitted_ends(
         base,
         [[replace(e.trial, start=factor * e.trial.start) for factor in finer] for e in nearest],
     )
-    return [_least([first, *finer_ends]) for first, finer_ends in zip(nearest, beside, strict=True)]
+    return [
+        _best_end([first, *finer_ends]) for first, finer_ends in zip(nearest, beside, strict=True)
+    ]
 
 
-def _least(ends: Sequence[_End]) -> _End:
+def _best_end(ends: Sequence[_End]) -> _End:
     return min(ends, key=lambda end: (end.descent.deviance, end.trial.start))
 
 
-def _ends(base: LinearSystem, trials: Sequence[Sequence[_Trial]]) -> list[list[_End]]:
+def _refitted_ends(base: LinearSystem, trials: Sequence[Sequence[_Trial]]) -> list[list[_End]]:
     """Where all else, refitted to first order, leaves every trial.
 
     The columns stay those of where no candidate is, and so does what rows are divided by.

@@ -69,9 +69,9 @@ def with_linear_start(
     ranked = list(scores)
     for candidate in {c.effect.name: c for c in reversed(offered)}.values():
         form = candidate.effect.linear
-        if form is None or not _misses(wide, significant, form.channel):
+        if form is None or not _exceeds_floor(wide, significant, form.channel):
             continue
-        begun = _begun(wide.fit, candidate.effect, form)
+        begun = _fit_from_form(wide.fit, candidate.effect, form)
         if begun is not None:
             ranked = with_better(ranked, scored(wide, candidate, begun), offered)
     return tuple(ranked)
@@ -106,7 +106,7 @@ def with_better(
     return sorted([*others, best], key=lambda s: (-s.fall, s.candidate.effect.name))
 
 
-def _misses(wide: LinearSystem, significant: NDArray[np.bool_], channel: str) -> bool:
+def _exceeds_floor(wide: LinearSystem, significant: NDArray[np.bool_], channel: str) -> bool:
     """Whether some plain signal misses its floor by so much that the base may be wrong."""
     least = wide.policy.selection.coupling_floors**2
     q = wide.reduced_chi2(wide.residual)
@@ -172,7 +172,7 @@ def _standing(system: LinearSystem) -> Standing:
     return Standing(system.deviance, chi2, float(system.prior_costs().sum()))
 
 
-def _begun(fit: Fit, effect: Effect, form: LinearForm) -> Fit | None:
+def _fit_from_form(fit: Fit, effect: Effect, form: LinearForm) -> Fit | None:
     """Where a fit with the effect begins: at the values that its linear form gives.
 
     At an order of the angle the torque's fourth derivative of an angle is noise. These rows are

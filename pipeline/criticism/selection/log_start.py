@@ -62,7 +62,7 @@ def with_log_start(
         candidate = by_name[shown.discrimination.name]
         effect = settled(candidate.effect, shown.discrimination)
         given = {name: value for name, (value, _) in shown.discrimination.values.items()}
-        begun = _begun(wide.fit, effect, {**given, **shown.start}, shown.base)
+        begun = _fit_at(wide.fit, effect, {**given, **shown.start}, shown.base)
         started = scored(wide, candidate, begun)
         alike = [s for s in ranked if s.candidate.effect.shown is hook]
         best = max((s.fall for s in alike), default=0.0)
@@ -71,7 +71,7 @@ def with_log_start(
     return tuple(ranked)
 
 
-def _begun(fit: Fit, effect: Effect, values: Values, base: Values) -> Fit:
+def _fit_at(fit: Fit, effect: Effect, values: Values, base: Values) -> Fit:
     """The fit with an effect at such values, by their short names, and such constants."""
     model = fit.model.with_effects(effect)
     starts = {f"{effect.name}.{name}": value for name, value in values.items()}

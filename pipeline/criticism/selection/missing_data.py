@@ -23,7 +23,7 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.diagnosis import Unexcited
 
 
-def mixed(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
+def mixed_coasts(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     """A note of the coasts that are left out, since they are of several set-ups.
 
     Parameters
@@ -38,7 +38,7 @@ def mixed(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     return (f"coasts left out: {setup_words(setups)}; {REMEDY}",) if setups else ()
 
 
-def unused(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str, ...]:
+def unused_captures(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str, ...]:
     """A note of the captures that no equation could use, none where all are used.
 
     Parameters
@@ -62,7 +62,7 @@ def unused(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str, ..
     return (f"not used, {reason}: {', '.join(sorted(unused_paths))}",) if unused_paths else ()
 
 
-def idle(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
+def unusable_captures(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     """Why no capture is used, and what each would need.
 
     Parameters
@@ -81,7 +81,7 @@ def idle(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     needs: dict[str, list[str]] = {}
     for capture in campaign.captures:
         needs.setdefault(_needs(capture), []).append(capture.path)
-    causes = (*mixed(campaign, machine), *loaded(campaign, machine))
+    causes = (*mixed_coasts(campaign, machine), *loaded_drives(campaign, machine))
     lacking = (f"{', '.join(sorted(paths))}: {need}" for need, paths in sorted(needs.items()))
     return causes or tuple(lacking)
 
@@ -103,7 +103,7 @@ def _needs(capture: Capture) -> str:
     return f"a {test} needs {' or '.join(ways)} as well"
 
 
-def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
+def loaded_drives(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     """Notes of the drives whose motion is not used, since an unrecorded torque turns the shaft.
 
     Parameters
@@ -143,7 +143,7 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     return tuple(notes[current] for current, paths in shares.items() if paths)
 
 
-def at_ambient(fit: Fit) -> tuple[str, ...]:
+def unlogged_temperatures(fit: Fit) -> tuple[str, ...]:
     """Notes of the captures in which a temperature that the model uses was not recorded.
 
     Parameters
@@ -176,7 +176,7 @@ def at_ambient(fit: Fit) -> tuple[str, ...]:
     return tuple(dict.fromkeys(notes))
 
 
-def unrecorded(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str, ...]:
+def unrecorded_signals(campaign: Campaign, cut_segments: Sequence[Segment]) -> tuple[str, ...]:
     """Notes of the signals that captures do not record, and that were taken as none or as another.
 
     Parameters
@@ -218,7 +218,7 @@ def _warmer(fit: Fit, name: str) -> dict[str, float]:
     return {path: value - usual for path, value in fitted.items()}
 
 
-def unexcited(
+def unexcited_effects(
     campaign: Campaign,
     library: Mapping[str, Effect],
     last: LadderStep,
@@ -247,7 +247,7 @@ def unexcited(
     inside = {effect.name for effect in last.system.fit.model.effects}
     least, hidden = last.system.policy.selection.visible_u, []
     for name, effect in library.items():
-        lacking = tuple(test for test in effect.tests if not _holds(campaign, effect, test))
+        lacking = tuple(test for test in effect.tests if not _has_signals(campaign, effect, test))
         if name in inside or not lacking or lacking[0] != effect.tests[0]:
             continue
         if detectable(effect, last.system, offered) < least:
@@ -256,7 +256,7 @@ def unexcited(
     return tuple(hidden)
 
 
-def _holds(campaign: Campaign, effect: Evidence, test: str) -> bool:
+def _has_signals(campaign: Campaign, effect: Evidence, test: str) -> bool:
     """Whether some capture is of a test and has every signal that shows an effect."""
     captures = campaign.of(test)
     return any(all(capture.has(name) for name in effect.signals) for capture in captures)

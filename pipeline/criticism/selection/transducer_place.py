@@ -41,7 +41,7 @@ def at_better_place(system: LinearSystem) -> LinearSystem:
     torques = [channel == TORQUE for _, channel, _ in system.labels]
     if not significant[torques].any():
         return system
-    segments = tuple(_elsewhere(s) if _reads_torque(s) else s for s in system.segments)
+    segments = tuple(_at_other_place(s) if _reads_torque(s) else s for s in system.segments)
     other = gauss_newton(replace(system.fit, segments=segments))
     return other if other.deviance < system.deviance - system.policy.selection.tie else system
 
@@ -68,6 +68,6 @@ def _reads_torque(segment: Segment) -> bool:
     return TORQUE in segment.recorded and TORQUE in segment.channels
 
 
-def _elsewhere(segment: Segment) -> Segment:
+def _at_other_place(segment: Segment) -> Segment:
     instrument = segment.instrument
     return replace(segment, instrument=replace(instrument, stator=not instrument.stator))

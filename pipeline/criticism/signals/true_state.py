@@ -204,7 +204,7 @@ def operating(
             finer=theta.size // segment.size,
             run=_run(signals, theta.size),
             runs_rad=segment.sensors.runs_rad,
-            behind_nm=_behind(signals, theta.size),
+            behind_nm=_torque_behind(signals, theta.size),
         ),
     )
 
@@ -404,7 +404,7 @@ def _run(signals: Signals, size: int) -> NDArray[np.int64]:
     return np.repeat(run.astype(np.int64), size // run.size)
 
 
-def _behind(signals: Signals, size: int) -> Array | None:
+def _torque_behind(signals: Signals, size: int) -> Array | None:
     behind = signals.get("behind_nm")
     return None if behind is None else np.repeat(behind, size // behind.size)
 

@@ -114,7 +114,7 @@ def _by_angle(spin: Spin, moving: Sequence[Channel], theta: Array) -> list[Turn]
     turns = []
     for channel in moving:
         flux = _flux_of(spin, channel)
-        cycles = _least(partial(residual_square, flux[rows]), best - 0.4, best + 0.4)
+        cycles = _golden_section(partial(residual_square, flux[rows]), best - 0.4, best + 0.4)
         turns.append(_amplitude(spin, channel, flux, cycles * theta, cycles))
     return [turn for turn in turns if turn is not None]
 
@@ -183,7 +183,7 @@ def _by_vector(spin: Spin) -> list[Turn]:
     return [turn for turn in vector_turns if turn is not None]
 
 
-def _least(value: Callable[[float], float], low: float, high: float) -> float:
+def _golden_section(value: Callable[[float], float], low: float, high: float) -> float:
     """Minimum of a smooth function between two ends by golden section, to 1e-6."""
     shrink = (math.sqrt(5.0) - 1.0) / 2.0
     left, right = high - shrink * (high - low), low + shrink * (high - low)
@@ -209,7 +209,7 @@ def _by_swings(spin: Spin, channel: Channel) -> Turn | None:
     v = channel.v_v
     duration = float(np.ptp(spin.t_s))
     rate = white_noise_sigma(v) * math.sqrt(duration / spin.t_s.size) / channel.gain
-    offset, u_offset = _rest(v)
+    offset, u_offset = _offset_at_rest(v)
     flux = cubic(spin.t_s, v - offset) / channel.gain
     noise, swing = 4.0 * rate * math.sqrt(duration), float(np.ptp(flux))
     unsure = 3.0 * u_offset * duration / channel.gain
@@ -253,7 +253,7 @@ def _one_swing(
     return Turn(channel.name, 1.0, amplitude, u, math.inf, spin.t_s, flux, np.zeros(0))
 
 
-def _rest(v: Array) -> tuple[float, float]:
+def _offset_at_rest(v: Array) -> tuple[float, float]:
     """Offset of a voltage at rest and its uncertainty, from the outer thirds of the quiet ends.
 
     A hand that already moves shows as a difference between those and the whole quiet ends; for

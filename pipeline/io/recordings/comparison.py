@@ -157,7 +157,7 @@ def _views_of(trace: Trace) -> tuple[ViewPlan, ViewPlan]:
     """A signal, and its residual: without what was added, behind, and with it."""
     entity = entity_of(trace)
     measured = Line(entity, "measured", "measured", MEASURED, WIDE)
-    model, residual_plan = Line(entity, "model", "model", MODEL), _left(trace)
+    model, residual_plan = Line(entity, "model", "model", MODEL), _residual_plan(trace)
     lines: tuple[Line, ...] = (measured, model)
     if trace.before is not None:
         before = Line(entity, "before", "model before", BASELINE)
@@ -170,7 +170,7 @@ def _views_of(trace: Trace) -> tuple[ViewPlan, ViewPlan]:
     return ViewPlan(words, lines, 2.0), residual_plan
 
 
-def _left(trace: Trace) -> ViewPlan:
+def _residual_plan(trace: Trace) -> ViewPlan:
     """What the model leaves, on an axis of its own size."""
     line = Line(entity_of(trace), "residual", "measured − model", RESIDUAL)
     words = f"{with_unit(trace.signal)}, left over"
@@ -204,7 +204,7 @@ def loupes(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
     for trace in of_capture[:MOST_LOUPES]:
         around_s = round_s(float(np.ptp(trace.t_s)) / LOUPE_SHARE)
         words = f"Loupe ±{quantity(around_s, 's', 2)}: "
-        views = (_views_of(trace)[0], _left(trace))
+        views = (_views_of(trace)[0], _residual_plan(trace))
         plans += [replace(one, name=words + one.name, around_s=around_s) for one in views]
     return tuple(plans)
 

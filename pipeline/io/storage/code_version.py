@@ -305,7 +305,7 @@ def closure_digest(module: str) -> str:
         `libraries_version`.
 
     """
-    return own_code().digest(*_own(module))
+    return own_code().digest(*_of_package(module))
 
 
 @cache
@@ -324,13 +324,13 @@ def libraries_version(*modules: str) -> str:
         that is not installed), and plug-ins of other packages.
 
     """
-    names = {DISTRIBUTIONS.get(name, name) for name in own_code().libraries(*_own(*modules))}
+    names = {DISTRIBUTIONS.get(name, name) for name in own_code().libraries(*_of_package(*modules))}
     versions = _versions({*names, *OPTIONAL})
     machine = [f"python {platform.python_version()}", platform.machine()]
     return "; ".join(filter(None, [*machine, *versions, outside_version()]))
 
 
-def _own(*modules: str) -> list[str]:
+def _of_package(*modules: str) -> list[str]:
     """Those of the modules that are of this package."""
     return [module for module in modules if module.split(".")[0] == pipeline.__name__]
 

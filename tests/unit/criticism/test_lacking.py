@@ -13,7 +13,7 @@ from pipeline.criticism.comparison import compare
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of, pole_pairs_of
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.selection.missing_data import unrecorded
+from pipeline.criticism.selection.missing_data import unrecorded_signals
 from pipeline.execution.tasks.start import start_constants
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
@@ -139,8 +139,8 @@ def test_what_was_not_recorded_is_named_beside_what_is_left(lost, words) -> None
     machine = machine_of(part, start_constants(part))
     assert machine is not None
     cut = segments(part, machine)
-    (note,) = unrecorded(part, cut)
+    (note,) = unrecorded_signals(part, cut)
     assert words in note
     assert all(segment.capture in note for segment in cut)
     whole = replace(shipped(), captures=shipped().of("drive"))
-    assert unrecorded(whole, segments(whole, machine)) == ()
+    assert unrecorded_signals(whole, segments(whole, machine)) == ()

@@ -19,10 +19,10 @@ from pipeline.estimation.electrical.hand_turns import (
     _excess,
     _extremes,
     _flux_of,
+    _golden_section,
     _knots,
-    _least,
+    _offset_at_rest,
     _one_swing,
-    _rest,
     _steps_fit,
     turns_of,
 )
@@ -76,14 +76,16 @@ def test_knots_are_equally_far_along_the_way_there_and_back() -> None:
 
 def test_the_golden_section_finds_either_ends_side() -> None:
     for at in (0.137, 0.5, 0.91):
-        assert _least(lambda x, at=at: (x - at) ** 2, 0.0, 1.0) == pytest.approx(at, abs=2e-6)
+        assert _golden_section(lambda x, at=at: (x - at) ** 2, 0.0, 1.0) == pytest.approx(
+            at, abs=2e-6
+        )
     calls: list[float] = []
 
     def counted(x: float) -> float:
         calls.append(x)
         return (x - 0.3) ** 2
 
-    _least(counted, -1.0, 1.0)
+    _golden_section(counted, -1.0, 1.0)
     # 2 shrinks by the golden ratio to 1e-6 in 31 steps of one value each, two to begin with
     assert len(calls) == 2 + math.ceil(math.log(2.0 / 1e-6) / math.log((1.0 + math.sqrt(5.0)) / 2))
 
@@ -132,7 +134,7 @@ def test_the_offset_at_rest_and_its_uncertainty() -> None:
     sigma = 1e-3
     v = 0.2 + alternating(400, sigma)
     v[90:340] += 3.0
-    offset, u = _rest(v)
+    offset, u = _offset_at_rest(v)
     assert offset == pytest.approx(0.2, abs=1e-6)
     assert u == pytest.approx(white_noise_sigma(v) / math.sqrt(50.0), rel=1e-3)
 
@@ -143,7 +145,7 @@ def test_a_hand_that_moves_at_rest_is_in_the_offsets_uncertainty() -> None:
     v[:90][60:] += 4e-3
     v[-90:][:30] += 4e-3
     v[90:-90] += 3.0
-    offset, u = _rest(v)
+    offset, u = _offset_at_rest(v)
     moved = 4e-3 / 3.0
     assert offset == pytest.approx(0.0, abs=1e-6)
     expected = math.hypot(white_noise_sigma(v) / math.sqrt(60.0), 0.5 * moved)
@@ -155,7 +157,7 @@ def test_without_rest_at_both_ends_the_offset_is_the_mean(before: int, after: in
     v = alternating(300, 1e-3)
     v[before:150] += 3.0
     v[150 : 300 - after] -= 2.0
-    offset, u = _rest(v)
+    offset, u = _offset_at_rest(v)
     assert offset == pytest.approx(float(v.mean()))
     assert u == pytest.approx(float(v.std()))
 
@@ -164,7 +166,7 @@ def test_three_rows_of_rest_are_enough() -> None:
     v = alternating(300, 1e-3)
     v[3:150] += 3.0
     v[150:297] -= 2.0
-    assert _rest(v)[0] == pytest.approx(0.0, abs=2e-3)
+    assert _offset_at_rest(v)[0] == pytest.approx(0.0, abs=2e-3)
 
 
 def half_waves(start: float, end: float, count: int, amplitude: float = 2.0):
@@ -389,7 +391,7 @@ def test_a_hand_that_moves_at_one_end_alone() -> None:
     v = alternating(540, 1e-3)
     v[-90:][:30] += 8e-3
     v[90:-90] += 3.0
-    offset, u = _rest(v)
+    offset, u = _offset_at_rest(v)
     assert offset == pytest.approx(0.0, abs=1e-6)
     expected = math.hypot(white_noise_sigma(v) / math.sqrt(60.0), 0.5 * 8e-3 / 6.0)
     assert u == pytest.approx(expected, rel=1e-3)
