@@ -58,16 +58,16 @@ def once(captures: Sequence[Capture]) -> tuple[tuple[Capture, ...], tuple[Findin
     """
     ranked = sorted(captures, key=lambda c: (-_rows(c), c.integrity != "verified", c.path))
     prints = {c.path: _fingerprint(c) for c in ranked}
-    kept: list[Capture] = []
+    unique: list[Capture] = []
     findings = []
     for capture in ranked:
-        other = next((k for k in kept if _same_rows(prints[k.path], prints[capture.path])), None)
+        other = next((k for k in unique if _same_rows(prints[k.path], prints[capture.path])), None)
         if other is None:
-            kept.append(capture)
+            unique.append(capture)
         else:
             findings.append(_finding(capture, other))
-    kept.sort(key=lambda c: c.path)
-    return tuple(kept), tuple(sorted(findings))
+    unique.sort(key=lambda c: c.path)
+    return tuple(unique), tuple(sorted(findings))
 
 
 def _rows(capture: Capture) -> int:
@@ -80,10 +80,10 @@ def _fingerprint(capture: Capture) -> dict[str, Array]:
     for table in capture.tables:
         for name in table.columns:
             values = table[name].to_numpy()
-            there = np.isfinite(values)
-            values = values if there.all() else values[there]
-            few = values[:: max(1, values.size // POLICY.sample)]
-            if name != "t_s" and np.unique(few).size >= POLICY.values:
+            finite = np.isfinite(values)
+            values = values if finite.all() else values[finite]
+            sample = values[:: max(1, values.size // POLICY.sample)]
+            if name != "t_s" and np.unique(sample).size >= POLICY.values:
                 columns[name] = values
     return columns
 
@@ -102,13 +102,13 @@ def _holds(long: Array, short: Array) -> bool:
     """Whether one run of values holds the other, or all but its end of it, to the last digit."""
     if short.size > long.size:
         long, short = short, long
-    near = POLICY.rounding * float(np.abs(long).max())
-    begins = np.flatnonzero(np.abs(long - short[0]) <= near)
+    tolerance = POLICY.rounding * float(np.abs(long).max())
+    begins = np.flatnonzero(np.abs(long - short[0]) <= tolerance)
     for begin in begins[: POLICY.begins].tolist():
         size = min(short.size, long.size - begin)
         if size < POLICY.share * short.size:
             continue
-        if np.all(np.abs(long[begin : begin + size] - short[:size]) <= near):
+        if np.all(np.abs(long[begin : begin + size] - short[:size]) <= tolerance):
             return True
     return False
 

@@ -150,9 +150,9 @@ def _net_turn(capture: Capture) -> float:
 
 def _reverses(capture: Capture) -> bool:
     angle = _angle(capture)
-    there = float(angle.max() - angle[0]), float(angle.max() - angle[-1])
+    reached = float(angle.max() - angle[0]), float(angle.max() - angle[-1])
     back = float(angle[0] - angle.min()), float(angle[-1] - angle.min())
-    return min(there) > np.pi or min(back) > np.pi
+    return min(reached) > np.pi or min(back) > np.pi
 
 
 def _torque_signs(campaign: Campaign) -> list[Finding]:

@@ -83,10 +83,10 @@ def shaft_angle(capture: Capture, t_s: Array) -> Array | None:
             if name not in table.columns or "t_s" not in table.columns:
                 continue
             clock, values = table["t_s"].to_numpy(), table[name].to_numpy()
-            good = np.isfinite(values)
-            if np.count_nonzero(good) < 2:
+            finite = np.isfinite(values)
+            if np.count_nonzero(finite) < 2:
                 continue
-            clock, values = clock[good], values[good]
+            clock, values = clock[finite], values[finite]
             angle = values if name == "theta_mech_rad" else integral(clock, values)
             return np.interp(t_s, clock, angle, left=np.nan, right=np.nan)
     return None
@@ -135,14 +135,14 @@ def _vector_of(
     capture: Capture, names: tuple[str, ...]
 ) -> tuple[Array, NDArray[np.complex128]] | None:
     for table in capture.tables:
-        there = {n: table[n].to_numpy() for n in names if n in table.columns}
-        there = {n: v for n, v in there.items() if np.isfinite(v).any()}
-        if len(there) < 2 or "t_s" not in table.columns:
+        columns = {n: table[n].to_numpy() for n in names if n in table.columns}
+        columns = {n: v for n, v in columns.items() if np.isfinite(v).any()}
+        if len(columns) < 2 or "t_s" not in table.columns:
             continue
-        if len(there) == 2:
-            absent = next(name for name in names if name not in there)
-            there[absent] = -sum(there.values(), np.zeros(table.height))
-        a, b, c = (there[name] for name in names)
+        if len(columns) == 2:
+            absent = next(name for name in names if name not in columns)
+            columns[absent] = -sum(columns.values(), np.zeros(table.height))
+        a, b, c = (columns[name] for name in names)
         return table["t_s"].to_numpy(), space_vector(a, b, c)
     return None
 
@@ -175,23 +175,23 @@ def turning(capture: Capture, vector_of: VectorOf = line_voltage_vector) -> Turn
     angle = shaft_angle(capture, t_s)
     if angle is None:
         return None
-    good = np.isfinite(x) & np.isfinite(angle)
-    if np.count_nonzero(good) < 16:
+    finite = np.isfinite(x) & np.isfinite(angle)
+    if np.count_nonzero(finite) < 16:
         return None
-    t_s, x, angle = t_s[good], x[good], angle[good]
+    t_s, x, angle = t_s[finite], x[finite], angle[finite]
     size = np.abs(x)
     clear = size > 0.1 * np.percentile(size, 95.0)
     phase = np.unwrap(np.angle(x))
     edges = np.unique(np.linspace(0, x.size - 1, min(BLOCKS, x.size // 8) + 1).astype(int))
-    whole = np.array([clear[a : b + 1].all() for a, b in pairwise(edges)])
-    electrical, mechanical = np.diff(phase[edges])[whole], np.diff(angle[edges])[whole]
+    unbroken = np.array([clear[a : b + 1].all() for a, b in pairwise(edges)])
+    electrical, mechanical = np.diff(phase[edges])[unbroken], np.diff(angle[edges])[unbroken]
     if electrical.size < 2 or not np.any(mechanical):
         return None
     rates = np.abs(np.diff(phase)[clear[1:]] / np.diff(t_s)[clear[1:]])
     top_hz = float(np.percentile(rates, 99.0)) / TURN_RAD
     slope = float(mechanical @ electrical / (mechanical @ mechanical))
-    left = electrical - slope * mechanical
-    u = float(np.sqrt(left @ left / (left.size - 1) / (mechanical @ mechanical)))
+    residuals = electrical - slope * mechanical
+    u = float(np.sqrt(residuals @ residuals / (residuals.size - 1) / (mechanical @ mechanical)))
     return Turning(slope, u, float(np.abs(electrical).sum()) / TURN_RAD, top_hz)
 
 

@@ -125,10 +125,10 @@ def broken(table: pl.LazyFrame, columns: tuple[str, ...]) -> list[tuple[str, str
 
     """
     rules = [(column, code) for column in columns for code in _rules_of(column)]
-    kept = table.select(
+    unchanged = table.select(
         RULES[code](column).all().alias(str(place)) for place, (column, code) in enumerate(rules)
     )
-    answers = kept.collect().row(0) if rules else ()
+    answers = unchanged.collect().row(0) if rules else ()
     return [one for one, holds in zip(rules, answers, strict=True) if not holds]
 
 
@@ -180,13 +180,13 @@ def _fault(table: pl.DataFrame, column: str, code: str) -> CaptureError:
     rows = np.flatnonzero(~holds)
     term, values = COLUMNS[column], table[column].to_numpy()
     examples = ", ".join(f"{values[row]:g}" for row in rows[:EXAMPLES])
-    what = {
+    fault = {
         "time_not_finite": f"{column} has no finite value",
         "time_not_increasing": f"{column} does not increase",
         "infinite_value": f"{column} is infinite",
         "implausible_value": f"{column} is outside {term.low:g} to {term.high:g} {term.unit}",
     }[code]
-    message = f"{what} in {rows.size} of {table.height} rows ({examples})"
+    message = f"{fault} in {rows.size} of {table.height} rows ({examples})"
     return CaptureError(code, message, REMEDIES[code], (int(rows[0]), int(rows[-1])))
 
 
@@ -208,38 +208,38 @@ def check_columns(capture: Capture) -> None:
     test, tables = capture.meta.test, capture.tables
     if not any(table.height for table in tables):
         raise CaptureError("no_rows", f"the {test} holds no sample", "record it again")
-    there = frozenset(name for table in tables for name in _filled(table))
+    filled = frozenset(name for table in tables for name in _filled(table))
     wanted = requirements(test, capture.meta.pair)
-    missing = [requirement for requirement in wanted if not requirement.met_by(there)]
+    missing = [requirement for requirement in wanted if not requirement.met_by(filled)]
     if missing:
         needs = "; ".join(requirement.text() for requirement in missing)
-        empty = sorted(capture.columns - there)
+        empty = sorted(capture.columns - filled)
         blank = f" (without a value: {', '.join(empty)})" if empty else ""
         raise CaptureError(
             "missing_column",
-            f"{test} needs {needs}; the file has {', '.join(sorted(there)) or 'none'}{blank}",
-            _remedy(test, there),
+            f"{test} needs {needs}; the file has {', '.join(sorted(filled)) or 'none'}{blank}",
+            _remedy(test, filled),
         )
     if has_clock(test, capture.columns):
         _every_table_has_a_clock(capture)
 
 
-def _remedy(test: str, there: frozenset[str]) -> str:
+def _remedy(test: str, filled: frozenset[str]) -> str:
     """How a capture that lacks a column may come to one."""
-    if test == "drive" and "torque_shaft_nm" in there and there.intersection(_MOTION):
+    if test == "drive" and "torque_shaft_nm" in filled and filled.intersection(_MOTION):
         return (
             "where the drive computes that torque from its current, map it to iq_a "
             "(`inspect ... column.NAME=iq_a`) and run with `constants={kt_peak_nm_a: 1}`; "
             "else record the current too"
         )
-    if test == "drive" and {"vdc_v", "idc_a"} <= there:
+    if test == "drive" and {"vdc_v", "idc_a"} <= filled:
         return (
             "of the supply's power and a speed, what the road or the load takes is not known, and "
             "nothing of the motor follows: add torque_shaft_nm, which gives the motor constant and "
             "drag by the balance of power, or the phase current that the controller knows (iq_a)"
         )
-    if test in ("drive", "torque_map") and len(there & {"ia_a", "ib_a", "ic_a"}) >= 2:
-        if "theta_elec_rad" in there:
+    if test in ("drive", "torque_map") and len(filled & {"ia_a", "ib_a", "ic_a"}) >= 2:
+        if "theta_elec_rad" in filled:
             return (
                 "line currents are id_a and iq_a by the angle from the magnet's flux: let the "
                 "drive log these, or turn them by theta_elec_rad yourself where its zero is known"

@@ -121,8 +121,8 @@ def _rows_once(capture: Capture) -> tuple[Capture, list[Finding]]:
     tables, findings = [], []
     for table in capture.tables:
         changed = pl.any_horizontal(cs.numeric().ne_missing(cs.numeric().shift()))
-        kept = table.select(changed).to_series()
-        rows = (~kept).arg_true()
+        changed_rows = table.select(changed).to_series()
+        rows = (~changed_rows).arg_true()
         if "t_s" not in table.columns or not rows.len():
             tables.append(table)
             continue
@@ -130,7 +130,7 @@ def _rows_once(capture: Capture) -> tuple[Capture, list[Finding]]:
         remedy = "write each row once; they are left out"
         span = (int(rows[0]), int(rows[-1]))
         findings.append(warning(capture, "repeated_rows", words, remedy, span))
-        tables.append(table.filter(kept))
+        tables.append(table.filter(changed_rows))
     return (replace(capture, tables=tuple(tables)) if findings else capture), findings
 
 
@@ -152,8 +152,8 @@ def _without_computed_torque(capture: Capture) -> tuple[Capture, list[Finding]]:
         "leave it out of the source map: the drive computes it, and a transducer between motor and "
         "load would show friction and acceleration"
     )
-    kept = replace(capture, tables=tuple(t for t in tables if t.columns != ["t_s"]))
-    return kept, [warning(capture, "computed_torque", words, remedy)]
+    reduced = replace(capture, tables=tuple(t for t in tables if t.columns != ["t_s"]))
+    return reduced, [warning(capture, "computed_torque", words, remedy)]
 
 
 def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:
@@ -161,10 +161,10 @@ def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:
     tables, blanks = [], []
     for table in capture.tables:
         filled = {n: np.isfinite(table[n].to_numpy()).any() for n in table.columns}
-        kept = [name for name in table.columns if filled[name] or not table.height]
-        blanks += [name for name in table.columns if name not in kept]
-        if set(kept) - {"t_s"}:
-            tables.append(table.select(kept))
+        filled_names = [name for name in table.columns if filled[name] or not table.height]
+        blanks += [name for name in table.columns if name not in filled_names]
+        if set(filled_names) - {"t_s"}:
+            tables.append(table.select(filled_names))
     if not blanks:
         return capture, []
     words = f"{', '.join(sorted(blanks))}: no row holds a value, so the column counts as missing"

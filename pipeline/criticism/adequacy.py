@@ -73,9 +73,9 @@ def model_verdict(
         return _stated(model, ModelVerdict("insufficient", note=base)), None
     if not search and _misses_beyond_drift(base):
         return _stated(model, replace(_residuals(base), verdict="missing")), None
-    diagnosis, kept = searched(campaign, model, base)
+    diagnosis, fitted = searched(campaign, model, base)
     # instruments that drift count as noise where the verdict says that nothing else is left
-    tested = _residuals(base if diagnosis.verdict in ("missing", "unknown") else kept)
+    tested = _residuals(base if diagnosis.verdict in ("missing", "unknown") else fitted)
     named = replace(_named(tested, diagnosis), scales=base.system.fit.machine.scales)
     library = effects(model.effects_path)
     named = replace(named, touches=_touches(named.sizes, library))

@@ -81,10 +81,10 @@ def disagreements(readings: Iterable[Reading]) -> tuple[Disagreement, ...]:
     for reading in readings:
         by_quantity.setdefault(reading.quantity, []).append(reading)
     checks = []
-    for _, own in sorted(by_quantity.items()):
-        groups = max((_clusters(way) for way in _ways(own)), key=len, default=[])
+    for _, readings_of in sorted(by_quantity.items()):
+        groups = max((_clusters(way) for way in _ways(readings_of)), key=len, default=[])
         if len(groups) > 1:
-            checks.append(_disagreement(own, groups))
+            checks.append(_disagreement(readings_of, groups))
     return tuple(checks)
 
 
@@ -94,7 +94,7 @@ def _ways(readings: Sequence[Reading]) -> list[list[Reading]]:
     for reading in readings:
         ways.setdefault(reading.way, []).append(reading)
     ordered = sorted(ways.items(), key=lambda item: (-len(item[1]), item[0]))
-    return [sorted(own, key=lambda r: (r.value, r.path)) for _, own in ordered]
+    return [sorted(part, key=lambda r: (r.value, r.path)) for _, part in ordered]
 
 
 def _clusters(readings: list[Reading]) -> list[list[Reading]]:
@@ -145,17 +145,17 @@ def _mean(readings: Sequence[Reading]) -> tuple[float, float, float]:
     inverse = np.linalg.inv(_covariance(readings))
     weight = float(inverse.sum())
     mean = float(inverse.sum(axis=0) @ values) / weight
-    rest = values - mean
-    return mean, 1.0 / math.sqrt(weight), float(rest @ inverse @ rest)
+    residuals = values - mean
+    return mean, 1.0 / math.sqrt(weight), float(residuals @ inverse @ residuals)
 
 
 def _covariance(readings: Sequence[Reading], *, shared: bool = True) -> Array:
     """Covariance [n, n, unit²] of budgets and methods."""
     parts = [{part.source: part.u for part in propagate([(1.0, r.budget)])} for r in readings]
-    sources = sorted({source for own in parts for source in own})
-    common = [s for s in sources if sum(s in own for own in parts) == len(parts) > 1]
-    kept = sources if shared else [s for s in sources if s not in common]
-    table = np.array([[own.get(source, 0.0) for source in kept] for own in parts])
+    sources = sorted({source for shares in parts for source in shares})
+    common = [s for s in sources if sum(s in shares for shares in parts) == len(parts) > 1]
+    used = sources if shared else [s for s in sources if s not in common]
+    table = np.array([[shares.get(source, 0.0) for source in used] for shares in parts])
     spread = np.array([r.u_rel_model * r.value for r in readings])
     covariance: Array = table.reshape(len(parts), -1) @ table.reshape(len(parts), -1).T
     return covariance + np.diag(spread**2)
@@ -163,14 +163,14 @@ def _covariance(readings: Sequence[Reading], *, shared: bool = True) -> Array:
 
 def _disagreement(readings: Sequence[Reading], groups: list[list[Reading]]) -> Disagreement:
     """The groups of one way, joined by the readings of other ways that lie near one of them."""
-    p_value = _p_value([r for own in groups for r in own])
-    means = [_mean(own)[:2] for own in groups]
-    joined: list[set[str]] = [{r.path for r in own} for own in groups]
+    p_value = _p_value([r for part in groups for r in part])
+    means = [_mean(part)[:2] for part in groups]
+    joined: list[set[str]] = [{r.path for r in part} for part in groups]
     placed = set().union(*joined)
     for reading in readings:
-        near = sorted((abs(math.log(reading.value / m[0])), n) for n, m in enumerate(means))
-        if reading.path not in placed and near[0][0] < min(POLICY.link, 0.5 * near[1][0]):
-            joined[near[0][1]].add(reading.path)
+        nearest = sorted((abs(math.log(reading.value / m[0])), n) for n, m in enumerate(means))
+        if reading.path not in placed and nearest[0][0] < min(POLICY.link, 0.5 * nearest[1][0]):
+            joined[nearest[0][1]].add(reading.path)
     apart = [Group(tuple(sorted(paths)), *mean) for paths, mean in zip(joined, means, strict=True)]
     apart.sort(key=lambda group: (-len(group.paths), group.paths))
     tied = len(apart[0].paths) == len(apart[1].paths)

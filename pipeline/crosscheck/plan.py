@@ -161,7 +161,8 @@ def _reasons(step: Step) -> list[str]:
         covered = doubt.words in step.experiments
         names.setdefault("" if covered else doubt.words, []).append(doubt.name)
     return [
-        f"   for {', '.join(own)}" + (f": {words}" if words else "") for words, own in names.items()
+        f"   for {', '.join(tests)}" + (f": {words}" if words else "")
+        for words, tests in names.items()
     ]
 
 
@@ -330,8 +331,8 @@ def _settling(
 
 def _untried(constant: str, known: Known, ways: tuple[Way, ...]) -> frozenset[str]:
     """The tests of the ways to a constant that nothing has been recorded for."""
-    own = (way for way in ways if constant in way.gives and not way.computes)
-    return frozenset(t for way in own if not known.tests & set(way.tests) for t in way.tests)
+    measuring = (way for way in ways if constant in way.gives and not way.computes)
+    return frozenset(t for way in measuring if not known.tests & set(way.tests) for t in way.tests)
 
 
 def _is_missing(known: Known, name: str) -> bool:

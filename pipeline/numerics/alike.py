@@ -39,18 +39,18 @@ def same_but_for_noise(signal: Array, other: Array) -> float | None:
     >>> same_but_for_noise(0.05 * current - 0.001 * np.sign(np.cos(np.arange(500) / 9.0)), current)
 
     """
-    both = np.isfinite(signal) & np.isfinite(other)
-    one, two = signal[both], other[both]
+    finite = np.isfinite(signal) & np.isfinite(other)
+    one, two = signal[finite], other[finite]
     blocks = one.size // _BLOCK
     power = float(one @ one)
     if blocks < _LEAST_BLOCKS or power == 0.0 or not np.ptp(two):
         return None
     factor = float(one @ two) / float(two @ two)
-    rest = one - factor * two
-    if float(rest @ rest) > (1.0 - _LEAST_R2) * power:
+    residual = one - factor * two
+    if float(residual @ residual) > (1.0 - _LEAST_R2) * power:
         return None
-    white = float(np.var(rest)) / _BLOCK
-    means = rest[: blocks * _BLOCK].reshape(blocks, _BLOCK).mean(axis=1)
+    white = float(np.var(residual)) / _BLOCK
+    means = residual[: blocks * _BLOCK].reshape(blocks, _BLOCK).mean(axis=1)
     # rounding and the last digit of a text are no structure
     floor = (1e-4 * float(np.sqrt(power / one.size))) ** 2
     if float(np.mean(means**2)) > _EXCESS * white + floor:

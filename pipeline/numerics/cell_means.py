@@ -101,7 +101,7 @@ def cell_means(error: Array, sigma: Array, cell: Indices, visit: Indices, cells:
     """
     weight = sigma**-2
     count = np.bincount(cell, minlength=cells)
-    seen = count > 0
+    nonempty = count > 0
     _, visit = np.unique(visit, return_inverse=True)
     by_visit = np.bincount(visit, weight)
     of_visit = np.bincount(visit, weight * error) / by_visit
@@ -109,20 +109,20 @@ def cell_means(error: Array, sigma: Array, cell: Indices, visit: Indices, cells:
     home[visit] = cell
     by_cell = np.bincount(cell, weight, cells)
     mean = np.full(cells, np.nan)
-    mean[seen] = np.bincount(cell, weight * error, cells)[seen] / by_cell[seen]
+    mean[nonempty] = np.bincount(cell, weight * error, cells)[nonempty] / by_cell[nonempty]
     common = float((weight * error).sum() / weight.sum())
     power = float((weight * (error - common) ** 2).sum())
-    made = float((by_cell[seen] * (mean[seen] - common) ** 2).sum())
-    explained = min(made / power, 1.0) if power > 0 else 0.0
-    cells_seen = int(seen.sum())
+    between = float((by_cell[nonempty] * (mean[nonempty] - common) ** 2).sum())
+    explained = min(between / power, 1.0) if power > 0 else 0.0
+    cells_seen = int(nonempty.sum())
     dof = by_visit.size - cells_seen
     p_value, p_all = np.full(cells, np.nan), float("nan")
-    left = float((by_visit * (of_visit - mean[home]) ** 2).sum()) / max(dof, 1)
-    if dof < FEWEST_VISITS or left <= 0.0:
+    within = float((by_visit * (of_visit - mean[home]) ** 2).sum()) / max(dof, 1)
+    if dof < FEWEST_VISITS or within <= 0.0:
         return CellMeans(mean, count, p_value, explained, p_all)
-    t2 = mean[seen] ** 2 * by_cell[seen] / left
+    t2 = mean[nonempty] ** 2 * by_cell[nonempty] / within
     # the tails of Student's t and of F as incomplete beta functions
-    p_value[seen] = betainc(dof / 2.0, 0.5, dof / (dof + t2))
+    p_value[nonempty] = betainc(dof / 2.0, 0.5, dof / (dof + t2))
     if cells_seen > 1:
-        p_all = float(betainc(dof / 2.0, (cells_seen - 1) / 2.0, dof / (dof + made / left)))
+        p_all = float(betainc(dof / 2.0, (cells_seen - 1) / 2.0, dof / (dof + between / within)))
     return CellMeans(mean, count, p_value, explained, p_all)

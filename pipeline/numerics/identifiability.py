@@ -96,9 +96,9 @@ class Identified:
             only as far as columns from finite differences can show.
 
         """
-        there = float(np.linalg.norm(gradient * self.sizes))
+        size = float(np.linalg.norm(gradient * self.sizes))
         moved = float(np.linalg.norm(gradient @ self.null))
-        return self._noise_of(gradient) if moved < _COARSE * there else math.inf
+        return self._noise_of(gradient) if moved < _COARSE * size else math.inf
 
     def _noise_of(self, gradient: Array) -> float:
         # by the root: in the covariance, what two nearly tied numbers are together is lost
@@ -253,18 +253,18 @@ def known_combinations(
     linear combination of the gradients of those before it.
 
     """
-    kept: list[Combination] = []
+    accepted: list[Combination] = []
     for one in (
         *_products(identified, values, places, positive),
         *_sums(identified, values, places),
     ):
         gradients = [
-            *(other.gradient * identified.sizes for other in kept),
+            *(other.gradient * identified.sizes for other in accepted),
             one.gradient * identified.sizes,
         ]
         if within(np.array(one.u), np.array(one.size)) and new_direction(gradients):
-            kept.append(one)
-    return tuple(kept)
+            accepted.append(one)
+    return tuple(accepted)
 
 
 def new_direction(gradients: Sequence[Array]) -> bool:
@@ -304,8 +304,8 @@ def _product(identified: Identified, values: Array, powers: dict[int, int]) -> C
     """Π x^w, its gradient also where a factor of the numerator is zero."""
     gradient = np.zeros(values.size)
     for place, power in powers.items():
-        rest = [values[n] ** w for n, w in powers.items() if n != place]
-        gradient[place] = power * values[place] ** (power - 1) * float(np.prod(rest))
+        factors = [values[n] ** w for n, w in powers.items() if n != place]
+        gradient[place] = power * values[place] ** (power - 1) * float(np.prod(factors))
     value = float(np.prod([values[n] ** w for n, w in powers.items()]))
     size = float(
         np.prod([(identified.sizes if w > 0 else values)[n] ** w for n, w in powers.items()])

@@ -279,13 +279,13 @@ def noise_power(spec: Spectrum) -> tuple[Array, Array, float]:
 
     """
     deviation = spec.coefficients - spec.coefficients.mean(axis=0)
-    own = np.sum(np.abs(deviation) ** 2, axis=0) / (spec.turns - 1)
+    by_turn = np.sum(np.abs(deviation) ** 2, axis=0) / (spec.turns - 1)
     reach = min(NEIGHBOURS, max(0, (spec.orders.size - 1) // 2))
     kernel = np.ones(2 * reach + 1)
-    weight = np.convolve(np.ones(own.size), kernel, mode="same")
-    local = np.convolve(own, kernel, mode="same") / weight
+    weight = np.convolve(np.ones(by_turn.size), kernel, mode="same")
+    local = np.convolve(by_turn, kernel, mode="same") / weight
     dof = 2.0 * (spec.turns - 1) * float(weight.min())
-    return local, own, dof
+    return local, by_turn, dof
 
 
 def held_out_gain(spec: Spectrum) -> Array:
@@ -347,10 +347,10 @@ def orders_present(spec: Spectrum, level: float = 0.01, share: float = 0.75) -> 
     """
     from scipy.special import fdtrc
 
-    local, own, dof_local = noise_power(spec)
+    local, by_turn, dof_local = noise_power(spec)
     dof_own = 2.0 * (spec.turns - 1)
-    excess = fdtrc(dof_own, dof_local, own / np.maximum(local, np.finfo(float).tiny)) < 0.01
-    power = np.where(excess, own, local)
+    excess = fdtrc(dof_own, dof_local, by_turn / np.maximum(local, np.finfo(float).tiny)) < 0.01
+    power = np.where(excess, by_turn, local)
     dof = np.where(excess, dof_own, dof_local)
     mean = spec.coefficients.mean(axis=0)
     signal = spec.turns * np.abs(mean) ** 2
@@ -358,14 +358,14 @@ def orders_present(spec: Spectrum, level: float = 0.01, share: float = 0.75) -> 
     p_value = np.minimum(
         1.0, fdtrc(2.0, dof_local, signal / np.maximum(local, tiny)) * spec.orders.size
     )
-    repeats = fdtrc(2.0, dof_own, signal / np.maximum(own, tiny)) < 0.05
-    there = (p_value < level) & repeats & (held_out_gain(spec) >= share)
+    repeats = fdtrc(2.0, dof_own, signal / np.maximum(by_turn, tiny)) < 0.05
+    present = (p_value < level) & repeats & (held_out_gain(spec) >= share)
     u = np.sqrt(power / (2.0 * spec.turns))
     lines = [
         OrderLine(
             int(spec.orders[k]), complex(mean[k]), float(u[k]), float(dof[k]), float(p_value[k])
         )
-        for k in np.flatnonzero(there)
+        for k in np.flatnonzero(present)
     ]
     return sorted(lines, key=lambda line: (-line.amplitude, line.order))
 
@@ -404,18 +404,18 @@ def find_orders(
     Högbom, Astron. Astrophys. Suppl. 15, 1974, 417 (CLEAN).
 
     """
-    whole = rest = spectrum(turns, highest)
+    whole = remaining = spectrum(turns, highest)
     orders: list[int] = []
     fits = np.zeros((len(turns), 0), dtype=np.complex128)
     while len(orders) < MOST_LINES:
-        new = [line for line in orders_present(rest, level) if line.order not in orders]
+        new = [line for line in orders_present(remaining, level) if line.order not in orders]
         if not new:
             break
         orders += [line.order for line in new if line.amplitude > ALIKE * new[0].amplitude]
         fitted = [_fit_orders(turn, orders) for turn in turns]
         fits = np.array([coefficients for coefficients, _ in fitted])
-        rest = spectrum([left for _, left in fitted], highest)
-    back = rest.coefficients.copy()
+        remaining = spectrum([residual for _, residual in fitted], highest)
+    back = remaining.coefficients.copy()
     for column, order in enumerate(orders):
         back[:, order - 1] += fits[:, column]
     cleaned = Spectrum(whole.orders, back, whole.means, whole.senses)
@@ -429,9 +429,9 @@ def _fit_orders(turn: Turn, orders: Sequence[int]) -> tuple[ComplexArray, Turn]:
     design = harmonic_design(turn.theta_rad, list(orders))
     fit = linear_fit(design, turn.value)
     mean = float(fit.coefficients[0])
-    left = Turn(turn.theta_rad, fit.residuals + mean, turn.sense)
+    residual = Turn(turn.theta_rad, fit.residuals + mean, turn.sense)
     coefficients: ComplexArray = fit.coefficients[1::2] - 1j * fit.coefficients[2::2]
-    return coefficients, left
+    return coefficients, residual
 
 
 def waveform(lines: Sequence[OrderLine], theta_rad: Array) -> Array:

@@ -89,12 +89,12 @@ def noise_about_cubics(t_s: Array, signal: Array) -> float:
     """
     if t_s.size < 6:
         return 0.0
-    near = (-2, -1, 1, 2)
+    offsets = (-2, -1, 1, 2)
     at = t_s[2:-2]
-    stamps = {n: t_s[2 + n : t_s.size - 2 + n] for n in near}
+    stamps = {n: t_s[2 + n : t_s.size - 2 + n] for n in offsets}
     error, power = signal[2:-2].astype(np.float64), np.ones(at.size)
-    for n in near:
-        others = [m for m in near if m != n]
+    for n in offsets:
+        others = [m for m in offsets if m != n]
         parts = [(at - stamps[m]) / (stamps[n] - stamps[m]) for m in others]
         weight = np.prod(parts, axis=0)
         error = error - weight * signal[2 + n : t_s.size - 2 + n]
@@ -186,9 +186,9 @@ def true_runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 def _trim(signal: Array, start: int, stop: int, window: int, sigma: float, limit: float) -> int:
     level = float(np.mean(signal[(start + stop) // 2 : stop]))
-    near = max(4.0 * sigma / math.sqrt(window), 0.25 * limit)
+    tolerance = max(4.0 * sigma / math.sqrt(window), 0.25 * limit)
     while stop - start > 2 * window:
-        if abs(float(np.mean(signal[start : start + window])) - level) <= near:
+        if abs(float(np.mean(signal[start : start + window])) - level) <= tolerance:
             break
         start += window
     return start

@@ -79,8 +79,8 @@ class Projection:
             Same unit.
 
         """
-        plain = self.functions[:, :1, :]
-        weights = plain / plain.sum(axis=2, keepdims=True)
+        order_zero = self.functions[:, :1, :]
+        weights = order_zero / order_zero.sum(axis=2, keepdims=True)
         windows = sliding_window_view(signals, self.length, axis=1)[:, self.starts, :]
         sums: Array = np.matmul(weights, windows.transpose(1, 2, 0))[:, 0, :].T
         return sums

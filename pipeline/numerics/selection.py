@@ -68,7 +68,7 @@ def needed_columns(
     pool = np.column_stack([candidates[name] for name in names]) / sigma[:, None]
     length = np.sum(pool**2, axis=0)
     pool = _without(pool, basis)
-    rest = _without(y / sigma, basis)
+    residual = _without(y / sigma, basis)
     chosen: list[int] = []
     while len(chosen) < min(most, len(names)):
         free = y.size - basis.shape[1] - len(chosen) - 1
@@ -76,11 +76,11 @@ def needed_columns(
         usable = (power > COLLINEAR * length) & ~np.isin(np.arange(len(names)), chosen)
         if free < 1 or not usable.any():
             break
-        falls = np.where(usable, (pool.T @ rest) ** 2 / np.where(usable, power, 1.0), 0.0)
+        falls = np.where(usable, (pool.T @ residual) ** 2 / np.where(usable, power, 1.0), 0.0)
         best = int(np.argmax(falls))
-        left = float(rest @ rest) - float(falls[best])
-        if left > 0.0:
-            statistic = float(falls[best]) / (left / free) / dependence
+        remaining = float(residual @ residual) - float(falls[best])
+        if remaining > 0.0:
+            statistic = float(falls[best]) / (remaining / free) / dependence
         else:
             statistic = np.inf if falls[best] > 0.0 else 0.0
         tests = len(names) - len(chosen)
@@ -88,7 +88,7 @@ def needed_columns(
             break
         chosen.append(best)
         unit = (pool[:, best] / np.linalg.norm(pool[:, best]))[:, None]
-        pool, rest = _without(pool, unit), _without(rest, unit)
+        pool, residual = _without(pool, unit), _without(residual, unit)
     return [names[k] for k in chosen]
 
 

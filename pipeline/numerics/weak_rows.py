@@ -247,8 +247,8 @@ def _slopes(t_s: Array, y: Array, size: int) -> Array:
     length = step + size - 1
 
     def stretches(values: Array) -> Array:
-        whole = np.pad(values, (0, -count % step), mode="edge")
-        rows = np.lib.stride_tricks.sliding_window_view(whole, length)[::step]
+        padded = np.pad(values, (0, -count % step), mode="edge")
+        rows = np.lib.stride_tricks.sliding_window_view(padded, length)[::step]
         centred: Array = rows - rows.mean(axis=1, keepdims=True)
         return centred
 

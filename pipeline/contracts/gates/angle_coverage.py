@@ -65,8 +65,8 @@ def _angles(capture: Capture) -> np.ndarray:
 
 
 def _electrical_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
-    seen = turning(capture)
-    cycles = _cycles(capture) if seen is None else seen.cycles
+    turned = turning(capture)
+    cycles = _cycles(capture) if turned is None else turned.cycles
     if cycles >= options["cycles"]:
         return Passed()
     seen_words = f"the back-EMF turns {cycles:.2f}" if cycles else "no back-EMF turns"

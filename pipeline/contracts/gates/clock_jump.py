@@ -79,29 +79,29 @@ def _went_on(
     t_s, values = table["t_s"].to_numpy(), table[name].to_numpy()
     before = slice(max(0, gap + 1 - window), gap + 1)
     after = slice(gap + 1, gap + 1 + window)
-    left = _line(t_s[before], values[before], float(t_s[gap]))
+    before_gap = _line(t_s[before], values[before], float(t_s[gap]))
     right = _line(t_s[after], values[after], float(t_s[gap + 1]))
-    if left is None or right is None:
+    if before_gap is None or right is None:
         return False
     skipped = t_s[gap + 1] - t_s[gap]
-    slope = 0.5 * (left[1] + right[1])
-    as_stamped = right[0] - left[0] - slope * skipped
-    if_closed = right[0] - left[0] - slope * usual_s
-    sigma = float(np.hypot(left[2], right[2])) + 0.5 * abs(right[1] - left[1]) * usual_s
+    slope = 0.5 * (before_gap[1] + right[1])
+    as_stamped = right[0] - before_gap[0] - slope * skipped
+    if_closed = right[0] - before_gap[0] - slope * usual_s
+    sigma = float(np.hypot(before_gap[2], right[2])) + 0.5 * abs(right[1] - before_gap[1]) * usual_s
     clear = abs(as_stamped) > options["sigmas"] * sigma
     return bool(clear and abs(if_closed) < 0.25 * abs(as_stamped))
 
 
 def _line(t_s: Array, values: Array, at_s: float) -> tuple[float, float, float] | None:
     """Value of a straight line at a time, its slope, and the scatter of the samples about it."""
-    good = np.isfinite(values)
-    if np.count_nonzero(good) < 6:
+    finite = np.isfinite(values)
+    if np.count_nonzero(finite) < 6:
         return None
-    t_s, values = t_s[good], values[good]
+    t_s, values = t_s[finite], values[finite]
     centred = t_s - t_s.mean()
     slope = float(centred @ values / (centred @ centred))
-    left = values - values.mean() - slope * centred
-    scatter = float(np.sqrt(left @ left / (left.size - 2)))
+    residuals = values - values.mean() - slope * centred
+    scatter = float(np.sqrt(residuals @ residuals / (residuals.size - 2)))
     return float(values.mean() + slope * (at_s - t_s.mean())), slope, scatter
 
 

@@ -34,8 +34,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _finite(capture: Capture, *names: str) -> dict[str, Array]:
-    there = {n: capture.arrays(n)[n] for n in names if capture.has(n)}
-    return {n: v[np.isfinite(v)] for n, v in there.items() if np.isfinite(v).any()}
+    columns = {n: capture.arrays(n)[n] for n in names if capture.has(n)}
+    return {n: v[np.isfinite(v)] for n, v in columns.items() if np.isfinite(v).any()}
 
 
 def _clear_of_noise(values: Array, reach: float, times: float) -> bool:

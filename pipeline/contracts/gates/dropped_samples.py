@@ -49,12 +49,12 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
             continue
         t_s = table["t_s"].to_numpy()
         gaps, usual_s = gaps_of(t_s, options["gap_intervals"], capture.meta.pause_s)
-        lost = missing_samples(t_s, gaps, usual_s)
-        if lost < 0.5:
+        missing = missing_samples(t_s, gaps, usual_s)
+        if missing < 0.5:
             continue
-        share = lost / (lost + t_s.size)
+        share = missing / (missing + t_s.size)
         words = (
-            f"about {lost:.0f} samples are missing in {gaps.size} gaps, {100 * share:.2g} % of "
+            f"about {missing:.0f} samples are missing in {gaps.size} gaps, {100 * share:.2g} % of "
             f"the record; the widest is {np.diff(t_s)[gaps].max():.3g} s where {usual_s:.3g} s "
             "is usual"
         )
@@ -75,9 +75,9 @@ def _refuse_lost_edge(
             continue
         current = table[name].to_numpy()
         change = np.abs(current[gaps + 1] - current[gaps])
-        lost = gaps[change > edge_share * (np.nanmax(current) - np.nanmin(current))]
-        if lost.size:
-            after = int(lost[0])
+        edge_gaps = gaps[change > edge_share * (np.nanmax(current) - np.nanmin(current))]
+        if edge_gaps.size:
+            after = int(edge_gaps[0])
             words = f"{words}; {name} changes by {change.max():.3g} A inside one gap"
             raise CaptureError(NAME, words, REMEDY, (after, after + 1))
 

@@ -37,14 +37,14 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
         names = [n for n in needed if n in table.columns]
         if set(names) <= {"t_s"}:
             continue
-        good = {name: np.isfinite(table[name].to_numpy()) for name in names}
-        dense = {n: g for n, g in good.items() if g.mean() >= options["dense_share"]}
+        finite = {name: np.isfinite(table[name].to_numpy()) for name in names}
+        dense = {n: g for n, g in finite.items() if g.mean() >= options["dense_share"]}
         keep = np.all(list(dense.values()), axis=0) if dense else np.ones(table.height, dtype=bool)
         for name in names:
-            if np.count_nonzero(good[name]) < options["fewest"]:
+            if np.count_nonzero(finite[name]) < options["fewest"]:
                 raise CaptureError(
                     NAME,
-                    f"{name} has {counted(int(np.count_nonzero(good[name])), 'value')}; "
+                    f"{name} has {counted(int(np.count_nonzero(finite[name])), 'value')}; "
                     f"{meta.test} needs {options['fewest']:.0f} at least",
                     "record for longer, or faster",
                 )

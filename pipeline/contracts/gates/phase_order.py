@@ -34,17 +34,17 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
     """
     if capture.meta.test in FREE_TURNING:
-        seen = turning(capture)
+        turned = turning(capture)
         opposed = (
-            seen is not None
-            and seen.cycles >= options["cycles"]
-            and seen.cycles_per_turn < -options["sigmas"] * seen.u
+            turned is not None
+            and turned.cycles >= options["cycles"]
+            and turned.cycles_per_turn < -options["sigmas"] * turned.u
         )
-        if seen is not None and opposed:
+        if turned is not None and opposed:
             raise CaptureError(
                 CODE,
                 f"the line voltages turn c-b-a where the shaft turns forward "
-                f"({seen.cycles_per_turn:.2f} cycles a turn)",
+                f"({turned.cycles_per_turn:.2f} cycles a turn)",
                 REMEDY,
             )
         return Passed()
@@ -70,14 +70,14 @@ def _refuse_opposed_currents(capture: Capture, options: Mapping[str, float]) -> 
     stated = capture.meta.pole_pairs
     if stated is None or _common_share(capture) > options["common"]:
         return
-    seen = turning(capture, line_current_vector)
-    if seen is None or seen.cycles < options["cycles"]:
+    turned = turning(capture, line_current_vector)
+    if turned is None or turned.cycles < options["cycles"]:
         return
-    if abs(seen.cycles_per_turn + stated) < options["off_count"] * stated:
+    if abs(turned.cycles_per_turn + stated) < options["off_count"] * stated:
         raise CaptureError(
             CODE,
             f"the line currents turn c-b-a where the shaft turns forward "
-            f"({seen.cycles_per_turn:.2f} cycles a turn)",
+            f"({turned.cycles_per_turn:.2f} cycles a turn)",
             CURRENTS_REMEDY,
         )
 
@@ -150,8 +150,8 @@ def _first_slope(x: Array, y: Array) -> tuple[float, float]:
         return 0.0, np.inf
     normal = (x / scale).T @ (x / scale)
     beta = np.linalg.solve(normal, (x / scale).T @ y)
-    left = y - (x / scale) @ beta
-    variance = left @ left / (y.size - x.shape[1]) * np.linalg.inv(normal)[0, 0]
+    residuals = y - (x / scale) @ beta
+    variance = residuals @ residuals / (y.size - x.shape[1]) * np.linalg.inv(normal)[0, 0]
     return float(beta[0] / scale[0]), float(np.sqrt(variance) / scale[0])
 
 

@@ -83,9 +83,9 @@ def sum_share(table: pl.DataFrame, names: tuple[str, ...], additive: float) -> f
     """
     three = [table[name].to_numpy() for name in names]
     total = three[0] + three[1] + three[2]
-    good = np.isfinite(total)
-    power = float(sum(np.mean(column[good] ** 2) for column in three)) if good.any() else 0.0
-    total = total[good]
+    finite = np.isfinite(total)
+    power = float(sum(np.mean(column[finite] ** 2) for column in three)) if finite.any() else 0.0
+    total = total[finite]
     if power == 0.0 or total.size < 2:
         return 0.0
     shared = float(np.mean(total[1:] * total[:-1]))

@@ -26,22 +26,22 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     refused.
 
     """
-    seen = turning(capture)
-    if seen is None or seen.cycles < options["cycles"] or seen.u > options["largest_u"]:
+    turned = turning(capture)
+    if turned is None or turned.cycles < options["cycles"] or turned.u > options["largest_u"]:
         return Passed()
-    count = abs(seen.cycles_per_turn)
-    whole, stated = round(count), capture.meta.pole_pairs
-    off = abs(count - whole)
-    if whole == 0 or off > options["from_whole"] + 2.0 * seen.u:
+    count = abs(turned.cycles_per_turn)
+    counted, stated = round(count), capture.meta.pole_pairs
+    off = abs(count - counted)
+    if counted == 0 or off > options["from_whole"] + 2.0 * turned.u:
         words = f"the back-EMF makes {count:.3f} cycles a turn of the shaft, no whole number"
-        cause = _unit(count, seen.u, options["from_whole"], stated)
+        cause = _unit(count, turned.u, options["from_whole"], stated)
         if cause:
             raise CaptureError(CODE, f"{words}: {cause}", "map the unit in conf/source")
         remedy = "check the angle's unit, for slip of its coupling, and for a gear"
         return Passed(findings=(warning(capture, CODE, words, remedy),))
-    if stated is not None and stated != whole:
+    if stated is not None and stated != counted:
         words = f"the back-EMF makes {count:.3f} cycles a turn; the nameplate says {stated}"
-        if stated == 2 * whole:
+        if stated == 2 * counted:
             words = f"{words}, which is the number of poles"
         return Passed(findings=(warning(capture, "pole_pairs_nameplate", words, REMEDY),))
     return Passed()
@@ -58,8 +58,8 @@ def _unit(count: float, u: float, from_whole: float, stated: int | None) -> str:
     for factor, words in UNITS.items():
         cycles = count * factor
         whole = round(cycles)
-        near = abs(cycles - whole) <= from_whole + 2.0 * u * factor
-        if near and u * factor < 0.1 and whole > 0 and (whole == stated or count < 0.5):
+        close = abs(cycles - whole) <= from_whole + 2.0 * u * factor
+        if close and u * factor < 0.1 and whole > 0 and (whole == stated or count < 0.5):
             readings.append((whole == stated, f"{words}, which makes {cycles:.3f}"))
     return ", or ".join(
         words for same, words in readings if same or not any(one for one, _ in readings)

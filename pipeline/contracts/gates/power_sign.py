@@ -35,8 +35,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     else:
         return Passed()
     power = power[np.isfinite(power)]
-    whole = float(np.abs(power).sum())
-    if whole == 0.0 or float(power.sum()) > -options["share"] * whole:
+    total = float(np.abs(power).sum())
+    if total == 0.0 or float(power.sum()) > -options["share"] * total:
         return Passed()
     raise CaptureError(
         "power_sign",

@@ -40,8 +40,8 @@ def _judge(capture: Capture, samples: float, refuse: float, warn: float, per: st
     if samples < refuse:
         raise CaptureError(CODE, f"{words}, where {refuse:g} is the least", REMEDY)
     if samples < warn:
-        few = f"{words}, where {warn:g} would be good"
-        return Passed(findings=(warning(capture, CODE, few, REMEDY),))
+        too_few = f"{words}, where {warn:g} would be good"
+        return Passed(findings=(warning(capture, CODE, too_few, REMEDY),))
     return Passed()
 
 
@@ -62,8 +62,8 @@ def _step(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _spin(capture: Capture, options: Mapping[str, float]) -> Passed:
-    seen, usual_s, stated = turning(capture), _interval_s(capture), capture.meta.pole_pairs
-    top_hz = 0.0 if seen is None else seen.top_hz
+    turned, usual_s, stated = turning(capture), _interval_s(capture), capture.meta.pole_pairs
+    top_hz = 0.0 if turned is None else turned.top_hz
     if stated is not None:
         top_hz = max(top_hz, stated * _top_speed_rad_s(capture) / TURN_RAD)
     if top_hz == 0.0:

@@ -110,8 +110,8 @@ def speed_over_angle(capture: Capture, turns: float) -> tuple[float, float] | No
             return math.inf, 0.0
         power = by_angle @ by_angle
         ratio = float(by_angle @ by_speed / power)
-        left = by_speed - ratio * by_angle
-        return ratio, math.sqrt(float(left @ left / (BLOCKS - 1) / power))
+        residuals = by_speed - ratio * by_angle
+        return ratio, math.sqrt(float(residuals @ residuals / (BLOCKS - 1) / power))
     return None
 
 
@@ -136,8 +136,8 @@ def _suspect(ratio: float, pole_pairs: int | None) -> str:
     if pole_pairs and pole_pairs > 1:
         known[float(pole_pairs)] = "the speed is electrical"
         known[1.0 / pole_pairs] = "the angle is electrical"
-    near = (words for number, words in known.items() if abs(ratio / number - 1.0) < 0.02)
-    return next(near, "")
+    matching = (words for number, words in known.items() if abs(ratio / number - 1.0) < 0.02)
+    return next(matching, "")
 
 
 GATE = Gate(

@@ -109,11 +109,11 @@ def frozen_rows(values: Array, options: Mapping[str, float]) -> Rows:
     if runs.size == 0:
         return none
     low, high = np.nanmin(values), np.nanmax(values)
-    kept = [r for r in runs if low < values[starts[r]] < high]
+    frozen = [r for r in runs if low < values[starts[r]] < high]
     afar = options["drop_share"] * (high - low)
-    kept = [r for r in kept if values[starts[r]] != 0.0 or _falls_from(values, starts[r], afar)]
-    kept = [r for r in kept if not _settles(values, starts[r], lengths[r])]
-    return rows_of_runs(values.size, starts[kept], lengths[kept]) if kept else none
+    frozen = [r for r in frozen if values[starts[r]] != 0.0 or _falls_from(values, starts[r], afar)]
+    frozen = [r for r in frozen if not _settles(values, starts[r], lengths[r])]
+    return rows_of_runs(values.size, starts[frozen], lengths[frozen]) if frozen else none
 
 
 def _falls_from(values: Array, start: int, afar: float) -> bool:

@@ -48,13 +48,13 @@ def _faults(
     if not finite.any():
         return []
     coldest = float(np.percentile(values[finite], COLDEST_PERCENT))
-    most, near = options["most_degc"], False
+    most, in_kelvin = options["most_degc"], False
     against = "no motor is as hot as that"
     if ambient is not None:
         most = max(most, ambient + options["most_rise_k"])
-        near = abs(coldest - ambient - ZERO_DEGC_K) <= options["near_k"]
+        in_kelvin = abs(coldest - ambient - ZERO_DEGC_K) <= options["near_k"]
         against = f"ambient_degc is {ambient:g}"
-    if coldest <= most and not near:
+    if coldest <= most and not in_kelvin:
         return []
     words = f"{name} lies at {coldest:.4g} and above, and {against}: it is in kelvin"
     return [CaptureError(NAME, words, REMEDY, span_of(finite))]

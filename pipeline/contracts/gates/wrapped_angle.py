@@ -54,11 +54,11 @@ def _steps(capture: Capture, name: str) -> NDArray[np.float64]:
     names = (name, "t_s") if capture.has("t_s") else (name,)
     data = capture.arrays(*names, masked=False)
     steps: NDArray[np.float64] = np.diff(data[name])
-    whole = np.isfinite(steps)
+    usable = np.isfinite(steps)
     if "t_s" in data and steps.size:
         taken_s = np.diff(data["t_s"])
-        whole &= taken_s < GAP * np.median(taken_s)
-    return np.where(whole, steps, 0.0)
+        usable &= taken_s < GAP * np.median(taken_s)
+    return np.where(usable, steps, 0.0)
 
 
 GATE = Gate(

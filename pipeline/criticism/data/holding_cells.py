@@ -67,8 +67,8 @@ def holding_cells(capture: Capture, policy: Policy) -> Cells | None:
     if not capture.has("theta_mech_rad", "iq_a"):
         return None
     columns = capture.arrays("theta_mech_rad", "iq_a")
-    fine = np.isfinite(columns["theta_mech_rad"]) & np.isfinite(columns["iq_a"])
-    theta, current = columns["theta_mech_rad"][fine], columns["iq_a"][fine]
+    finite = np.isfinite(columns["theta_mech_rad"]) & np.isfinite(columns["iq_a"])
+    theta, current = columns["theta_mech_rad"][finite], columns["iq_a"][finite]
     rows, spread = [], []
     for part, sense in passes(theta):
         cells, residuals = _cells(theta[part], current[part], policy.tables)

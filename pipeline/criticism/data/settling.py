@@ -72,8 +72,8 @@ def _of_log(recorded: Capture, policy: Policy) -> tuple[float, float, float] | N
     if not names:
         return None
     data = capture.arrays("t_s", "vq_v", names[0])
-    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    t_s, volts, theta = (data[name][fine] for name in ("t_s", "vq_v", names[0]))
+    finite = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    t_s, volts, theta = (data[name][finite] for name in ("t_s", "vq_v", names[0]))
     theta = theta if names[0] == "theta_mech_rad" else trapezoid(t_s, theta)
     width = max(policy.cutting.load_window_s, policy.cutting.load_samples * _period(t_s))
     try:

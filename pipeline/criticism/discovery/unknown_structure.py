@@ -99,9 +99,9 @@ def unknown_structure(
     model_size = wide.model_columns.size
     # a drag over an inertia is a product: the expression is sought around the inertia found
     moved = fit.moved(wide.columns[:model_size], best.step[:model_size])
-    fine = linear_system(moved, effect_columns(port.effect, moved.model), wide)
-    weight = fine.weights(fine.reduced_chi2(best.residual))
-    pursuit = Pursuit(fine, model_size, port, weight)
+    finer = linear_system(moved, effect_columns(port.effect, moved.model), wide)
+    weight = finer.weights(finer.reduced_chi2(best.residual))
+    pursuit = Pursuit(finer, model_size, port, weight)
     sketch = describe(pursuit, expression(pursuit), best.port, others, signals, name)
     return sketch, best.gain
 

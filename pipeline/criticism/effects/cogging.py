@@ -25,10 +25,10 @@ def orders(machine: Machine) -> tuple[int, ...]:
     out of all reason (`Machine.cogging_order`), and twice that where no slow turn shows it.
     """
     bases = [machine.pole_pairs] + ([machine.slots] if machine.slots else [])
-    seen = {k for k in machine.torque_orders if any(k % base == 0 for base in bases)}
+    multiples = {k for k in machine.torque_orders if any(k % base == 0 for base in bases)}
     if machine.cogging_order is not None:
-        seen.add(machine.cogging_order)
-    every = tuple(sorted(seen | _unverified_orders(machine))) or (6 * machine.pole_pairs,)
+        multiples.add(machine.cogging_order)
+    every = tuple(sorted(multiples | _unverified_orders(machine))) or (6 * machine.pole_pairs,)
     # of a wave that is not gone through once, a piece looks like any other curve
     return tuple(k for k in every if k * machine.travel_turns >= 1.0) or every[-1:]
 

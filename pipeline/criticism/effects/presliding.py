@@ -28,8 +28,8 @@ def _state(x: Operating, travel_rad: float) -> Array:
     else:
         fading = np.exp(-np.abs(x.shaft.runs_rad) / travel_rad)
         lacks = [2.0]
-        for left in fading[:-1].tolist():
-            lacks.append(2.0 - lacks[-1] * left)
+        for factor in fading[:-1].tolist():
+            lacks.append(2.0 - lacks[-1] * factor)
         lack, sense = np.array(lacks)[x.shaft.run], np.sign(x.shaft.runs_rad)[x.shaft.run]
     return sense * (1.0 - lack * np.exp(-x.travel_rad / travel_rad))
 

@@ -20,14 +20,14 @@ def _saturated(square: Any, bend: float) -> Any:
 def _coenergy(x: Operating, q: Values) -> Any:
     size = x.machine.scales["current_a"]
     d, s = x.id_a / size, x.iq_a / size
-    lost = 0.0
+    loss = 0.0
     if q["q_fall"]:
-        lost = lost + x.base["lq_h"] * q["q_fall"] * _saturated(s * s, q["q_bend"])
+        loss = loss + x.base["lq_h"] * q["q_fall"] * _saturated(s * s, q["q_bend"])
     if q["d_odd"]:
-        lost = lost + x.base["ld_h"] * q["d_odd"] / 3 * d * d * d
+        loss = loss + x.base["ld_h"] * q["d_odd"] / 3 * d * d * d
     if q["d_fall"]:
-        lost = lost + x.base["ld_h"] * q["d_fall"] * _saturated(d * d, q["d_bend"])
-    return -(size**2) * lost
+        loss = loss + x.base["ld_h"] * q["d_fall"] * _saturated(d * d, q["d_bend"])
+    return -(size**2) * loss
 
 
 EFFECT = Effect(

@@ -40,8 +40,8 @@ def _inner_h(x: Operating, q: Values) -> float:
 
 def _coenergy(x: Operating, q: Values) -> Any:
     bent = q["bend"] * _square(x)
-    lost = _inner_h(x, q) * np.where(_bench(x), 1.0, bent / (1.0 + bent))
-    return -0.5 * lost * (x.id_a * x.id_a + x.iq_a * x.iq_a)
+    share = _inner_h(x, q) * np.where(_bench(x), 1.0, bent / (1.0 + bent))
+    return -0.5 * share * (x.id_a * x.id_a + x.iq_a * x.iq_a)
 
 
 def _drop(x: Operating, q: Values) -> Complex:
@@ -59,11 +59,11 @@ def _in_a_step(x: Operating, q: Values) -> Complex:
     as the current in a resistance beside L_i is, straight lines from sample to sample.
     """
     late = _late_s(x, q)
-    kept = math.exp(-x.ts_s / late)
-    new = 1.0 - (1.0 - kept) * late / x.ts_s
+    decay = math.exp(-x.ts_s / late)
+    new = 1.0 - (1.0 - decay) * late / x.ts_s
     current = np.asarray(x.i_a)
-    moves = new * current[1:] + (1.0 - kept - new) * current[:-1]
-    inwards = accumulate(moves.tolist(), lambda now, move: kept * now + move, initial=current[0])
+    moves = new * current[1:] + (1.0 - decay - new) * current[:-1]
+    inwards = accumulate(moves.tolist(), lambda now, move: decay * now + move, initial=current[0])
     inside = np.fromiter(inwards, dtype=np.complex128, count=current.size)
     return _inner_h(x, q) / late * (current - inside)
 

@@ -316,11 +316,11 @@ class _Sampler:
         """Whether this is the sampler of a segment at a point."""
         return segment is self.segment and values == self.values and model == self.model
 
-    def reading_error(self, near: Values, valid: NDArray[np.bool_]) -> Array:
-        """Error [R] that any model is allowed, with scales and friction of the values `near`."""
-        if self.reading is None or self.reading[0] != near:
-            error = reading_error(self.segment, self.model, near, self.x)
-            self.reading = dict(near), error[valid]
+    def reading_error(self, values: Values, valid: NDArray[np.bool_]) -> Array:
+        """Error [R] that any model is allowed, with scales and friction of `values`."""
+        if self.reading is None or self.reading[0] != values:
+            error = reading_error(self.segment, self.model, values, self.x)
+            self.reading = dict(values), error[valid]
         return self.reading[1]
 
     def change(self, column: Column) -> Array | None:

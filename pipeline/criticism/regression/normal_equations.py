@@ -311,8 +311,8 @@ def pseudo_inverse(normal: Array) -> Array:
     # a parameter that no capture observes stays where it is, exactly
     size = np.sqrt(np.where(information > 0.0, information, 1.0))
     power, axes = np.linalg.eigh(normal / np.outer(size, size))
-    good = power > _TIE * max(float(power[-1]), 1.0)
-    inverse: Array = (axes[:, good] / power[good]) @ axes[:, good].T
+    nonzero = power > _TIE * max(float(power[-1]), 1.0)
+    inverse: Array = (axes[:, nonzero] / power[nonzero]) @ axes[:, nonzero].T
     unscaled: Array = inverse / np.outer(size, size)
     return unscaled
 

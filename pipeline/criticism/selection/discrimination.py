@@ -83,8 +83,8 @@ def _true_torque(recorded: Array, model: Model, values: Values) -> Array:
     for effect in reversed(model.effects):
         if effect.shaft is not None:
             q = values_of(effect, model.machine, values)
-            rest, one = effect.shaft(np.array([0.0, 1.0]), q)
-            torque = (torque - rest) / (one - rest)
+            offset, at_one = effect.shaft(np.array([0.0, 1.0]), q)
+            torque = (torque - offset) / (at_one - offset)
     return torque
 
 

@@ -176,20 +176,20 @@ def _cells(variable: str, value: Array) -> tuple[NDArray[np.int64], Array]:
     Cells of an angle are equally wide. Edges of others lie halfway between those of equal widths
     and those of equal shares of the values: a test that dwells somewhere shows the rest as well.
     """
-    fine = np.isfinite(value)
+    finite = np.isfinite(value)
     if variable == "theta_mech_rad":
         edges = np.linspace(0.0, TURN_RAD, _CELLS + 1)
-    elif fine.sum() < _FEWEST:
+    elif finite.sum() < _FEWEST:
         return np.full(value.size, -1), np.empty(0)
     else:
         shares = np.linspace(0.0, 1.0, _CELLS + 1)
-        low, high = float(value[fine].min()), float(value[fine].max())
+        low, high = float(value[finite].min()), float(value[finite].max())
         even = low + (high - low) * shares
-        edges = np.unique((np.quantile(value[fine], shares) + even) / 2.0)
+        edges = np.unique((np.quantile(value[finite], shares) + even) / 2.0)
     if edges.size < 2:
         return np.full(value.size, -1), np.empty(0)
-    cell = np.searchsorted(edges[1:-1], np.where(fine, value, edges[0]), side="right")
-    return np.where(fine, cell, -1).astype(np.int64), (edges[1:] + edges[:-1]) / 2.0
+    cell = np.searchsorted(edges[1:-1], np.where(finite, value, edges[0]), side="right")
+    return np.where(finite, cell, -1).astype(np.int64), (edges[1:] + edges[:-1]) / 2.0
 
 
 def _turn_curves(without: Sequence[ErrorMap], with_it: Sequence[ErrorMap]) -> Iterator[_Curve]:

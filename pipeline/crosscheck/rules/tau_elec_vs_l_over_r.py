@@ -114,13 +114,13 @@ def step_time_constant_s(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, flo
         return None
     volts, amps = v_v - v_v[: edges[0]].mean(), i_a - i_a[: edges[0]].mean()
     areas = [[trapezoid(t_s[s], x[s]) for s in spans] for x in (volts, amps)]
-    own = np.repeat(np.eye(len(spans)), [s.stop - s.start for s in spans], axis=0)
-    columns = np.column_stack([np.concatenate(areas[0]), np.concatenate(areas[1]), own])
+    of_step = np.repeat(np.eye(len(spans)), [s.stop - s.start for s in spans], axis=0)
+    columns = np.column_stack([np.concatenate(areas[0]), np.concatenate(areas[1]), of_step])
     current = np.concatenate([amps[s] for s in spans])
     fit = linear_fit(columns, current)
-    rate, left = -float(fit.coefficients[1]), float(np.std(fit.residuals))
+    rate, scatter = -float(fit.coefficients[1]), float(np.std(fit.residuals))
     longest = max(float(t_s[s.stop - 1] - t_s[s.start]) for s in spans)
-    if not fit.full_rank or rate * longest < 3.0 or np.ptp(current) < 20.0 * left:
+    if not fit.full_rank or rate * longest < 3.0 or np.ptp(current) < 20.0 * scatter:
         return None
     return 1.0 / rate, fit.u(1) * math.sqrt(autocorrelation_time(fit.residuals)) / rate**2
 
@@ -149,9 +149,9 @@ def _trace(capture: Capture) -> tuple[Array, Array, Array]:
     names = ("t_s", f"v{pair}_v", f"i{line}_a")
     data = capture.arrays(*names)
     t_s, v_v, i_a = (data[name] for name in names)
-    there = np.isfinite(v_v) & np.isfinite(i_a)
+    finite = np.isfinite(v_v) & np.isfinite(i_a)
     sign = 1.0 if line == pair[0] else -1.0
-    return t_s[there], v_v[there], sign * i_a[there]
+    return t_s[finite], v_v[finite], sign * i_a[finite]
 
 
 def _expected_s(capture: Capture, ld_h: float, lq_h: float, r_phase_ohm: float) -> float:
