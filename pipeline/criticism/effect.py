@@ -280,7 +280,7 @@ class Operating(Samples):
     `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit, `ts_s` is the sample period. `inverter`: the
     machine is fed and logged by a drive, so that inverter and drive-sensor effects apply; `supply`
     says how. `psi_wb` [n] (complex, d + jq) and `torque_em_nm` [n] are there for drop and torque
-    hooks. `kept` is what `once` made.
+    hooks. `cache` is what `once` made.
     """
 
     machine: Machine
@@ -291,7 +291,7 @@ class Operating(Samples):
     shaft: ShaftState = ShaftState()
     psi_wb: Complex | None = None
     torque_em_nm: Array | None = None
-    kept: dict[tuple[int, Hashable], tuple[Any, Any]] = field(default_factory=dict)
+    cache: dict[tuple[int, Hashable], tuple[Any, Any]] = field(default_factory=dict)
 
     def fed(self, **supply: Any) -> Operating:
         """The same machine, fed and logged by a drive of which more is known.
@@ -325,7 +325,7 @@ class Operating(Samples):
             if np.array_equal(getattr(self, name), theirs := getattr(other, name))
         }
         same = columns.keys() >= _MOTION and self.ts_s == other.ts_s
-        return replace(self, **columns, kept=dict(other.kept)) if same else self
+        return replace(self, **columns, cache=dict(other.cache)) if same else self
 
     def once(self, column: Any, name: Hashable, make: Callable[[], Made]) -> Made:
         """What depends on one array alone, computed once for all copies of the state that share the
@@ -346,10 +346,10 @@ class Operating(Samples):
             The result of `make`, of this call or an earlier one.
 
         """
-        known = self.kept.get((id(column), name))
+        known = self.cache.get((id(column), name))
         if known is None:
             # the column is kept with it, so that nothing else takes its identity
-            known = self.kept[id(column), name] = column, make()
+            known = self.cache[id(column), name] = column, make()
         result: Made = known[1]
         return result
 
@@ -430,7 +430,7 @@ class Operating(Samples):
             supply=replace(self.supply, volts_v=None),
             psi_wb=None,
             torque_em_nm=None,
-            kept={},
+            cache={},
         )
 
     @property

@@ -113,12 +113,12 @@ class Unthinned:
     late: Mapping[str, Array] = field(default_factory=dict)
 
 
-class Kept(dict[Hashable, Any]):
+class Cache(dict[Hashable, Any]):
     """Cache of what was computed of a segment; another process has its own."""
 
-    def __reduce__(self) -> tuple[type[Kept], tuple[()]]:
+    def __reduce__(self) -> tuple[type[Cache], tuple[()]]:
         """Pickles as one that holds nothing."""
-        return Kept, ()
+        return Cache, ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,7 +153,7 @@ class Segment:
     blocks
         Number of the part of a capture that each window [W] belongs to; parts are held out one by
         one where there is no other capture to predict it from.
-    kept
+    cache
         Cache of what was computed of it.
 
     """
@@ -171,7 +171,7 @@ class Segment:
     disturbances: Disturbances = Disturbances()
     unthinned: Unthinned = Unthinned()
     blocks: NDArray[np.int64] | None = None
-    kept: Kept = field(default_factory=Kept, repr=False, compare=False)
+    cache: Cache = field(default_factory=Cache, repr=False, compare=False)
 
     @property
     def size(self) -> int:
@@ -199,13 +199,13 @@ class Segment:
             The result of `make`, of this call or an earlier one.
 
         """
-        known = self.kept.get(name)
+        known = self.cache.get(name)
         if known is not None and known[0] is column and known[1] == by:
             earlier: Made = known[2]
             return earlier
         result = make()
         if any(column is one for one in self.recorded.values()):
-            self.kept[name] = column, by, result
+            self.cache[name] = column, by, result
         return result
 
 

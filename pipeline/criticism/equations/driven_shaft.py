@@ -133,7 +133,7 @@ def predicted(segment: Segment, x: Operating, _: Pieces, model: Model, values: V
     for _round in range(2):
         kt = 1.5 * x.machine.pole_pairs * pieces.psi_wb.real
         current = (values["j_kgm2"] * smooth + pieces.drag_nm) / kt
-        driven = replace(x, iq_a=current, kept={})
+        driven = replace(x, iq_a=current, cache={})
         pieces = evaluate(model, driven, values)
     rough = (1.0 + values["lead_share"]) * values["r_ohm"] * values["j_kgm2"] / kt
     volts = pieces.drop_v + 1j * x.machine.pole_pairs * x.omega_rad_s * pieces.psi_wb.real
@@ -164,7 +164,7 @@ def _winding(segment: Segment, model: Model, values: Values) -> tuple[float, flo
     cold = np.zeros(1)
     winding_k = cold if "temp_winding_degc" in segment.recorded else x.winding_k
     magnet_k = cold if "temp_magnet_degc" in segment.recorded else x.magnet_k
-    x = replace(x, iq_a=np.ones(1), winding_k=winding_k, magnet_k=magnet_k, kept={})
+    x = replace(x, iq_a=np.ones(1), winding_k=winding_k, magnet_k=magnet_k, cache={})
     pieces = evaluate(replace(model, effects=warming), x, values)
     r_ohm, psi_wb = float(pieces.drop_v.imag[0]), float(pieces.psi_wb.real[0])
     return r_ohm, model.machine.pole_pairs * psi_wb

@@ -152,7 +152,7 @@ def _depends(on: Callable[[Operating], Array], x: Operating) -> set[str]:
 
 
 def _fresh(x: Operating, **changed: Any) -> Operating:
-    return replace(x, **changed, kept={}, psi_wb=None, torque_em_nm=None)
+    return replace(x, **changed, cache={}, psi_wb=None, torque_em_nm=None)
 
 
 def _torque_table(effect: str, hook: TorqueHook, x: Operating, q: Values) -> EffectTable | None:

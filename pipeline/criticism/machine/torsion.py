@@ -53,7 +53,7 @@ class Shaft:
         Inertias; the latter is known to a few per cent.
     u_theta_rad, u_through_nm, u_momentum_nm
         Standard deviations of a sample's noise; that of `through_nm` is in `momentum_nm` as well.
-    kept
+    valid
         Good samples [n].
 
     """
@@ -67,7 +67,7 @@ class Shaft:
     u_theta_rad: float
     u_through_nm: float
     u_momentum_nm: float
-    kept: NDArray[np.bool_]
+    valid: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +156,7 @@ def _windows(shaft: Shaft, policy: Torsion) -> Iterable[_Window]:
     block, theta, through, turned, least = _smoothed(shaft, policy)
     size = max(round(policy.window_s / (block * shaft.ts_s)), policy.window_blocks)
     closed = _closed(through, least)
-    valid = np.asarray(sliding_window_view(shaft.kept, 3 * block).all(axis=1))
+    valid = np.asarray(sliding_window_view(shaft.valid, 3 * block).all(axis=1))
     closed &= valid[::block][: closed.size]
     noise = _Noise.of(shaft, block, size)
     moves = max(policy.torque_range * least, policy.torque_moves * float(np.std(through)))

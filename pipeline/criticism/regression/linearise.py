@@ -281,10 +281,10 @@ def _sampler(segment: Segment, model: Model, values: Values) -> _Sampler:
     """The sampler of a segment at a point. The last one is kept: a fit comes back to where it ended
     for columns anew, for those of candidates, for other floors.
     """
-    known: _Sampler | None = segment.kept.get("sampler")
+    known: _Sampler | None = segment.cache.get("sampler")
     if known is not None and known.at(segment, model, values):
         return known
-    sampler = segment.kept["sampler"] = _Sampler(segment, model, dict(values))
+    sampler = segment.cache["sampler"] = _Sampler(segment, model, dict(values))
     return sampler
 
 

@@ -380,7 +380,7 @@ def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
         known = {**zero(effect, model), **known}
     evaluate(model, x, known, frozenset({"flux"}))
     factor = 1.0 + model.policy.selection.form_error
-    moved = replace(x, id_a=x.id_a * factor, iq_a=x.iq_a * factor, kept={})
+    moved = replace(x, id_a=x.id_a * factor, iq_a=x.iq_a * factor, cache={})
     change = np.zeros(x.omega_rad_s.shape, dtype=complex)
     for effect in model.effects:
         if effect.drop is not None:

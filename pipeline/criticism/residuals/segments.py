@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.instruments import gains_of
-from pipeline.criticism.data.segment import UNSMOOTHED, Kept, Segment, with_lines
+from pipeline.criticism.data.segment import UNSMOOTHED, Cache, Segment, with_lines
 from pipeline.criticism.data.sensor_noise import is_rounded, rounding_step
 from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.effect import UNLOGGED, Machine
@@ -193,6 +193,6 @@ def sparse(segment: Segment, windows: int) -> Segment:
     moved = PAD + (weak.length + 2 * PAD) * np.arange(windows)
     thin = replace(weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen])
     blocks = None if segment.blocks is None else segment.blocks[chosen]
-    short = replace(segment, recorded=cut, weak=thin, blocks=blocks, kept=Kept())
+    short = replace(segment, recorded=cut, weak=thin, blocks=blocks, cache=Cache())
     lines = segment.disturbances.lines
     return short if lines is None else with_lines(short, lines[:, :, chosen])

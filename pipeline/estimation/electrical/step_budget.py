@@ -262,6 +262,6 @@ def _driven_currents(solution: Solution) -> list[Array]:
     rows = [solution.parameters[None, :]] * len(model.records)
     offsets = [
         0.0 if slots.offset_a is None else float(solution.parameters[at + slots.offset_a])
-        for at, slots in zip(model.layout.starts, model.layout.own, strict=True)
+        for at, slots in zip(model.layout.starts, model.layout.slots, strict=True)
     ]
     return [i[:, 0] - x for i, x in zip(model.predict(rows), offsets, strict=True)]

@@ -30,7 +30,7 @@ Inductances = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, slots=True)
-class Own:
+class Slots:
     """Where one capture's own parameters sit, counted from its first; None where it has none.
 
     The pair's and the supply's resistance, the current's offset where the voltage has two levels
@@ -48,7 +48,7 @@ class Own:
     size: int
 
 
-def own_of(record: StepRecord) -> Own:
+def slots_of(record: StepRecord) -> Slots:
     """The places of a capture's own parameters.
 
     Parameters
@@ -58,7 +58,7 @@ def own_of(record: StepRecord) -> Own:
 
     Returns
     -------
-    Own
+    Slots
         Counted from the capture's first parameter; None for a parameter that the capture has no
         need of.
 
@@ -76,7 +76,7 @@ def own_of(record: StepRecord) -> Own:
     source, offset, first, drop = places
     moves = slice(at, at + wave.moves.shape[1])
     levels = slice(moves.stop, moves.stop + (wave.levels_v.size if wave.has_supply else 0))
-    return Own(0, source, offset, moves, first, drop, levels, levels.stop)
+    return Slots(0, source, offset, moves, first, drop, levels, levels.stop)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,12 +84,12 @@ class Layout:
     """Where the parameters sit: those of the axes, then from `starts` each capture's own."""
 
     starts: tuple[int, ...]
-    own: tuple[Own, ...]
+    slots: tuple[Slots, ...]
 
     @property
     def size(self) -> int:
         """How many parameters in all."""
-        return self.starts[-1] + self.own[-1].size
+        return self.starts[-1] + self.slots[-1].size
 
 
 def layout_of(records: Sequence[StepRecord]) -> Layout:
@@ -106,9 +106,9 @@ def layout_of(records: Sequence[StepRecord]) -> Layout:
         The shared parameters first, then those of each capture in turn.
 
     """
-    parameters = tuple(own_of(record) for record in records)
-    starts = np.cumsum([len(SHARED), *(o.size for o in parameters[:-1])])
-    return Layout(tuple(int(s) for s in starts), parameters)
+    slots = tuple(slots_of(record) for record in records)
+    starts = np.cumsum([len(SHARED), *(o.size for o in slots[:-1])])
+    return Layout(tuple(int(s) for s in starts), slots)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,7 @@ class Drive:
         return self.r_ohm + self.source_ohm
 
 
-def drive_of(record: StepRecord, slots: Own, values: Array) -> Drive:
+def drive_of(record: StepRecord, slots: Slots, values: Array) -> Drive:
     """The drive of a capture from the columns of its own parameters [m, size].
 
     Parameters
@@ -186,7 +186,7 @@ def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
     )
     start = np.zeros(layout.size)
     start[[LD, LQ]] = np.clip(both, 0.2 * l_total.min() / 2, 5.0 * l_total.max() / 2)
-    for record, at, slots in zip(records, layout.starts, layout.own, strict=True):
+    for record, at, slots in zip(records, layout.starts, layout.slots, strict=True):
         start[at] = record.r_start_ohm
         if slots.source_ohm is not None:
             start[at + slots.source_ohm] = max(record.wave.source_ohm, -0.5 * record.r_start_ohm)
@@ -275,7 +275,7 @@ class StepModel:
         """
         shared, cos_g, width, volts, drives = [], [], [], [], []
         for record, grid, rows, at, slots in zip(
-            self.records, self._grids, variants, self.layout.starts, self.layout.own, strict=True
+            self.records, self._grids, variants, self.layout.starts, self.layout.slots, strict=True
         ):
             drive = drive_of(record, slots, rows[:, at : at + slots.size])
             segment, begin, end = grid
@@ -406,7 +406,7 @@ class StepModel:
             self.records,
             variants,
             self.layout.starts,
-            self.layout.own,
+            self.layout.slots,
             strict=True,
         ):
             drive = drive_of(record, slots, rows[:, at : at + slots.size])
@@ -435,7 +435,7 @@ class StepModel:
         low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
         positive = [LD, LQ, *self.layout.starts]
         low[positive] = 1e-3 * start[positive]
-        for at, slots in zip(self.layout.starts, self.layout.own, strict=True):
+        for at, slots in zip(self.layout.starts, self.layout.slots, strict=True):
             if slots.source_ohm is not None:
                 low[at], low[at + slots.source_ohm] = 0.6 * start[at], -0.5 * start[at]
             moves = slice(at + slots.moves.start, at + slots.moves.stop)
@@ -458,7 +458,7 @@ class StepModel:
             Those that are shared, and the capture's own.
 
         """
-        start, size = self.layout.starts[capture], self.layout.own[capture].size
+        start, size = self.layout.starts[capture], self.layout.slots[capture].size
         of_capture = (free >= start) & (free < start + size)
         return free[of_capture | (free < len(SHARED))]
 
@@ -471,7 +471,7 @@ class StepModel:
             powers = np.arange(1.0, 1.0 + TERMS) + (place == LQ)
             widths[place + 1 : place + 1 + TERMS] = 1e-6 * flux**-powers
         for record, at, slots in zip(
-            self.records, self.layout.starts, self.layout.own, strict=True
+            self.records, self.layout.starts, self.layout.slots, strict=True
         ):
             ampere = max(record.largest_a, 1e-9)
             widths[at : at + slots.size] = 1e-5 * ampere

@@ -274,7 +274,7 @@ def _saturation_plot(solution: Solution, axes: Sequence[str]) -> Evidence:
     for name in axes:
         x, y, fitted = [], [], []
         for record, at, slots in zip(
-            model.records, model.layout.starts, model.layout.own, strict=True
+            model.records, model.layout.starts, model.layout.slots, strict=True
         ):
             if abs(_share(record, name)) < math.sqrt(0.5):
                 continue

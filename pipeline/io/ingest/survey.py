@@ -313,7 +313,7 @@ class _Content:
     """What the bytes of a file show: form, own metadata, first lines, topics, layout of an MCAP."""
 
     form: Form
-    own: Mapping[str, str]
+    metadata: Mapping[str, str]
     head: str | None
     topics: list[str]
     layout: Layout | None = None
@@ -389,7 +389,7 @@ def _entry(
     if not known:
         _not_lost(path, data)
         return None
-    form, metadata = content.form, content.own
+    form, metadata = content.form, content.metadata
     if source is not None and source.reader is not None:
         form, metadata = "foreign", dict(find_reader(source.reader).metadata(data))
     fixed = {} if source is None else source.metadata_for(path)
@@ -501,7 +501,7 @@ def _source(
 
     A map named by `source` counts first, then the file's own `contract`, then what recognises it.
     """
-    named = file.beside.get("source") or file.listed.get("source") or content.own.get("source")
+    named = file.beside.get("source") or file.listed.get("source") or content.metadata.get("source")
     if named:
         try:
             maps = list(find_maps(sources, named).values())
@@ -509,7 +509,7 @@ def _source(
             raise CaptureError("unknown_source", fault.message, fault.remedy) from None
         fitting = [s for s in maps if s.recognises(file.path, content.head, content.topics)]
         return (fitting or maps)[0], True
-    if "contract" in content.own:
+    if "contract" in content.metadata:
         return None, True
     matches = [s for s in sources.values() if s.recognises(file.path, content.head, content.topics)]
     if len(matches) > 1:

@@ -96,7 +96,7 @@ def finer(x, points):
         name: np.interp(at, places, getattr(x, name))
         for name in ("theta_rad", "omega_rad_s", "torque_em_nm")
     }
-    return replace(x, shaft=ShaftState(alone=True, finer=points), kept={}, **fine)
+    return replace(x, shaft=ShaftState(alone=True, finer=points), cache={}, **fine)
 
 
 def test_a_state_of_more_points_a_sample_has_the_same_coupling():

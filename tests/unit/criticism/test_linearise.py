@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.segment import Kept, row_index
+from pipeline.criticism.data.segment import Cache, row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
@@ -161,7 +161,7 @@ def test_a_fit_that_comes_back_to_where_it_was_computes_nothing_again(monkeypatc
     louder = replace(start, sigma=tuple(3.0 * sigma for sigma in start.sigma))
     again = linear_system(louder, offered)
     assert asked == []
-    new = linear_system(replace(louder, segments=(replace(segments[0], kept=Kept()),)), offered)
+    new = linear_system(replace(louder, segments=(replace(segments[0], cache=Cache()),)), offered)
     assert np.array_equal(again.matrix, new.matrix)
     assert np.array_equal(again.residual, new.residual)
     asked.clear()
@@ -182,7 +182,7 @@ def test_a_residual_beside_another_state_is_the_one_without_it(name):
     residual(one, model, values, beside=state)
     for parameter in model.parameters():
         moved = {**values, parameter: values[parameter] + 1e-3}
-        alone = residual(replace(one, kept=Kept()), model, moved)
+        alone = residual(replace(one, cache=Cache()), model, moved)
         assert np.array_equal(residual(one, model, moved, beside=state), alone)
 
 

@@ -255,10 +255,10 @@ def test_a_wave_that_turns_many_times_a_sample_averages_out_of_a_coasting_shaft(
     turned = np.linspace(0.0, 60 * 2000.0 * 5e-3 / 32, 60)
     x = replace(operating(), theta_rad=turned, inverter=False)
     for finer, most in ((32, 0.08), (1, 1.0)):
-        cosine, sine = replace(x, shaft=ShaftState(finer=finer), kept={}).shaft_waves(84)
+        cosine, sine = replace(x, shaft=ShaftState(finer=finer), cache={}).shaft_waves(84)
         assert np.hypot(cosine, sine).max() <= most + 1e-12
     assert np.hypot(cosine, sine).min() == pytest.approx(1.0)
-    slow = replace(x, theta_rad=turned / 3e3, shaft=ShaftState(finer=32), kept={})
+    slow = replace(x, theta_rad=turned / 3e3, shaft=ShaftState(finer=32), cache={})
     assert np.hypot(*slow.shaft_waves(84)).min() > 0.999
 
 

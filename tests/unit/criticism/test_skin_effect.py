@@ -51,7 +51,7 @@ def test_a_step_finds_the_branch_as_a_resistance_first_and_an_inductance_at_last
         freq_hz=still,
         inverter=False,
         ts_s=ts,
-        kept={},
+        cache={},
     )
     q = values(x)
     lost = np.gradient(effect_flux(EFFECT, x, q)[0].real, ts)
@@ -62,7 +62,7 @@ def test_a_step_finds_the_branch_as_a_resistance_first_and_an_inductance_at_last
 
 
 def test_a_meter_has_a_resistance_of_its_own_and_none_of_the_inner_field():
-    x = replace(operating(3), omega_rad_s=np.zeros(3), inverter=False, kept={}, ts_s=1.0)
+    x = replace(operating(3), omega_rad_s=np.zeros(3), inverter=False, cache={}, ts_s=1.0)
     q = values(x)
     assert EFFECT.drop(x, q) == pytest.approx(0.3 * x.base["r_ohm"] * x.i_a)
     assert effect_flux(EFFECT, x, q)[0] == pytest.approx(-BRANCH_OHM * LATE_S * x.i_a)

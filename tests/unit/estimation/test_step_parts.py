@@ -31,7 +31,7 @@ from pipeline.estimation.electrical.step_model import (
     _covered,
     _steps,
     drive_of,
-    own_of,
+    slots_of,
     start_of,
 )
 from pipeline.estimation.electrical.step_record import (
@@ -317,7 +317,7 @@ def test_a_constant_inductance_gives_the_closed_form(source: float) -> None:
     model = model_of(made)
     (record,) = model.records
     values = parameters_of(model)
-    at, own = model.layout.starts[0], model.layout.own[0]
+    at, own = model.layout.starts[0], model.layout.slots[0]
     values[at] = R
     values[at + own.source_ohm] = source
     values[at + own.offset_a] = 0.25
@@ -339,7 +339,7 @@ def test_a_capture_that_starts_unsettled_has_its_first_current() -> None:
     wave = _sampled(record.t_s, np.zeros(record.t_s.size), "held", [], PERIOD)
     bare = replace(record, wave=wave, level=np.full(record.t_s.size, BETWEEN), starts_settled=False)
     model = StepModel([bare], inductances)
-    own = model.layout.own[0]
+    own = model.layout.slots[0]
     assert (own.source_ohm, own.offset_a, own.drop_v) == (None, 1, None)
     assert own.first_a == 2
     values = parameters_of(model)
@@ -354,7 +354,7 @@ def test_the_pair_sees_twice_the_mix_of_both_axes(theta: float, mix: float) -> N
     """2 (cos^2 Ld + sin^2 Lq), by the time constant of the prediction."""
     model = model_of(step(noise=1e-4, theta=theta))
     values = parameters_of(model, ld=4e-4, lq=1.2e-3)
-    at, own = model.layout.starts[0], model.layout.own[0]
+    at, own = model.layout.starts[0], model.layout.slots[0]
     values[at], values[at + own.source_ohm] = R, 0.0
     values[at + own.levels_v.start : at + own.levels_v.stop] = 0.0, 6.0, 0.0
     values[at + own.offset_a] = 0.0
@@ -370,7 +370,7 @@ def test_an_inverters_drop_is_against_the_current() -> None:
     made = replace(made, meta=replace(made.meta, voltage_kind="commanded"))
     model = model_of(made)
     (record,) = model.records
-    at, own = model.layout.starts[0], model.layout.own[0]
+    at, own = model.layout.starts[0], model.layout.slots[0]
     assert own.source_ohm is None
     values = parameters_of(model)
     values[at], values[at + own.drop_v], values[at + own.offset_a] = R, 0.9, 0.0
@@ -411,7 +411,7 @@ def test_bounds_keep_resistances_positive_and_edges_near() -> None:
     model = model_of(step(noise=1e-3, source=0.2))
     start = start_of(model.records, model.layout)
     low, high = model.bounds(start)
-    at, own = model.layout.starts[0], model.layout.own[0]
+    at, own = model.layout.starts[0], model.layout.slots[0]
     assert low[[LD, LQ]] == pytest.approx(1e-3 * start[[LD, LQ]])
     assert low[at] == pytest.approx(0.6 * start[at])
     assert low[at + own.source_ohm] == pytest.approx(-0.5 * start[at])
@@ -432,7 +432,7 @@ def test_a_start_splits_what_the_pairs_see_over_the_axes(angles, ld, lq) -> None
     assert start[LD] == pytest.approx(ld, rel=2e-3)
     if lq:
         assert start[LQ] == pytest.approx(lq, rel=2e-3)
-    at, own = model.layout.starts[0], model.layout.own[0]
+    at, own = model.layout.starts[0], model.layout.slots[0]
     assert start[at] == records[0].r_start_ohm
     assert start[at + own.levels_v.start + 1] == pytest.approx(6.0, rel=1e-2)
 
@@ -465,7 +465,7 @@ def test_steps_are_fine_for_eight_time_constants() -> None:
 def test_a_drives_settled_current_is_its_first_level_over_the_loop() -> None:
     record = read_step(step(noise=1e-4, source=0.2))
     assert record is not None
-    own = own_of(record)
+    own = slots_of(record)
     values = np.zeros((1, own.size))
     values[0, own.r_ohm], values[0, own.source_ohm] = 1.0, 0.25
     values[0, own.levels_v] = 2.5, 6.0, 1.0
@@ -631,7 +631,7 @@ def test_the_mean_inductance_of_a_capture_is_that_of_its_step(solution) -> None:
     layout = solution.model.layout
     pairs = (1e-3, 1e-3, 2e-3)
     for record, at, own, pair in zip(
-        solution.model.records, layout.starts, layout.own, pairs, strict=True
+        solution.model.records, layout.starts, layout.slots, pairs, strict=True
     ):
         drive = drive_of(record, own, solution.parameters[None, at : at + own.size])
         assert _chord(record, drive) == pytest.approx(pair, rel=0.01)
