@@ -101,7 +101,7 @@ def test_a_compensation_gives_back_by_an_earlier_current_what_dead_time_takes():
     assert np.abs(drop(x, gives)).max() < 1e-12
     assert drop(x, gives | {"loss_v": 0.05}) == pytest.approx(0.25 * whole)
     assert drop(x, gives | {"ramp_a": 1e9}) == pytest.approx(whole)
-    still = replace(x, id_a=np.full(x.id_a.size, 2.0), iq_a=np.full(x.id_a.size, 3.0), kept={})
+    still = replace(x, id_a=np.full(x.id_a.size, 2.0), iq_a=np.full(x.id_a.size, 3.0), cache={})
     before = replace(still, eps_rad=x.eps_rad - x.machine.pole_pairs * x.omega_rad_s * late_s)
     turned = np.exp(1j * (before.eps_rad - x.eps_rad))
     late = drop(still, of) - drop(before, of) * turned
