@@ -199,18 +199,17 @@ def _computed(
     with watch.stage("fleet"):
         fleet = fleet_of(output, results, others)
         datasheets = fleet.datasheets
-        there = {one.motor_id: status_now(output, one, histories) for one in fleet.others}
+        of_others = {one.motor_id: status_now(output, one, histories) for one in fleet.others}
         findings = sorted(
             {f for r in results for f in r.finished.findings}.union(survey.findings), key=_order
         )
         files, removed = publish(
-            settings, results, fleet, tuple(findings), {**there, **statuses}, others
+            settings, results, fleet, tuple(findings), {**of_others, **statuses}, others
         )
         outcome = outcome_of(datasheets, findings, survey, statuses, report=settings.report)
     lasting = not died and all(result.lasting for result in results)
     if lasting and registered.code == 0 and _revocations(registry) == revoked:
-        contents = _contents(datasheets, results)
-        cache.keep_outcome(batch, Batch(outcome, contents), files)
+        cache.keep_outcome(batch, Batch(outcome, _contents(datasheets, results)), files)
     cache.forget_others([*others, *(job.motor_id for job in jobs)])
     outcome = with_folder_names(outcome, settings)
     for name, seconds in (item for result in results for item in result.seconds.items()):

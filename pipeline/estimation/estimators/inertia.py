@@ -389,14 +389,9 @@ def _estimates(
         parts += sampled if name == "b_visc_nm_s_rad" else ()
         parts += _of_a_speed(rows, float(constants[i]))
         parts += _of_a_d_current(rows, float(per_kt[i]) * torque.kt_nm_a)
-        budget = propagate(
-            [
-                (1.0, (*parts, *type_b[i])),
-                (float(per_kt[i]), torque.kt_budget),
-                (float(per_rel[i]), torque.reluctance_budget),
-                (float(per_alpha[i]), torque.magnet_budget),
-            ]
-        )
+        slopes = [float(slope[i]) for slope in (per_kt, per_rel, per_alpha)]
+        budgets = (torque.kt_budget, torque.reluctance_budget, torque.magnet_budget)
+        budget = propagate([(1.0, (*parts, *type_b[i])), *zip(slopes, budgets, strict=True)])
         estimates.append(METHOD.measured(name, float(constants[i]), budget, paths, at, note))
     return tuple(estimates)
 
