@@ -129,7 +129,8 @@ def ripple_of(
     if ripple is None:
         return 0.0, 0.0
     (there,) = _beyond_noise([ripple])
-    return _torque(there, capture, {n: column[rows] for n, column in data.items()}, winding)
+    rows_data = {name: column[rows] for name, column in data.items()}
+    return _torque(there, winding, _winding_temperature(rows_data), _drop_v(capture, rows_data))
 
 
 def ripple_by_speed(capture: Capture, winding: Winding | None) -> tuple[Array, Array, Array]:
@@ -168,7 +169,8 @@ def ripple_by_speed(capture: Capture, winding: Winding | None) -> tuple[Array, A
     if not middles:
         return blank, blank, blank
     speeds = np.array([ripple.omega_mech_rad_s for ripple in middles])
-    both = np.array([_torque(ripple, capture, data, winding) for ripple in middles])
+    warmth, drop_v = _winding_temperature(data), _drop_v(capture, data)
+    both = np.array([_torque(ripple, winding, warmth, drop_v) for ripple in middles])
     return speeds, both[:, 0] / speeds, both[:, 1] / speeds
 
 
@@ -244,18 +246,16 @@ def _beyond_noise(each: Sequence[_Ripple]) -> list[_Ripple]:
 
 
 def _torque(
-    ripple: _Ripple, capture: Capture, data: Mapping[str, Array], winding: Winding
+    ripple: _Ripple, winding: Winding, warmth: tuple[float, float], drop_v: float | None
 ) -> tuple[float, float]:
-    """Torque of a ripple and its standard uncertainty [N·m]."""
+    """Torque of a ripple and its standard uncertainty [N·m]; no drop of a measured voltage."""
     voltage, current, omega = ripple.voltage_v, ripple.current_a, ripple.omega_mech_rad_s
-    warmer, u_resistance = _winding_temperature(data)
+    warmer, u_resistance = warmth
     r = winding.r_phase_ohm * (1.0 + warmer)
     torque = ripple_torque(voltage, current, r, omega)
     square = float(np.sum(np.abs(current) ** 2))
     doubts_w = [r * np.hypot(u_resistance, winding.u_resistance) * square]
-    if capture.meta.voltage_kind != "measured":
-        lost_v = policy().capture_spread.inverter * _bus_v(capture, data)
-        drop_v = policy().ripple_torque.drop_share * lost_v
+    if drop_v is not None:
         late = float(np.sum(1j * SIGNED * voltage * current.conj()).real)
         late *= winding.pole_pairs * omega
         doubts_w += [drop_v * float(np.sqrt(square)), 0.5 * ripple.hold_s * late]
@@ -320,7 +320,14 @@ def _winding_temperature(data: Mapping[str, Array]) -> tuple[float, float]:
     return warmer, spread.resistance_temperature_known
 
 
-def _bus_v(capture: Capture, columns: Mapping[str, Array]) -> float:
-    """Voltage of the DC link; where it is not stated, the least that makes these."""
-    largest = float(np.nanmax(np.hypot(columns["vd_v"], columns["vq_v"])))
-    return capture.meta.vdc_v or float(np.sqrt(3.0)) * largest
+def _drop_v(capture: Capture, columns: Mapping[str, Array]) -> float | None:
+    """What an inverter may drop of a commanded voltage's harmonics [V]; None of a measured one.
+
+    The DC link's voltage that is not stated is the least that makes these.
+    """
+    if capture.meta.voltage_kind == "measured":
+        return None
+    link_v = capture.meta.vdc_v or float(
+        np.sqrt(3.0) * np.nanmax(np.hypot(columns["vd_v"], columns["vq_v"]))
+    )
+    return policy().ripple_torque.drop_share * policy().capture_spread.inverter * link_v
