@@ -24,7 +24,6 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import Budget, Contribution, coverage_factor
 
 Options = Mapping[str, Mapping[str, float]]
-UNPOWERED = ("open_circuit", "hand_turn", "spin_down")
 LINES = ("ia_a", "ib_a", "ic_a")
 TEMPERATURES = ("temp_magnet_degc", "temp_winding_degc")
 
@@ -126,37 +125,25 @@ def _own_scatter(budget: Budget, factor: float, path: str) -> Budget:
 
 def _spread(capture: Capture, quantity: str) -> float:
     """The relative standard uncertainty of the method from one capture to the next [1]."""
-    known = any(capture.has(name) for name in TEMPERATURES)
+    spreads = policy().capture_spread
     if quantity == "pole_pairs":
-        return policy().capture_spread.count
+        return spreads.count
     if quantity in ("ld_h", "lq_h"):
-        return policy().capture_spread.inductance
+        return spreads.inductance
     if quantity == "r_phase_ohm":
+        logged = capture.has("temp_winding_degc")
         spread = (
-            policy().capture_spread.resistance_temperature_known
-            if capture.has("temp_winding_degc")
-            else policy().capture_spread.resistance_temperature_unknown
+            spreads.resistance_temperature_known
+            if logged
+            else spreads.resistance_temperature_unknown
         )
+    elif not any(capture.has(name) for name in TEMPERATURES):
+        spread = spreads.flux_temperature_unknown
     elif capture.meta.test == "torque_map":
-        spread = (
-            policy().capture_spread.torque
-            if known
-            else policy().capture_spread.flux_temperature_unknown
-        )
-    elif capture.meta.test in UNPOWERED and not known:
-        stated = capture.meta.ambient_degc is not None
-        spread = (
-            policy().capture_spread.flux_temperature_known
-            if stated
-            else policy().capture_spread.flux_temperature_unpowered
-        )
+        spread = spreads.torque
     else:
-        spread = (
-            policy().capture_spread.flux_temperature_known
-            if known
-            else policy().capture_spread.flux_temperature_unknown
-        )
-    return max(spread, policy().capture_spread.log) if capture.meta.test == "drive" else spread
+        spread = spreads.flux_temperature_known
+    return max(spread, spreads.log) if capture.meta.test == "drive" else spread
 
 
 def _inverter(capture: Capture, estimate: Estimate) -> float:

@@ -136,11 +136,6 @@ class Selection:
         "captures contradict both",
         why="a form is right to far less than half",
     )  # fmt: skip
-    little_share: float = chosen(
-        0.01, "1",
-        "share of the held-out error that a further effect must take while anything is left",
-        why="a hundredth is negligible",
-    )  # fmt: skip
     drift_size: float = chosen(
         4.0, "standard deviations of noise", "drift of a sensor at a capture's end",
         why="larger, and slow effects pass for drift; smaller, and a drift is named as an effect",

@@ -119,7 +119,7 @@ class Score:
         if not self.matters:
             return f"seen, at {self.size:.2g} of the least size that matters"
         if self.confounder is not None:
-            return f"{self.confounder} explains it better, and is too small to matter"
+            return f"{self.confounder} explains it as well, and is too small to matter"
         if self.passes:
             return "refitted, it does not hold on captures held out, or may be zero"
         if self._below_floor:
@@ -428,7 +428,7 @@ class _Scoring:
     def confounder(
         self, score: Score, best: Mapping[str, tuple[Score, NDArray[np.int64]]]
     ) -> str | None:
-        """The clearest effect that explains what a candidate does better, at a size too small to
+        """The clearest effect that explains what a candidate does as well, at a size too small to
         matter, and beside which the candidate is not worth its penalty.
 
         A loss that is too small to be reported must not be reported under a wrong name.
@@ -440,7 +440,7 @@ class _Scoring:
             for other, places in best.values()
             if not other.matters
             and other.fall > other.penalty
-            and other.fall > score.fall + score.policy.tie
+            and other.fall > score.fall - score.policy.tie
             and other.candidate.effect.discriminator is None
         ]
         if not small:

@@ -77,19 +77,17 @@ class CaptureSpread:
     """Relative standard uncertainties that no budget of a single capture holds.
 
     From one capture to the next the method's own assumptions change: magnets lose 0.11 % of their
-    flux a kelvin (NdFeB) and copper gains 0.39 %. An unknown temperature counts as twenty kelvin
-    under current and as ten without, a known one as five where the sensor sits elsewhere.
+    flux a kelvin (NdFeB) and copper gains 0.39 %. An unknown temperature counts as twenty
+    kelvin, a known one as five where the sensor sits elsewhere.
     """
 
     flux_temperature_known: float = derived(
         0.005, "1", "of flux, magnet temperature logged", source="5 K of 0.11 % a kelvin"
     )
     flux_temperature_unknown: float = derived(
-        0.02, "1", "of flux under current, temperature unknown", source="20 K of 0.11 % a kelvin"
-    )
-    flux_temperature_unpowered: float = derived(
-        0.01, "1", "of flux without current, temperature unknown", source="10 K of 0.11 % a kelvin"
-    )
+        0.02, "1", "of flux, temperature unknown: after a load an open winding is warm as well",
+        source="20 K of 0.11 % a kelvin",
+    )  # fmt: skip
     torque: float = chosen(
         0.01, "1", "of a torque constant between maps of other currents",
         why="iron saturates by per cents",

@@ -145,7 +145,7 @@ def test_what_a_small_effect_explains_is_not_named_after_another():
     assert last.added == ()
     shadowed = next(s for s in last.scores if s.candidate.effect.name == other[0])
     assert shadowed.fall > shadowed.penalty
-    assert shadowed.shortfall == "windage explains it better, and is too small to matter"
+    assert shadowed.shortfall == "windage explains it as well, and is too small to matter"
 
 
 def test_windage_is_found_with_its_size():

@@ -93,7 +93,6 @@ def test_numbers_that_follow_from_a_source_follow_from_it() -> None:
     assert spread.inverter == pytest.approx(1e-6 * 20e3)
     for share, kelvin in (
         (spread.flux_temperature_known, 5.0),
-        (spread.flux_temperature_unpowered, 10.0),
         (spread.flux_temperature_unknown, 20.0),
     ):
         assert share == pytest.approx(kelvin * abs(DEFAULT.magnet.coefficient_1_k), rel=0.1)
