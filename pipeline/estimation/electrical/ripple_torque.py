@@ -248,7 +248,10 @@ def _beyond_noise(each: Sequence[_Ripple]) -> list[_Ripple]:
 def _torque(
     ripple: _Ripple, winding: Winding, warmth: tuple[float, float], drop_v: float | None
 ) -> tuple[float, float]:
-    """Torque of a ripple and its standard uncertainty [N·m]; no drop of a measured voltage."""
+    """Torque of a ripple and its standard uncertainty [N·m]; no drop of a measured voltage.
+
+    One that is less than its own uncertainty is not taken off, and stands in it.
+    """
     voltage, current, omega = ripple.voltage_v, ripple.current_a, ripple.omega_mech_rad_s
     warmer, u_resistance = warmth
     r = winding.r_phase_ohm * (1.0 + warmer)
@@ -259,7 +262,12 @@ def _torque(
         late = float(np.sum(1j * SIGNED * voltage * current.conj()).real)
         late *= winding.pole_pairs * omega
         doubts_w += [drop_v * float(np.sqrt(square)), 0.5 * ripple.hold_s * late]
-    return torque, 1.5 * float(np.linalg.norm(doubts_w)) / omega
+    u = 1.5 * float(np.linalg.norm(doubts_w)) / omega
+    return (
+        (torque, u)
+        if abs(torque) > abs(u)
+        else (0.0, float(np.copysign(np.hypot(torque, u), omega)))
+    )
 
 
 def _ripple(
