@@ -134,6 +134,19 @@ def test_a_commanded_voltage_leaves_what_a_dead_time_takes() -> None:
     assert found(data, voltage_kind="commanded", vdc_v=100.0)[1] > 1.9 * commanded[1]
 
 
+def test_a_torque_of_ripple_below_its_own_doubt_is_not_taken_off_and_stands_in_it() -> None:
+    """What 2 % of a link of 5 kV may drop is more than all of the ripple's power."""
+    data = columns(8.0)
+    torque = found(data, voltage_kind="commanded", vdc_v=50.0)[0]
+    none, unknown = found(data, voltage_kind="commanded", vdc_v=5000.0)
+    _, doubt = found(data, voltage_kind="commanded", vdc_v=4900.0)
+    assert none == 0.0
+    assert unknown > abs(torque)
+    assert unknown**2 - torque**2 == pytest.approx(
+        (doubt**2 - torque**2) * (50 / 49) ** 2, rel=1e-3
+    )
+
+
 def test_what_shows_no_ripple_torque() -> None:
     data = columns(8.0)
     blind = {name: column for name, column in data.items() if name != "vd_v"}
