@@ -24,6 +24,8 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import Budget, Contribution, coverage_factor
 
 Options = Mapping[str, Mapping[str, float]]
+LOADED = ("torque_map", "drive", "heat_run")
+"""Tests that warm a motor, and leave it warm."""
 LINES = ("ia_a", "ib_a", "ic_a")
 TEMPERATURES = ("temp_magnet_degc", "temp_winding_degc")
 
@@ -66,38 +68,43 @@ def repeated(campaign: Campaign) -> tuple[Capture, ...]:
     return tuple(c for c in campaign.captures if counts[ways[c.path]] > 1)
 
 
-def readings(motor_id: str, captures: Iterable[Capture], options: Options) -> tuple[Reading, ...]:
+def readings(
+    campaign: Campaign, captures: Iterable[Capture], options: Options
+) -> tuple[Reading, ...]:
     """Each quantity that each capture determines alone; what it does not determine is left out.
 
     Parameters
     ----------
-    motor_id
-        Of the campaign.
+    campaign
+        All captures of the motor, which say whether a load had warmed it.
     captures
-        Each is fitted by itself, by every estimator that takes its test.
+        Those of them to read; each is fitted by itself, by every estimator that takes its test.
     options
         Of the estimators, as in `fit_all`.
 
     """
     with under(changed(options)):
-        return _readings(motor_id, captures, options)
+        return _readings(campaign, captures, options)
 
 
-def _readings(motor_id: str, captures: Iterable[Capture], options: Options) -> tuple[Reading, ...]:
+def _readings(
+    campaign: Campaign, captures: Iterable[Capture], options: Options
+) -> tuple[Reading, ...]:
     readings: list[Reading] = []
+    warmed = any(capture.meta.test in LOADED for capture in campaign.captures)
     for capture in captures:
-        constants, _, _ = fit_all(Campaign(motor_id, (capture,)), options)
+        constants, _, _ = fit_all(Campaign(campaign.motor_id, (capture,)), options)
         for name, quantity in QUANTITIES.items():
             estimate = constants.best(name)
             if estimate is None or estimate.status != "measured" or estimate.number <= 0.0:
                 continue
-            reading = _reading(capture, estimate, quantity)
+            reading = _reading(capture, estimate, quantity, warmed)
             if math.isfinite(reading.u_rel_model):
                 readings.append(reading)
     return tuple(readings)
 
 
-def _reading(capture: Capture, estimate: Estimate, quantity: Quantity) -> Reading:
+def _reading(capture: Capture, estimate: Estimate, quantity: Quantity, warmed: bool) -> Reading:
     return Reading(
         quantity.name,
         (estimate.method, *_way(capture)),
@@ -105,7 +112,7 @@ def _reading(capture: Capture, estimate: Estimate, quantity: Quantity) -> Readin
         quantity.factor * estimate.number,
         quantity.unit,
         _own_scatter(estimate.budget, quantity.factor, capture.path),
-        math.hypot(_spread(capture, quantity.name), _inverter(capture, estimate)),
+        math.hypot(_spread(capture, quantity.name, warmed), _inverter(capture, estimate)),
     )
 
 
@@ -123,8 +130,11 @@ def _own_scatter(budget: Budget, factor: float, path: str) -> Budget:
     return tuple(parts)
 
 
-def _spread(capture: Capture, quantity: str) -> float:
-    """The relative standard uncertainty of the method from one capture to the next [1]."""
+def _spread(capture: Capture, quantity: str, warmed: bool) -> float:
+    """The relative standard uncertainty of the method from one capture to the next [1].
+
+    A motor that some test `warmed` may be warm in any other.
+    """
     spreads = policy().capture_spread
     if quantity == "pole_pairs":
         return spreads.count
@@ -138,7 +148,12 @@ def _spread(capture: Capture, quantity: str) -> float:
             else spreads.resistance_temperature_unknown
         )
     elif not any(capture.has(name) for name in TEMPERATURES):
-        spread = spreads.flux_temperature_unknown
+        cold = (
+            spreads.flux_temperature_unpowered
+            if capture.meta.ambient_degc is None
+            else spreads.flux_temperature_known
+        )
+        spread = spreads.flux_temperature_unknown if warmed else cold
     elif capture.meta.test == "torque_map":
         spread = spreads.torque
     else:

@@ -78,7 +78,8 @@ class CaptureSpread:
 
     From one capture to the next the method's own assumptions change: magnets lose 0.11 % of their
     flux a kelvin (NdFeB) and copper gains 0.39 %. An unknown temperature counts as twenty
-    kelvin, a known one as five where the sensor sits elsewhere.
+    kelvin, as ten where no test warms the motor, a known one as five where the sensor sits
+    elsewhere.
     """
 
     flux_temperature_known: float = derived(
@@ -87,6 +88,10 @@ class CaptureSpread:
     flux_temperature_unknown: float = derived(
         0.02, "1", "of flux, temperature unknown: after a load an open winding is warm as well",
         source="20 K of 0.11 % a kelvin",
+    )  # fmt: skip
+    flux_temperature_unpowered: float = derived(
+        0.01, "1", "of flux, temperature unknown, where no test warms the motor",
+        source="10 K of 0.11 % a kelvin",
     )  # fmt: skip
     torque: float = chosen(
         0.01, "1", "of a torque constant between maps of other currents",

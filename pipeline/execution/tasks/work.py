@@ -170,7 +170,7 @@ def disagreements_between_captures(
 
     """
     for captures in (alone.repeated(campaign), campaign.captures):
-        apart = agreement.disagreements(alone.readings(campaign.motor_id, captures, options))
+        apart = agreement.disagreements(alone.readings(campaign, captures, options))
         if not apart:
             return ()
     return apart

@@ -81,7 +81,7 @@ def test_captures_are_alike_by_test_pair_and_height() -> None:
 def test_each_capture_by_itself_gives_what_it_determines() -> None:
     """A step on d says Ld and one on q Lq; neither says the other, and each has its own path."""
     steps = (on_a_scope("d", 12.0, 1, rate_hz=2e4), on_a_scope("q", 12.0, 2, rate_hz=2e4))
-    found = {(r.path, r.quantity): r for r in alone.readings("m", steps, {})}
+    found = {(r.path, r.quantity): r for r in alone.readings(Campaign("m", steps), steps, {})}
     inductances = {k: r for k, r in found.items() if k[1] in ("ld_h", "lq_h")}
     assert set(inductances) == {(steps[0].path, "ld_h"), (steps[1].path, "lq_h")}
     for (_, name), reading in inductances.items():

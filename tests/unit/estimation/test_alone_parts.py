@@ -49,7 +49,13 @@ def test_scatter_of_one_capture_counts_by_its_interval() -> None:
 def test_how_a_method_spreads_from_capture_to_capture(quantity, test, column, meta, expected):
     columns = {} if column is None else {column: np.full(3, 30.0)}
     made = capture(test, t_s=np.arange(3.0), **meta, **columns)
-    assert alone._spread(made, quantity) == expected
+    assert alone._spread(made, quantity, warmed=True) == expected
+
+
+@pytest.mark.parametrize(("ambient", "expected"), [({}, 0.01), ({"ambient_degc": 22.0}, 0.005)])
+def test_an_open_winding_is_cold_where_no_test_warms_the_motor(ambient, expected):
+    made = capture("open_circuit", t_s=np.arange(3.0), **ambient)
+    assert alone._spread(made, "p·psi", warmed=False) == expected
 
 
 def test_what_an_inverter_is_of_a_constant() -> None:

@@ -93,6 +93,7 @@ def test_numbers_that_follow_from_a_source_follow_from_it() -> None:
     assert spread.inverter == pytest.approx(1e-6 * 20e3)
     for share, kelvin in (
         (spread.flux_temperature_known, 5.0),
+        (spread.flux_temperature_unpowered, 10.0),
         (spread.flux_temperature_unknown, 20.0),
     ):
         assert share == pytest.approx(kelvin * abs(DEFAULT.magnet.coefficient_1_k), rel=0.1)
@@ -141,7 +142,7 @@ def test_a_reading_and_the_key_of_a_fit_follow_the_policy() -> None:
     campaign = hand_turn()
     changes = {"policy": {"capture_spread": {"count": 0.004}}}
     plain, wide = (
-        readings("m", campaign.captures, options)[0].u_rel_model for options in ({}, changes)
+        readings(campaign, campaign.captures, options)[0].u_rel_model for options in ({}, changes)
     )
     assert plain == DEFAULT.capture_spread.count
     assert wide == 0.004
