@@ -9,8 +9,10 @@ import polars as pl
 import pytest
 
 from pipeline.criticism.comparison import compare
-from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.data.machine_scale import base_scales, machine_of
 from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.equations.driven_shaft import _across_l
+from pipeline.criticism.machine.model import Model
 from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
@@ -100,6 +102,20 @@ def test_a_winding_that_settles_little_sooner_than_its_shaft_makes_no_other_iner
     true = R_OHM * j_kgm2 / KT
     assert abs(known["ka_v_s2_rad"].value - true) < 2.5 * known["ka_v_s2_rad"].u
     assert known["ka_v_s2_rad"].u < 0.3 * true
+
+
+def test_the_voltage_of_an_inductance_leads_where_the_acceleration_rises() -> None:
+    """v_L = L/R · (R J/Kt) · d³θ/dt³ = 2 ms · kA · 30 rad/s³ of a jerk that is constant."""
+    campaign = log(1, 0.0)
+    machine = machine_of(campaign, Constants({}))
+    assert machine is not None
+    model = Model(machine, ())
+    (segment,) = segments(campaign, machine)
+    bend = 30.0 * segment.ts_s * np.arange(segment.size)
+    scales = base_scales(machine)
+    ka = scales["r_ohm"] * scales["j_kgm2"] / (1.5 * machine.pole_pairs * scales["psi_wb"])
+    volts = _across_l(segment, bend, model, {"electrical_s": 2e-3})
+    assert volts == pytest.approx(2e-3 * ka * 30.0)
 
 
 def test_of_stated_resistance_and_back_emf_the_inertia_follows() -> None:

@@ -148,6 +148,18 @@ def test_what_a_small_effect_explains_is_not_named_after_another():
     assert shadowed.shortfall == "windage explains it as well, and is too small to matter"
 
 
+def test_an_effect_that_ties_with_one_too_small_to_matter_is_not_named():
+    """The captures do not say which of the two it is, and one of them is nothing to act on."""
+    segments = (with_drag(curved(0.1)), with_drag(curved(0.1), 6))
+    twin = replace(effects()["windage"], name="twin")
+    named = search(fitted(segments), {**LIBRARY, "twin": twin})[-1]
+    assert len(named.added) == 1
+    last = search(cautious(segments, 4.0), {**asking_for(0.3), "twin": twin})[-1]
+    assert last.added == ()
+    shadowed = next(s for s in last.scores if s.candidate.effect.name == "twin")
+    assert shadowed.confounder == "windage"
+
+
 def test_windage_is_found_with_its_size():
     def drag(omega, _):
         return 0.03 * omega * np.abs(omega) / 250.0**2
