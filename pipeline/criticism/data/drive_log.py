@@ -73,10 +73,10 @@ def drive_log(capture: Capture, machine: Machine) -> DriveLog | None:
     period, columns, keep = even_clock(capture, (*electrical, *moving), machine.policy.cutting)
     keep &= _on_time(capture, period, keep.size)
     speed = columns.get("omega_mech_rad_s")
-    shaft_angle(columns, period, machine)
+    speed_noise = shaft_angle(columns, period, machine)
     if speed is not None:
         columns["omega_mech_rad_s"] = speed
-    sensors = prepared(columns, period, machine.policy)
+    sensors = prepared(columns, period, machine.policy, speed_noise)
     angle = any("theta" in name for name in moving)
     return DriveLog(period, columns, keep, sensors, speed is not None, angle)
 

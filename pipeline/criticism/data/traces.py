@@ -371,7 +371,7 @@ def with_angle(capture: Capture, names: list[str]) -> list[str]:
     return names
 
 
-def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> None:
+def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> float:
     """Adds the shaft angle to columns, from whatever gives it.
 
     Parameters
@@ -382,11 +382,16 @@ def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> N
     period
         Sample period [s].
     machine
-        Pole pairs.
+        Pole pairs and policy.
+
+    Returns
+    -------
+    float
+        Standard deviation of the noise of a speed that was integrated [rad/s]; 0 of an angle.
 
     """
     if "theta_mech_rad" in columns:
-        return
+        return 0.0
     if "theta_elec_rad" in columns:
         columns["theta_mech_rad"] = columns.pop("theta_elec_rad") / machine.pole_pairs
     elif "omega_mech_rad_s" in columns:
@@ -394,11 +399,15 @@ def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> N
         columns["theta_mech_rad"] = np.concatenate(
             [[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * period]
         )
+        return sensor_noise(speed, machine.policy.sensor_noise)
     else:
         columns["theta_mech_rad"] = np.zeros(next(iter(columns.values())).size)
+    return 0.0
 
 
-def prepared(columns: dict[str, Array], period: float, policy: Policy) -> Sensors:
+def prepared(
+    columns: dict[str, Array], period: float, policy: Policy, speed_noise_rad_s: float = 0.0
+) -> Sensors:
     """Noise, coarse steps and runs of columns.
 
     Parameters
@@ -410,6 +419,8 @@ def prepared(columns: dict[str, Array], period: float, policy: Policy) -> Sensor
         Sample period [s].
     policy
         Constants of judgement.
+    speed_noise_rad_s
+        Of a speed whose integral is the angle (`shaft_angle`).
 
     Returns
     -------
@@ -428,7 +439,7 @@ def prepared(columns: dict[str, Array], period: float, policy: Policy) -> Sensor
         runs = with_travel(columns, noise, policy.cutting)
     if "torque_shaft_nm" in columns:
         columns["behind_nm"] = behind(columns["torque_shaft_nm"], policy.cutting.play_share)
-    return Sensors(noise, steps, runs)
+    return Sensors(noise, steps, runs, speed_noise_rad_s=speed_noise_rad_s)
 
 
 def behind(signal: Array, share: float) -> Array:

@@ -73,7 +73,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     names += ["torque_shaft_nm"] if torque else []
     policy = machine.policy.cutting
     period, columns, keep = even_clock(capture, tuple(names), policy)
-    shaft_angle(columns, period, machine)
+    speed_noise = shaft_angle(columns, period, machine)
     turned = float(np.ptp(columns["theta_mech_rad"]))
     channels: tuple[str, ...] = ("vd_v", "vq_v")
     if torque and turned > policy.turning_rad:
@@ -81,7 +81,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     size = columns["vd_v"].size
     window = window_of(period, size, policy)
     orders = electrical_orders(machine) if angle and turned > policy.turning_rad else ()
-    sensors = evened(capture, columns, prepared(columns, period, machine.policy), machine, window)
+    sensors = evened(
+        capture, columns, prepared(columns, period, machine.policy, speed_noise), machine, window
+    )
     most = policy.windows if capture.meta.test == "torque_map" else policy.windows_drive
     columns["t_s"] = period * np.arange(size, dtype=np.float64)
     logged = capture.meta.test == "drive" and len(channels) > 2

@@ -54,10 +54,12 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     further = [name for name in ("id_a", *SMOOTHED) if capture.has(name)]
     policy = machine.policy.cutting
     period, columns, keep = even_clock(capture, ("iq_a", TORQUE, *further, *angle), policy)
-    shaft_angle(columns, period, machine)
+    speed_noise = shaft_angle(columns, period, machine)
     size = keep.size
     window = window_of(period, size, policy)
-    sensors = evened(capture, columns, prepared(columns, period, machine.policy), machine, window)
+    sensors = evened(
+        capture, columns, prepared(columns, period, machine.policy, speed_noise), machine, window
+    )
     columns["t_s"] = period * np.arange(size, dtype=np.float64)
     cut_out, starts = thinned(columns, keep, window, policy.windows)
     by_angle = "omega_mech_rad_s" not in angle

@@ -91,10 +91,11 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     Notes
     -----
     Noise is added to the recording and the residual computed again; the variance of the change is
-    pooled over the windows. The noise is white, of each sensor's own level; an angle that is
-    rounded, and signals that are coarse, are rounded anew too. The noise of an angle that was
-    smoothed is smoothed alike: what is slow in it stays as it was. What the smoothing changes in
-    the residual counts too: it may have been noise or motion.
+    pooled over the windows. The noise is white, of each sensor's own level; of an angle that is an
+    integrated speed it is a random walk. An angle that is rounded, and signals that are coarse, are
+    rounded anew too. The noise of an angle that was smoothed is smoothed alike: what is slow in it
+    stays as it was. What the smoothing changes in the residual counts too: it may have been noise
+    or motion.
 
     """
     policy = model.policy.noise_floors
@@ -150,8 +151,14 @@ def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
 
 
 def _smoothed(segment: Segment, name: str, normal: Array) -> Array:
-    """Noise of a column from standard normal numbers [n]; that of a smoothed angle is smoothed."""
+    """Noise of a column from standard normal numbers [n]; that of a smoothed angle is smoothed, and
+    that of an integrated speed is a random walk.
+    """
     width = segment.sensors.parabola if name == "theta_mech_rad" else 1
+    speed_noise = segment.sensors.speed_noise_rad_s
+    if name == "theta_mech_rad" and speed_noise:
+        walk = speed_noise * segment.ts_s * np.cumsum(normal)
+        return walk if width == 1 else parabolas(walk, width)
     if width == 1:
         return _white(segment, name) * normal
     smooth = parabolas(normal, width)
