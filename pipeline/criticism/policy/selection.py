@@ -127,7 +127,7 @@ class Selection:
         why="most of it goes",
     )  # fmt: skip
     guess_share: float = chosen(
-        0.2, "1", "share of the held-out error that a trailing step must take beside an unknown",
+        0.2, "1", "share of the held-out error that a further step must take while any is left",
         why="a tenth of heat in a winding looked like skin effect",
     )  # fmt: skip
     companion_share: float = chosen(

@@ -40,28 +40,25 @@ def truncated(
 
     Notes
     -----
-    While anything is left, trailing steps are dropped that 1. captures contradict, where the
-    effects found do not explain what is left; 2. lowered the held-out error by less than
-    `guess_share`, where they do not explain it, unless the step cleared a signal of all waves of
-    the angle; 3. came after the first effect and lowered the held-out error by less than
-    `least_share`, with the same exception. A step stays that takes most of what its own side,
-    winding or shaft, misses in captures held out: a residual of the other side is no evidence
-    against it.
+    While anything is left, trailing steps are dropped that captures contradict, where the effects
+    found do not explain what is left; and those that lowered the held-out error by less than
+    `guess_share`, but for a first effect that explains it. A step stays that cleared a signal of
+    all waves of the angle, or that takes most of what its own side, winding or shaft, misses in
+    captures held out: a residual of the other side is no evidence against it.
 
     """
     policy = steps[0].fit.policy.selection
     for count in range(len(steps), 0, -1):
         kept, system = tuple(steps[:count]), steps[count - 1].system
         remainders = remainder(system)
-        allowed = (1.0 - policy.least_share) * held_out[count - 2].total
-        worse = count > 2 and held_out[count - 1].total > allowed
-        if count == 1 or not remainders or (explained(kept, held_out, remainders) and not worse):
+        before, after = held_out[count - 2].total, held_out[count - 1].total
+        lower = after < (1.0 - policy.guess_share) * before
+        explains = explained(kept, held_out, remainders)
+        if count == 1 or not remainders or (explains and (count == 2 or lower)):
             break
         if contradiction(steps[count - 1]):
             continue
-        if held_out[count - 1].total < (1.0 - policy.guess_share) * held_out[count - 2].total:
-            break
-        if _clears_orders(steps[count - 2].system, system):
+        if lower or _clears_orders(steps[count - 2].system, system):
             break
         if _clears_its_side(steps[count - 2 : count], held_out[count - 2 : count]):
             break
