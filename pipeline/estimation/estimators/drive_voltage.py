@@ -410,11 +410,13 @@ def _moved(
 
     On a free shaft q current goes with acceleration, and R with the lateness of the voltage: what
     little parts them is also what any other error of the model follows. So a nuisance counts
-    unless it is what it stands for: a lateness that drives have, Ke tau dw/dt and p tau w v_d. A
-    voltage that is measured has none.
+    unless it is what it stands for: a lateness that drives have, Ke tau dw/dt and p tau w v_d, of
+    periods of the inverter, however long the rows of a slower log. A voltage that is measured has
+    none.
     """
     commanded = any(c.meta.voltage_kind != "measured" for c in rows.captures)
-    latest = policy().inverter.latest_periods * rows.period_s * commanded
+    held_s = max(hold_s(c.meta, rows.period_s, 0.0) for c in rows.captures)
+    latest = policy().inverter.latest_periods * held_s * commanded
     most = {LATE: abs(float(values[0])) * latest, "turned": pole_pairs * latest}
     moved = np.zeros(len(GIVES))
     for name, size in zip(chosen, values[len(values) - len(chosen) :], strict=True):
