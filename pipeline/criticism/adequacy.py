@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.diagnosis import base_fit, searched
-from pipeline.criticism.effect import Effect
+from pipeline.criticism.effect import Effect, Machine
+from pipeline.criticism.library.friction_parts import friction_parts
 from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.regression.goodness import leave_out, remainder
@@ -76,9 +77,13 @@ def model_verdict(
     diagnosis, fitted = searched(campaign, model, base)
     # instruments that drift count as noise where the verdict says that nothing else is left
     tested = _residuals(base if diagnosis.verdict in ("missing", "unknown") else fitted)
-    named = replace(_named(tested, diagnosis), scales=base.system.fit.machine.scales)
-    library = effects(model.effects_path)
-    named = replace(named, touches=_touches(named.sizes, library))
+    machine, library = base.system.fit.machine, effects(model.effects_path)
+    named = replace(_named(tested, diagnosis), scales=machine.scales)
+    named = replace(
+        named,
+        touches=_touches(named.sizes, library),
+        in_friction=_in_friction(named, library, machine),
+    )
     return _stated(model, named), diagnosis
 
 
@@ -126,6 +131,29 @@ def _touches(sizes: Mapping[str, Parameters], library: Mapping[str, Effect]) -> 
         for name, parameters in sizes.items()
         for constant, words in library[name].touches.items()
     }
+
+
+def _in_friction(
+    named: ModelVerdict, library: Mapping[str, Effect], machine: Machine
+) -> dict[str, Parameters]:
+    """What friction constants contain of the effects that are known of the motor.
+
+    Of an effect that another explains as well, any share from none to all: a half, with the
+    uncertainty of a uniform distribution (GUM 4.3.7).
+    """
+    parts: dict[str, Parameters] = {}
+    for name, parameters in named.sizes.items():
+        if name not in library or not library[name].in_friction:
+            continue
+        whole = friction_parts(library[name], parameters, machine)
+        confused = name in named.missing and named.missing[name].confused_with
+        parts[name] = {n: _any_share(*one) for n, one in whole.items()} if confused else whole
+    return parts
+
+
+def _any_share(value: float | None, u: float | None, unit: str) -> ReportedParameter:
+    whole = value or 0.0
+    return ReportedParameter(whole / 2.0, math.hypot(u or 0.0, whole / math.sqrt(12.0)), unit)
 
 
 def _fitted(diagnosis: Diagnosis) -> dict[str, dict[str, ReportedParameter]]:

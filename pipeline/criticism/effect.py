@@ -683,6 +683,7 @@ class Description:
     `words` is its formula in a line, `signature` what it looks like, `headline` what a person says
     of it, with sizes in braces (`criticism.library.headline`); name and parameters without one.
     `touches`: constants of a datasheet that mean something else where it acts, and what.
+    `in_friction`: whether tests without voltages or d current count its drag as friction.
     """
 
     words: str
@@ -690,6 +691,7 @@ class Description:
     reference: str
     headline: str = ""
     touches: Mapping[str, str] = field(default_factory=dict)
+    in_friction: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

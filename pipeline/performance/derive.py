@@ -31,6 +31,7 @@ from pipeline.performance.sources import (
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
+from pipeline.records.friction import combined
 from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.performance import Blank, Curve, Derived, Operation, Performance
 
@@ -108,7 +109,7 @@ def of_constants(sheet: Datasheet, operation: Operation | None) -> Performance:
     bare = Performance(sheet.motor_id, sheet.version, operation)
     if operation is None:
         return replace(bare, blanks=(NO_CONDITIONS,))
-    sources = sources_of(sheet.constants)
+    sources = sources_of(_with_all_drag(sheet))
     if (blank := missing(sources, ELECTRICAL, "torque_speed", "torque against speed")) is not None:
         return replace(bare, blanks=(blank,))
     winding, magnet = np.array(operation.temp_winding_degc), np.array(operation.temp_magnet_degc)
@@ -365,12 +366,18 @@ def _notes(
 
 def _note_of_model(model: ModelVerdict | None) -> tuple[str, ...]:
     """What the verdict on the model says of the numbers."""
-    if model is not None and model.missing:
-        names = " and ".join(name.replace("_", " ") for name in model.missing)
+    lacking = [] if model is None else [n for n in model.missing if n not in model.in_friction]
+    if lacking:
+        names = " and ".join(name.replace("_", " ") for name in lacking)
         return (f"The model lacks {names}, which is not in these numbers",)
     if model is None or not model.passed:
         return ("The model was not shown to explain the captures: the intervals hold if it does",)
     return ()
+
+
+def _with_all_drag(sheet: Datasheet) -> Mapping[str, Estimate]:
+    """The constants, with iron loss that is known in friction again: all of it brakes."""
+    return sheet.constants if sheet.model is None else combined(sheet.constants, sheet.model)
 
 
 def _at(constants: Mapping[str, Estimate], name: str, condition: str) -> float | None:

@@ -111,6 +111,9 @@ class ModelVerdict(PlainRecord):
     touches
         Constants of a datasheet that mean something else where the effects of `sizes` act, and
         what they are then.
+    in_friction
+        By effect of `sizes`, its part of each friction constant, which is separated from the
+        datasheet's.
 
     """
 
@@ -129,6 +132,7 @@ class ModelVerdict(PlainRecord):
     fitted: Extension[Mapping[str, Parameters]] = field(default_factory=dict)
     scales: Extension[Mapping[str, Spread]] = field(default_factory=dict)
     touches: Extension[Mapping[str, str]] = field(default_factory=dict)
+    in_friction: Extension[Mapping[str, Parameters]] = field(default_factory=dict)
 
     @property
     def sizes(self) -> dict[str, Parameters]:

@@ -30,6 +30,7 @@ EFFECT = Effect(
     tests=("torque_map", "spin_down"),
     experiment="a torque map at two speeds with d current; a spin-down without the magnet",
     headline="eddy currents in the iron, a drag of {drag_nm} at the highest speed",
+    in_friction=True,
     reference="Bertotti, IEEE Trans. Magn. 24 (1988), general properties of power losses",
     parameters=(
         Parameter("drag_nm", "N·m", 0.02, 0.002, "torque_nm", low=0.0, high=1.0),

@@ -25,6 +25,7 @@ EFFECT = Effect(
     tests=("torque_map",),
     experiment="a torque map with d current; a slow turn without the magnet",
     headline="hysteresis of the iron, a drag of {drag_nm}",
+    in_friction=True,
     reference="Bertotti, IEEE Trans. Magn. 24 (1988), general properties of power losses; the "
     "exponent: Steinmetz, Trans. AIEE 9 (1892)",
     parameters=(

@@ -28,6 +28,7 @@ from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
+from pipeline.records.friction import separated
 from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.outcome import Stopwatch
 
@@ -192,7 +193,7 @@ def assemble(job: MotorJob, campaign: Campaign, judged: Judged, stamp: Stamp) ->
 
     """
     references = references_of(campaign, stamp.readings)
-    chosen = _with_notes(judged.constants.chosen(), judged.model)
+    chosen = _with_notes(separated(judged.constants.chosen(), judged.model), judged.model)
     status, why = verdict(
         chosen,
         judged.checks,

@@ -1,0 +1,89 @@
+"""What friction constants contain of the iron's drag, and constants less that part."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from pipeline.criticism.adequacy import _in_friction
+from pipeline.criticism.effect import Machine
+from pipeline.criticism.library.friction_parts import friction_parts
+from pipeline.criticism.library.registry import effects
+from pipeline.records.diagnosis import ReportedParameter
+from pipeline.records.estimate import Estimate
+from pipeline.records.friction import combined, separated
+from pipeline.records.model_verdict import FoundEffect, ModelVerdict
+from pipeline.records.uncertainty import type_b
+
+B, DRY = "b_visc_nm_s_rad", "torque_coulomb_nm"
+HIGHEST_RAD_S = 400.0
+MACHINE = Machine(4, None, {"speed_rad_s": HIGHEST_RAD_S, "period_s": 1e-4, "torque_nm": 2.0})
+EDDY = {
+    "drag_nm": ReportedParameter(0.08, 0.004, "N·m"),
+    "parallel": ReportedParameter(1.0, 0.0, "1"),
+}
+
+
+def viscous(value: float, u: float = 1e-6) -> dict[str, Estimate]:
+    budget = type_b("current@rig", u)
+    return {B: Estimate(B, value, "N·m·s/rad", "measured", "inertia", budget, note="by the drive")}
+
+
+def lacking(*confused: str) -> ModelVerdict:
+    return ModelVerdict("missing", missing={"iron_eddy": FoundEffect(EDDY, "", confused)})
+
+
+def with_parts(model: ModelVerdict) -> ModelVerdict:
+    return replace(model, in_friction=_in_friction(model, effects(None), MACHINE))
+
+
+def test_eddy_currents_are_viscous_and_hysteresis_is_dry() -> None:
+    (part,) = friction_parts(effects(None)["iron_eddy"], EDDY, MACHINE).items()
+    assert part == (B, (pytest.approx(0.08 / 400.0), pytest.approx(0.004 / 400.0), "N·m·s/rad"))
+    dry = {"drag_nm": ReportedParameter(0.03, 0.001, "N·m")}
+    (part,) = friction_parts(effects(None)["iron_hysteresis"], dry, MACHINE).items()
+    assert part == (DRY, (pytest.approx(0.03), pytest.approx(0.001), "N·m"))
+
+
+def test_excess_loss_is_some_of_both() -> None:
+    """√x by least squares of c + m x over 0 to 1: m = 4/5, c = 4/15."""
+    excess = {"excess_nm": ReportedParameter(0.05, 0.0, "N·m")}
+    parts = friction_parts(effects(None)["iron_eddy"], excess, MACHINE)
+    assert parts[B].value == pytest.approx(0.8 * 0.05 / 400.0, rel=2e-2)
+    assert parts[DRY].value == pytest.approx(4.0 / 15.0 * 0.05, rel=2e-2)
+
+
+def test_a_constant_less_its_part_has_the_parts_uncertainty() -> None:
+    model = with_parts(lacking())
+    known = viscous(0.0003)
+    less = separated(known, model)[B]
+    assert less.number == pytest.approx(0.0001)
+    assert less.u == pytest.approx(math.hypot(1e-6, 1e-5))
+    assert less.note.startswith("less 0.0002 N·m·s/rad of iron_eddy; ")
+    again = combined({B: less}, model)[B]
+    assert again.number == pytest.approx(0.0003)
+    assert again.budget == known[B].budget
+
+
+def test_of_a_part_that_another_effect_explains_any_share_is_as_likely() -> None:
+    """Uniform from none to all: its mean and its standard deviation (GUM 4.3.7)."""
+    less = separated(viscous(0.0003), with_parts(lacking("windage")))[B]
+    assert less.number == pytest.approx(0.0002)
+    assert less.u == pytest.approx(math.sqrt(1e-12 + 1e-10 + 0.0002**2 / 12.0))
+
+
+def test_a_part_beyond_the_whole_is_not_taken() -> None:
+    model = with_parts(lacking())
+    known = viscous(0.0001)
+    assert separated(known, model) == known
+    assert combined(known, model) == known
+
+
+def test_other_effects_and_other_constants_stay() -> None:
+    windage = {"loss_nm": ReportedParameter(0.1, 0.01, "N·m")}
+    model = with_parts(ModelVerdict("missing", missing={"windage": FoundEffect(windage)}))
+    assert model.in_friction == {}
+    assert separated({}, with_parts(lacking())) == {}
+    assert ModelVerdict.of(with_parts(lacking()).document()) == with_parts(lacking())
