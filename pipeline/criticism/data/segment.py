@@ -41,7 +41,7 @@ class Sensors:
     parabola
         Samples of the parabola that the angle was smoothed by; 1 for none.
     speed_noise_rad_s
-        Standard deviation of the noise of a speed whose integral is the angle; 0 of a recorded
+        Standard deviation of the noise of a speed whose integral is the angle; None of a recorded
         angle.
 
     """
@@ -51,7 +51,7 @@ class Sensors:
     runs_rad: Array | None = None
     angle_step_rad: float | None = None
     parabola: int = 1
-    speed_noise_rad_s: float = 0.0
+    speed_noise_rad_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -371,7 +371,7 @@ def with_angle(capture: Capture, names: list[str]) -> list[str]:
     return names
 
 
-def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> float:
+def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> float | None:
     """Adds the shaft angle to columns, from whatever gives it.
 
     Parameters
@@ -386,12 +386,12 @@ def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> f
 
     Returns
     -------
-    float
-        Standard deviation of the noise of a speed that was integrated [rad/s]; 0 of an angle.
+    float or None
+        Standard deviation of the noise of a speed that was integrated [rad/s]; None of an angle.
 
     """
     if "theta_mech_rad" in columns:
-        return 0.0
+        return None
     if "theta_elec_rad" in columns:
         columns["theta_mech_rad"] = columns.pop("theta_elec_rad") / machine.pole_pairs
     elif "omega_mech_rad_s" in columns:
@@ -402,11 +402,14 @@ def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> f
         return sensor_noise(speed, machine.policy.sensor_noise)
     else:
         columns["theta_mech_rad"] = np.zeros(next(iter(columns.values())).size)
-    return 0.0
+    return None
 
 
 def prepared(
-    columns: dict[str, Array], period: float, policy: Policy, speed_noise_rad_s: float = 0.0
+    columns: dict[str, Array],
+    period: float,
+    policy: Policy,
+    speed_noise_rad_s: float | None = None,
 ) -> Sensors:
     """Noise, coarse steps and runs of columns.
 

@@ -92,7 +92,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     -----
     Noise is added to the recording and the residual computed again; the variance of the change is
     pooled over the windows. The noise is white, of each sensor's own level; of an angle that is an
-    integrated speed it is a random walk. An angle that is rounded, and signals that are coarse, are
+    integrated speed it is a random walk, from anywhere in the turn: what a model has that goes with
+    the angle is noise there. An angle that is rounded, and signals that are coarse, are
     rounded anew too. The noise of an angle that was smoothed is smoothed alike: what is slow in it
     stays as it was. What the smoothing changes in the residual counts too: it may have been noise
     or motion.
@@ -115,6 +116,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
             name: column + _smoothed(segment, name, generator.normal(size=column.size))
             for name, column in segment.recorded.items()
         }
+        if sensors.speed_noise_rad_s is not None:
+            noisy["theta_mech_rad"] += generator.uniform(0.0, 2.0 * math.pi)
         for name, step in sensors.steps.items():
             noisy[name] += rounding_error(even[name], step, shifts[name][replicate])
         if sensors.angle_step_rad:
@@ -156,7 +159,7 @@ def _smoothed(segment: Segment, name: str, normal: Array) -> Array:
     """
     width = segment.sensors.parabola if name == "theta_mech_rad" else 1
     speed_noise = segment.sensors.speed_noise_rad_s
-    if name == "theta_mech_rad" and speed_noise:
+    if name == "theta_mech_rad" and speed_noise is not None:
         walk = speed_noise * segment.ts_s * np.cumsum(normal)
         return walk if width == 1 else parabolas(walk, width)
     if width == 1:

@@ -7,11 +7,17 @@ import polars as pl
 import pytest
 
 from pipeline.criticism.comparison import compare
+from pipeline.criticism.equations.dq import cut
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.noise_floors import noise_floor, window_gain
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
+from tests.unit.criticism.machines import BASE, machine
 
 DRY_RAD_S2, VISCOUS_1_S = 70.0, 0.25
+CURRENT_A = 10.0
 
 
 def coast(seed: int, noise_rad_s: float, begins_rad_s: float) -> Capture:
@@ -35,3 +41,36 @@ def test_a_speed_s_noise_is_the_floor_of_the_acceleration(noise_rad_s: float) ->
     assert len(errors) >= 3
     for error in errors:
         assert 0.8 < error.rmse / error.noise_floor < 1.25
+
+
+def slow_map(recorded: str) -> Capture:
+    """Three seconds at a hundredth of a turn each, with noise in every column."""
+    random, t_s = np.random.default_rng(4), np.arange(0.0, 3.0, 1e-3)
+    columns = dict.fromkeys(("vd_v", "id_a"), np.zeros(t_s.size))
+    columns |= dict.fromkeys(("vq_v", "iq_a"), np.full(t_s.size, CURRENT_A))
+    noisy = {name: one + random.normal(0.0, 1e-3, t_s.size) for name, one in columns.items()}
+    motion = {"theta_mech_rad": 0.1 * t_s, "omega_mech_rad_s": np.full(t_s.size, 0.1)}
+    moved = motion[recorded] + random.normal(0.0, 1e-5, t_s.size)
+    meta = CaptureMeta("m", "torque_map", pole_pairs=7)
+    table = pl.DataFrame({"t_s": t_s, **noisy, recorded: moved})
+    return Capture("map.csv", "1", "verified", meta, (table,))
+
+
+def test_what_goes_with_the_angle_is_noise_where_no_angle_is_recorded() -> None:
+    """A slow log of voltages holds a wave of two a turn, whose phase nothing tells."""
+    floors = {}
+    for recorded in ("theta_mech_rad", "omega_mech_rad_s"):
+        segment = cut(slow_map(recorded), machine())
+        assert segment is not None
+        model = Model(machine(), (effects(None)["phase_imbalance"],))
+        uneven = BASE | {"phase_imbalance.cosine": 0.03, "phase_imbalance.sine": 0.0}
+        even = uneven | {"phase_imbalance.cosine": 0.0}
+        floors[recorded] = [
+            float(noise_floor(segment, model, values, 1)[0]) / window_gain(segment)
+            for values in (even, uneven)
+        ]
+    assert floors["theta_mech_rad"][1] == pytest.approx(floors["theta_mech_rad"][0], rel=0.2)
+    # the difference of a wave of 0.03 R i and the same wave somewhere else: its amplitude, as rms
+    wave_v = 0.03 * BASE["r_ohm"] * CURRENT_A
+    assert floors["omega_mech_rad_s"][1] == pytest.approx(wave_v, rel=0.35)
+    assert floors["omega_mech_rad_s"][0] < 0.1 * wave_v
