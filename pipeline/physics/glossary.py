@@ -257,5 +257,20 @@ def has_clock(test: str, columns: frozenset[str]) -> bool:
         Columns that it holds.
 
     """
-    table = test == "resistance" and "t_s" not in columns and not columns.isdisjoint(OHMMETER)
+    table = "t_s" not in columns and of_ohmmeter(test, columns)
     return test not in TESTS_WITHOUT_CLOCK and not table
+
+
+def of_ohmmeter(test: str, columns: frozenset[str]) -> bool:
+    """Whether a capture holds readings of an ohmmeter, and no current that was driven.
+
+    Parameters
+    ----------
+    test
+        Its test.
+    columns
+        Columns that it holds.
+
+    """
+    driven = not columns.isdisjoint(("ia_a", "ib_a", "ic_a"))
+    return test == "resistance" and not columns.isdisjoint(OHMMETER) and not driven

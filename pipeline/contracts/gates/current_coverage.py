@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.requirements import LINE_CURRENTS
 from pipeline.contracts.waveform import Array, noise_of
-from pipeline.physics.glossary import has_clock
+from pipeline.physics.glossary import of_ohmmeter
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
@@ -23,7 +23,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     -----
     By the test, σ being the white noise of the channel and m the option `noise_multiple` [1]:
 
-    - resistance: an ohmmeter's table passes; max |i| > m σ in a line, else refused; one level only
+    - resistance: an ohmmeter's readings pass; max |i| > m σ in a line, else refused; one level only
       warns.
     - current step, torque map: the range of the current > 2 m σ, else refused.
     - heat run: max |i| > m σ, else refused; a rise of the winding below `rise_k` [K] warns.
@@ -43,7 +43,7 @@ def _clear_of_noise(values: Array, reach: float, times: float) -> bool:
 
 
 def _resistance(capture: Capture, options: Mapping[str, float]) -> Passed:
-    if not has_clock(capture.meta.test, capture.columns):
+    if of_ohmmeter(capture.meta.test, capture.columns):
         return Passed()
     currents = _finite(capture, *LINE_CURRENTS)
     times = options["noise_multiple"]

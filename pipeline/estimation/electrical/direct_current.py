@@ -22,9 +22,10 @@ from pipeline.estimation.uncertainty.instruments import (
     temperature_source,
     voltage_source,
 )
-from pipeline.numerics.least_squares import autocorrelation_time
+from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import find_plateaus
-from pipeline.physics.glossary import OHMMETER
+from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.glossary import OHMMETER, of_ohmmeter
 from pipeline.records.capture import Array, Campaign, Capture, CaptureMeta
 
 TEST = "resistance"
@@ -102,40 +103,56 @@ def direct_current_points(
     notes: list[str] = []
     temp_assumed_degc = options["temp_assumed_degc"]
     for index, capture in enumerate(campaign.of(TEST)):
-        if capture.has("temp_winding_degc") and not capture.has("t_s"):
-            points += _of_ohmmeter(capture, index)
-            continue
+        ambient = capture.meta.ambient_degc
+        temp_degc = temp_assumed_degc if ambient is None else ambient
+        meter = of_ohmmeter(TEST, capture.columns)
         pair = pair_of(capture)
-        if pair is None:
+        if pair is None and not meter:
             notes.append(f"{capture.path}: which terminal pair is not stated")
             continue
-        ambient = capture.meta.ambient_degc
         if first_temperature(capture, "winding") is None:
             about = f"ambient ± {policy().magnet.unlogged_k:g} K"
             notes.append(f"{capture.path}: no temp_winding_degc, taken at {about}")
+        if meter:
+            points += _of_ohmmeter(capture, index, temp_degc)
+            continue
         try:
-            points += _points_of(
-                capture, index, pair, temp_assumed_degc if ambient is None else ambient
-            )
+            points += _points_of(capture, index, pair, temp_degc)
         except KeyError:
             notes.append(f"{capture.path}: no voltage and current of pair {pair}")
     largest = max((abs(p.i_a) for p in points), default=0.0)
     return [p for p in points if abs(p.i_a) > options["zero_crossing"] * largest], notes
 
 
-def _of_ohmmeter(capture: Capture, index: int) -> list[Point]:
-    """The rows of an ohmmeter's table, as voltages at one ampere.
+def _of_ohmmeter(capture: Capture, index: int, temp_degc: float) -> list[Point]:
+    """The readings of an ohmmeter, as voltages at one ampere.
 
     Their noise is what they scatter; the meter's gain is that of a voltage over a current.
     """
     points = []
+    logged = first_temperature(capture, "winding") is not None
     for column in (name for name in OHMMETER if capture.has(name)):
-        rows = capture.arrays(column, "temp_winding_degc")
-        for ohm, degc in zip(*rows.values(), strict=True):
-            if math.isfinite(ohm) and math.isfinite(degc):
-                means = float(ohm), 1.0, float(degc)
-                points.append(Point(index, column[1:3], *means, 0.0, 0.0, capture.meta))
+        names = (column, "temp_winding_degc") if logged else (column,)
+        ohms, *temps = capture.arrays(*names).values()
+        degcs = temps[0] if temps else np.full(ohms.size, temp_degc)
+        read = np.isfinite(ohms) & np.isfinite(degcs)
+        u_ohm = _scatter_ohm(ohms[read], degcs[read])
+        for ohm, degc in zip(ohms[read], degcs[read], strict=True):
+            means = float(ohm), 1.0, float(degc)
+            points.append(Point(index, column[1:3], *means, u_ohm, 0.0, capture.meta, logged))
     return points
+
+
+def _scatter_ohm(ohms: Array, degcs: Array) -> float:
+    """Standard deviation of readings about a line against temperature; of two or three, which a
+    line would follow, about copper's.
+    """
+    excess = degcs - 25.0
+    if ohms.size > 3:
+        fit = linear_fit(np.column_stack([np.ones(ohms.size), excess]), ohms)
+        return math.sqrt(float(fit.residuals @ fit.residuals) / fit.dof)
+    factor = 1.0 + COPPER_COEFFICIENT_25_1_K * excess
+    return float(np.std(ohms / factor, ddof=1) * factor.mean()) if ohms.size > 1 else 0.0
 
 
 def captures_of(campaign: Campaign, points: Sequence[Point]) -> tuple[Capture, ...]:

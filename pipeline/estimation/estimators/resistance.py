@@ -217,7 +217,8 @@ def fit_direct_current(
 
 
 def _noise_v(p: Point) -> float:
-    return max(math.hypot(p.u_v, p.v_v / p.i_a * p.u_i), 1e-12 + 1e-9 * abs(p.v_v))
+    # No meter resolves more than a millionth; a smaller weight lets rounding outweigh the prior.
+    return max(math.hypot(p.u_v, p.v_v / p.i_a * p.u_i), 1e-12 + 1e-6 * abs(p.v_v))
 
 
 def _birge(normalised: Array, dof: int) -> float:

@@ -1,4 +1,4 @@
-"""A table of resistance and temperature, as an ohmmeter and a thermometer give it: no clock."""
+"""Resistance as an ohmmeter gives it: a table against temperature, or readings in time."""
 
 from __future__ import annotations
 
@@ -49,3 +49,28 @@ def test_a_table_needs_no_clock_and_no_current_but_a_temperature() -> None:
     cold = capture("resistance", "oven.csv", rab_ohm=np.array([0.7, 0.7, 0.7]))
     with pytest.raises(CaptureError, match="needs temp_winding_degc"):
         validate(cold, {})
+
+
+@pytest.mark.parametrize("warmth", [{"temp_winding_degc": np.full(12, 45.0)}, {}])
+def test_readings_in_time_are_used_as_a_table_is(warmth: dict[str, np.ndarray]) -> None:
+    """A meter with a data logger: the rows have a clock, and no current is recorded."""
+    line_ohm = 2.0 * R25_OHM * (1.0 + ALPHA_1_K * 20.0)
+    ohms = line_ohm * (1.0 + 3e-4 * np.random.default_rng(3).normal(size=12))
+    logged = capture("resistance", "meter.csv", t_s=np.arange(12.0), rab_ohm=ohms, **warmth)
+    assert validate(logged, {})[1] == ()
+    r_phase = estimates(resistance.ESTIMATOR, logged)["r_phase_ohm"]
+    assert abs(r_phase.number - R25_OHM) < 2.0 * r_phase.u
+    if not warmth:  # taken at ambient, within 20 K
+        assert r_phase.u > 0.05 * R25_OHM
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 4, 30])
+def test_rows_at_one_temperature_are_brought_to_25_by_copper(rows: int) -> None:
+    """Readings that scatter at one temperature say nothing of the coefficient."""
+    rng = np.random.default_rng(rows)
+    line_ohm = 2.0 * R25_OHM * (1.0 + ALPHA_1_K * 20.0)
+    columns = {f"r{one}_ohm": line_ohm * (1.0 + 3e-4 * rng.normal(size=rows)) for one in PAIRS}
+    degc = 45.0 + 0.1 * rng.normal(size=rows)
+    table = capture("resistance", "shop.csv", temp_winding_degc=degc, **columns)
+    r_phase = estimates(resistance.ESTIMATOR, table)["r_phase_ohm"]
+    assert abs(r_phase.number - R25_OHM) < 2.0 * r_phase.u < 0.1 * R25_OHM
