@@ -107,13 +107,13 @@ def direct_current_points(
         temp_degc = temp_assumed_degc if ambient is None else ambient
         meter = of_ohmmeter(TEST, capture.columns)
         pair = pair_of(capture)
-        if pair is None and not meter:
+        if not meter and pair is None:
             notes.append(f"{capture.path}: which terminal pair is not stated")
             continue
         if first_temperature(capture, "winding") is None:
             about = f"ambient ± {policy().magnet.unlogged_k:g} K"
             notes.append(f"{capture.path}: no temp_winding_degc, taken at {about}")
-        if meter:
+        if pair is None or meter:
             points += _of_ohmmeter(capture, index, temp_degc)
             continue
         try:
