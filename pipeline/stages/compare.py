@@ -7,6 +7,7 @@ import shlex
 from pathlib import Path
 
 from pipeline.execution.outputs.page_links import links_of, relink
+from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.comparison import Comparison
 from pipeline.records.comparison_history import Earlier, document_of, history_of, with_latest
@@ -42,11 +43,11 @@ def _judge(task: Task) -> Judged:
         output / "comparison" / f"{stem}.json", canonical_json(document := result.document())
     )
     if result.traces:
-        from pipeline.io.recordings.comparison import write_comparison_recording
+        from pipeline.io.recordings.comparison import comparison_bytes
 
         with task.watch.stage("recording"):
             path = output / "recordings" / f"comparison-{stem}.rrd"
-            write_comparison_recording(result, path)
+            write_checksummed(path, comparison_bytes(result))
     with task.watch.stage("page"):
         _write_page(output, result)
     return Judged(comparison_text(result), not result.errors, document, _next(task, result))

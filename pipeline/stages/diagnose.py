@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pipeline.execution.outputs.page_links import links_of, relink
+from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
@@ -40,10 +41,10 @@ def _judge(task: Task) -> Judged:
         effect = output / "diagnosis" / "effects" / f"{result.unknown.effect}.py"
         write_whole(effect, result.unknown.source.encode())
     if result.ladder:
-        from pipeline.io.recordings.ladder import write_ladder_recording
+        from pipeline.io.recordings.ladder import ladder_bytes
 
         with task.watch.stage("recording"):
-            write_ladder_recording(result, output / "recordings" / f"ladder-{stem}.rrd")
+            write_checksummed(output / "recordings" / f"ladder-{stem}.rrd", ladder_bytes(result))
     from pipeline.report.pages.ladder_page import render_ladder
 
     with task.watch.stage("page"):

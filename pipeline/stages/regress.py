@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pipeline.estimation.registry import estimators
 from pipeline.execution.outputs.page_links import LOTS, links_of, relink_index
+from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.diagnoses import read_diagnoses
 from pipeline.io.storage.limits import limits_file, read_limits
@@ -115,9 +116,9 @@ def _write(output: Path, regression: LotRegression) -> tuple[str, ...]:
     }
     for name, content in files.items():
         write_whole(folder / name, content)
-    from pipeline.io.recordings.lots import lots_name, write_lots_recording
+    from pipeline.io.recordings.lots import lots_bytes, lots_name
 
     recording = output / "recordings" / lots_name(regression)
-    write_lots_recording(regression, recording)
+    write_checksummed(recording, lots_bytes(regression))
     relink_index(output)
     return (*((folder / name).as_posix() for name in files), recording.as_posix())

@@ -31,10 +31,10 @@ from pipeline.io.recordings.capture import recording_bytes
 from pipeline.io.recordings.capture_traces import LONG_ROWS
 from pipeline.io.recordings.fleet_columns import SHOWN
 from pipeline.io.recordings.font import RANGES, SINGLE, drawable
-from pipeline.io.recordings.ladder import write_ladder_recording
-from pipeline.io.recordings.lots import lots_name, write_lots_recording
+from pipeline.io.recordings.ladder import ladder_bytes
+from pipeline.io.recordings.lots import lots_bytes, lots_name
 from pipeline.io.recordings.readback import entities, recording_property
-from pipeline.io.recordings.seal import SEAL, seal_of
+from pipeline.io.recordings.seal import SEAL, seal_of, write_checksummed
 from pipeline.io.recordings.viewer import catalogue
 from pipeline.io.recordings.views import MEASURED, MODEL, PALETTE, RESIDUAL
 from pipeline.records.capture import Capture, CaptureMeta
@@ -69,8 +69,8 @@ def output(tmp_path_factory: pytest.TempPathFactory) -> Path:
     words = [f"input={folder / 'in'}", f"output={folder / 'out'}", "report=false", "workers=1"]
     assert main(["run", *words, "registry=null", "diagnose=false"]) == 1
     recordings = folder / "out" / "recordings"
-    write_ladder_recording(make_diagnosis(), recordings / f"ladder-{FAULTY}.rrd")
-    write_lots_recording(make_regression(), recordings / lots_name(make_regression()))
+    write_checksummed(recordings / f"ladder-{FAULTY}.rrd", ladder_bytes(make_diagnosis()))
+    write_checksummed(recordings / lots_name(make_regression()), lots_bytes(make_regression()))
     return folder / "out"
 
 

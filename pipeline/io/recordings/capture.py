@@ -20,11 +20,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING
 
 import numpy as np
+from rerun import RecordingStream
 
-from pipeline.io.recordings.capture_lanes import lines_of, send_lanes, send_lines
+from pipeline.io.recordings.capture_lanes import lanes_of, lines_of, send_lane, send_lines
 from pipeline.io.recordings.capture_maps import ResidualMaps, residual_maps
 from pipeline.io.recordings.capture_traces import (
     capture_traces,
@@ -45,14 +45,12 @@ from pipeline.io.recordings.stream import (
     send_property,
     send_trace,
 )
+from pipeline.io.recordings.views import MODEL, RESIDUAL
 from pipeline.physics.notation import scale_for
 from pipeline.records.capture import Capture
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
-
-if TYPE_CHECKING:
-    from rerun import RecordingStream
 
 MOST_MAPS = 2
 MAP_WORDS = ("speed [rad/s]", "iq [A]")
@@ -84,7 +82,8 @@ def recording_bytes(
     maps = tuple(islice((one for one in drawn if one is not None), MOST_MAPS))
     name = f"{capture.meta.motor_id} {PurePosixPath(capture.path).stem}"
     table = sample_table(traces)
-    shown = Shown(traces, fits, maps, has_lanes(capture), datasheet is not None, table)
+    lanes = lanes_of(capture)
+    shown = Shown(traces, fits, maps, tuple(lanes), datasheet is not None, table)
     with recording(name, identity(capture, datasheet), capture_layout(shown)) as recorded:
         for trace in (*traces, *(fit.trace for fit in fits)):
             send_trace(recorded.stream, trace)
@@ -92,7 +91,8 @@ def recording_bytes(
             send_trace(recorded.stream, table[0])
         for one in maps:
             _send_maps(recorded.stream, one)
-        send_lanes(recorded.stream, capture)
+        for entity, lane in lanes.items():
+            send_lane(recorded.stream, entity, capture, lane)
         send_lines(recorded.stream, capture, lines_of(capture, of_capture, findings))
         _send_properties(recorded.stream, capture)
         if datasheet is not None:
@@ -114,24 +114,7 @@ def identity(capture: Capture, datasheet: Datasheet | None) -> tuple[str, str, s
     return capture.path, capture.sha256, "" if datasheet is None else datasheet.version
 
 
-def has_lanes(capture: Capture) -> tuple[str, ...]:
-    """Entities of the lanes that a capture has.
-
-    Parameters
-    ----------
-    capture
-        The capture.
-
-    """
-    from pipeline.io.recordings.capture_lanes import ASIDE, REGIME, capture_regimes, rows_aside
-
-    lanes = ((REGIME, capture_regimes(capture)), (ASIDE, rows_aside(capture)))
-    return tuple(entity for entity, stretches in lanes if stretches)
-
-
 def _send_maps(stream: RecordingStream, maps: ResidualMaps) -> None:
-    from pipeline.io.recordings.views import MODEL, RESIDUAL
-
     if maps.flat is not None:
         send_map(stream, f"/maps/{maps.signal}", maps.flat, maps.reach)
         send_frame(stream, f"/maps/{maps.signal}", maps.flat, maps.reach, MAP_WORDS)
@@ -140,8 +123,7 @@ def _send_maps(stream: RecordingStream, maps: ResidualMaps) -> None:
     scale = scale_for(max(maps.turn.reach, maps.floor), maps.unit)
     edges = np.degrees(np.array(maps.turn.x.edges))
     shown = np.nan_to_num(maps.turn.mean) / 10.0**scale.exponent
-    width = float(edges[1] - edges[0])
-    send_bars(stream, f"/angle/{maps.signal}", Bars(shown, edges[:-1], width, RESIDUAL))
+    send_bars(stream, f"/angle/{maps.signal}", Bars.between(edges, shown, RESIDUAL))
     most = scale.shown(max(maps.turn.reach, maps.floor))
     send_axis_ends(stream, f"/angle_axis/{maps.signal}", (most, -most), edges[-1])
     if maps.orders.size:
@@ -152,16 +134,7 @@ def _send_maps(stream: RecordingStream, maps: ResidualMaps) -> None:
 
 
 def _send_properties(stream: RecordingStream, capture: Capture) -> None:
-    meta = capture.meta
-    stated = {
-        "motor_id": meta.motor_id,
-        "motor_type": meta.motor_type,
-        "lot": meta.lot,
-        "station": meta.station,
-        "test": meta.test,
-        "started_at": meta.started_at,
-        "file": capture.path,
-        "sha256": capture.sha256,
-        "integrity": capture.integrity,
-    }
-    send_property(stream, "capture", stated)
+    names = ("motor_id", "motor_type", "lot", "station", "test", "started_at")
+    stated = {name: getattr(capture.meta, name) for name in names}
+    of_file = {"file": capture.path, "sha256": capture.sha256, "integrity": capture.integrity}
+    send_property(stream, "capture", stated | of_file)

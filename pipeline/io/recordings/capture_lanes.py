@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
-import polars as pl
+import rerun as rr
 from numpy.typing import NDArray
+from rerun import RecordingStream, TimeColumn
 
 from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.stream import ROW, TIME, nanoseconds
@@ -22,12 +22,10 @@ from pipeline.numerics.regimes import (
     stretches,
 )
 from pipeline.physics.notation import quantity
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
-
-if TYPE_CHECKING:
-    from rerun import RecordingStream, TimeColumn
+from pipeline.views.names import quantity_words, unit_words
 
 REGIME, ASIDE = "/lanes/regime", "/lanes/rows"
 KEPT = "kept"
@@ -127,23 +125,17 @@ def lines_of(
     return messages or [("INFO", "nothing was found in this capture", 0)]
 
 
-def send_lanes(stream: RecordingStream, capture: Capture) -> tuple[str, ...]:
-    """Sends the lanes that hold something; returns their entities.
+def lanes_of(capture: Capture) -> dict[str, tuple[Stretch, ...]]:
+    """The lanes that hold something, by entity.
 
     Parameters
     ----------
-    stream
-        The recording.
     capture
         The capture.
 
     """
-    sent = []
-    for entity, lane in ((REGIME, capture_regimes(capture)), (ASIDE, rows_aside(capture))):
-        if lane:
-            _send_lane(stream, entity, capture, lane)
-            sent.append(entity)
-    return tuple(sent)
+    lanes = {REGIME: capture_regimes(capture), ASIDE: rows_aside(capture)}
+    return {entity: lane for entity, lane in lanes.items() if lane}
 
 
 def send_lines(stream: RecordingStream, capture: Capture, lines: Sequence[Line]) -> None:
@@ -159,8 +151,6 @@ def send_lines(stream: RecordingStream, capture: Capture, lines: Sequence[Line])
         Level, text and row.
 
     """
-    import rerun as rr
-
     rr.send_columns(
         "/findings",
         indexes=[_index(capture, [row for _, _, row in lines])],
@@ -172,11 +162,23 @@ def send_lines(stream: RecordingStream, capture: Capture, lines: Sequence[Line])
     )
 
 
-def _send_lane(
+def send_lane(
     stream: RecordingStream, entity: str, capture: Capture, lane: Sequence[Stretch]
 ) -> None:
-    import rerun as rr
+    """Sends one lane.
 
+    Parameters
+    ----------
+    stream
+        The recording.
+    entity
+        Where it lies.
+    capture
+        Its clock.
+    lane
+        What was from when on.
+
+    """
     names = list(dict.fromkeys(one.state for one in lane))
     style = rr.StateConfiguration(
         values=[drawable(name) for name in names],
@@ -198,8 +200,6 @@ def _finding(finding: Finding) -> str:
 
 
 def _residual(capture: Capture, evidence: Evidence) -> list[Line]:
-    from pipeline.views.names import quantity_words, unit_words
-
     lines: list[Line] = []
     unit = unit_words(evidence.y_name)
     for series in evidence.series:
@@ -219,19 +219,23 @@ def _residual(capture: Capture, evidence: Evidence) -> list[Line]:
 
 
 def _row_at(capture: Capture, t_s: float) -> int:
-    table = capture.tables[0] if capture.tables else pl.DataFrame()
-    if "t_s" not in table.columns or table.height == 0:
-        return 0
-    return int(np.clip(np.searchsorted(table["t_s"].to_numpy(), t_s), 0, table.height - 1))
+    clock = _clock_s(capture)
+    return 0 if clock is None else int(np.clip(np.searchsorted(clock, t_s), 0, clock.size - 1))
 
 
 def _index(capture: Capture, rows: Sequence[int]) -> TimeColumn:
     """Where rows stand on the capture's own index."""
-    import rerun as rr
-
-    table = capture.tables[0] if capture.tables else pl.DataFrame()
-    places: NDArray[np.int64] = np.clip(np.asarray(rows), 0, max(table.height - 1, 0))
-    if "t_s" not in table.columns or table.height == 0:
+    height = capture.tables[0].height if capture.tables else 0
+    places: NDArray[np.int64] = np.clip(np.asarray(rows), 0, max(height - 1, 0))
+    clock = _clock_s(capture)
+    if clock is None:
         return rr.TimeColumn(ROW, sequence=places.tolist())
-    t_s = np.nan_to_num(table["t_s"].to_numpy()[places])
+    t_s = np.nan_to_num(clock[places])
     return rr.TimeColumn(TIME, duration=nanoseconds(t_s).astype("timedelta64[ns]"))
+
+
+def _clock_s(capture: Capture) -> Array | None:
+    """The clock of the main table [s]; None without a clock or without rows."""
+    if not capture.tables or "t_s" not in capture.tables[0].columns or not capture.tables[0].height:
+        return None
+    return capture.tables[0]["t_s"].to_numpy()

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from pipeline.io.recordings.capture_maps import signal_floor
-from pipeline.io.recordings.stream import ROW, Trace, timed
+from pipeline.io.recordings.stream import ROW, Trace, placed, timed
 from pipeline.records.capture import Capture
 from pipeline.records.evidence import Evidence
 
@@ -48,8 +48,7 @@ def capture_traces(capture: Capture) -> Iterator[Trace]:
         if "t_s" in table.columns:
             trace = timed(entity, table["t_s"].to_numpy(), values)
         else:
-            rows = pl.Series(ROW, np.arange(table.height, dtype=np.int64))
-            trace = Trace(entity, ROW, values.insert_column(0, rows))
+            trace = placed(entity, ROW, values)
         identifiers = all(name.isascii() and name.isidentifier() for name in trace.columns)
         yield replace(trace, packed=identifiers and table.height > LONG_ROWS)
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import polars as pl
+import rerun.blueprint as rrb
 from numpy.typing import NDArray
+from rerun.blueprint import Blueprint
 
 from pipeline.io.recordings.capture_maps import ResidualMaps, angle_words
 from pipeline.io.recordings.capture_traces import FitTrace
@@ -33,9 +35,6 @@ from pipeline.io.recordings.views import (
 )
 from pipeline.physics.notation import quantity, scale_for
 from pipeline.views.names import quantity_words, unit_words, with_unit
-
-if TYPE_CHECKING:
-    from rerun.blueprint import Blueprint
 
 MOST_FITS, MOST_GROUPS = 2, 2
 LOUPE_SHARE = 100.0
@@ -242,8 +241,6 @@ def _by_unit(traces: Sequence[Trace], fitted: set[str]) -> dict[str, list[tuple[
 
 
 def _traces_tab(shown: Shown, plans: Sequence[ViewPlan]) -> Any:
-    import rerun.blueprint as rrb
-
     rows: list[Any] = [time_view(plan) for plan in plans]
     shares = [plan.share for plan in plans]
     if shown.lanes:
@@ -269,8 +266,6 @@ def _traces_tab(shown: Shown, plans: Sequence[ViewPlan]) -> Any:
 
 
 def _maps_tab(maps: Sequence[ResidualMaps]) -> Any:
-    import rerun.blueprint as rrb
-
     rows = []
     for one in maps:
         scale = scale_for(one.reach, one.unit)
@@ -297,8 +292,6 @@ def _maps_tab(maps: Sequence[ResidualMaps]) -> Any:
 
 
 def _sheet_tab(shown: Shown, name: str) -> Any:
-    import rerun.blueprint as rrb
-
     views: list[Any] = [page_view("/datasheet", "Datasheet")] if shown.datasheet else []
     if shown.table is not None:
         table, step = shown.table
@@ -311,8 +304,6 @@ def _sheet_tab(shown: Shown, name: str) -> Any:
 
 
 def _table_view(trace: Trace, name: str) -> Any:
-    import rerun.blueprint as rrb
-
     query = rrb.archetypes.DataframeQuery(timeline=trace.index)
     return rrb.DataframeView(origin=trace.entity, name=name, query=query)
 

@@ -12,16 +12,16 @@ A recording holds, on the timeline `t` (duration), for every capture that was si
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import polars as pl
+import rerun.blueprint as rrb
 from numpy.typing import NDArray
+from rerun.blueprint import Blueprint
 
 from pipeline.io.recordings.capture_views import LOUPE_SHARE, round_s
 from pipeline.io.recordings.datasheet_page import plain
-from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
     TIME,
     recording,
@@ -51,31 +51,9 @@ from pipeline.records.comparison import Comparison, Trace
 from pipeline.views.comparison import KINDS, comparison_view
 from pipeline.views.names import with_unit
 
-if TYPE_CHECKING:
-    from rerun.blueprint import Blueprint
-
 MOST_POINTS = 4000
 MOST_LOUPES = 2
 """Signals of a capture that have a loupe: those farthest over their noise floors."""
-
-
-def write_comparison_recording(result: Comparison, path: Path) -> None:
-    """Writes the comparison of one motor as a recording.
-
-    Parameters
-    ----------
-    result
-        The comparison.
-    path
-        The .rrd file.
-
-    Raises
-    ------
-    MachineError
-        The disk refuses.
-
-    """
-    write_checksummed(path, comparison_bytes(result))
 
 
 def comparison_bytes(result: Comparison) -> bytes:
@@ -211,8 +189,6 @@ def loupes(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
 
 def _layout(result: Comparison) -> Blueprint:
     """A tab a capture: equations, free runs, loupes at the cursor; errors in the last tab."""
-    import rerun.blueprint as rrb
-
     tabs: list[Any] = []
     for capture in dict.fromkeys(trace.capture for trace in result.traces):
         plans = planned(result, capture)

@@ -7,19 +7,19 @@ its sides; the numbers themselves go beside it as a tensor.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
 from numpy.typing import NDArray
+from rerun import RecordingStream
+from rerun.blueprint import Spatial2DView
 
 from pipeline.io.recordings.font import drawable
-from pipeline.io.recordings.stream import tensor
+from pipeline.io.recordings.stream import send_rows, tensor
 from pipeline.physics.notation import scale_for
 from pipeline.records.error_map import Bins, ErrorMap
-
-if TYPE_CHECKING:
-    from rerun import RecordingStream
-    from rerun.blueprint import Spatial2DView
 
 CELL = 8
 BAR_GAP, BAR_WIDTH = 1.5 * CELL, CELL
@@ -134,17 +134,18 @@ def map_labels(error_map: ErrorMap, reach: float, words: tuple[str, str]) -> Lab
     width, height = CELL * error_map.x.count, CELL * error_map.y.count
     bar = width + BAR_GAP + BAR_WIDTH / 2
     scale = scale_for(reach, error_map.unit)
-    places = [(CELL * place, height + 0.7 * CELL) for place, _ in _ticks(error_map.x)]
-    texts = [text for _, text in _ticks(error_map.x)]
-    places += [(-1.1 * CELL, height - CELL * place) for place, _ in _ticks(error_map.y)]
-    texts += [text for _, text in _ticks(error_map.y)]
-    places += [(width / 2, height + 1.9 * CELL), (0.0, -0.75 * CELL), (bar, -0.75 * CELL)]
-    texts += [words[0], words[1], scale.unit or "1"]
-    full = f"{scale.shown(reach):.3g}"
-    beside = bar + 1.75 * CELL
-    places += [(beside, CELL / 3), (beside, height / 2), (beside, height - CELL / 3)]
-    texts += [f"+{full}", "0", f"-{full}"]
-    return Labels(np.array(places), tuple(texts))
+    beside, full = bar + 1.75 * CELL, f"{scale.shown(reach):.3g}"
+    labels = [
+        *((CELL * place, height + 0.7 * CELL, text) for place, text in _ticks(error_map.x)),
+        *((-1.1 * CELL, height - CELL * place, text) for place, text in _ticks(error_map.y)),
+        (width / 2, height + 1.9 * CELL, words[0]),
+        (0.0, -0.75 * CELL, words[1]),
+        (bar, -0.75 * CELL, scale.unit or "1"),
+        (beside, CELL / 3, f"+{full}"),
+        (beside, height / 2, "0"),
+        (beside, height - CELL / 3, f"-{full}"),
+    ]
+    return Labels(np.array([(x, y) for x, y, _ in labels]), tuple(text for *_, text in labels))
 
 
 def _ticks(bins: Bins) -> list[tuple[float, str]]:
@@ -181,21 +182,19 @@ def send_map(
         A timeline and a place on it; None for all times.
 
     """
-    import rerun as rr
-
     picture = map_picture(error_map, reach)
     if at is None:
         stream.log(f"{entity}/picture", rr.Image(picture), static=True)
         stream.log(f"{entity}/values", rr.Tensor(error_map.mean), static=True)
         return
-    index = [rr.TimeColumn(at[0], sequence=[at[1]])]
+    timeline, place = at
     shape = rr.encodings.ImageFormat(
         width=picture.shape[1], height=picture.shape[0], color_model="RGB", channel_datatype="U8"
     )
     columns = rr.Image.columns(buffer=[picture.tobytes()], format=[shape])
-    rr.send_columns(f"{entity}/picture", indexes=index, columns=columns, recording=stream)
+    send_rows(stream, f"{entity}/picture", timeline, [place], columns)
     values = rr.Tensor.columns(data=tensor(error_map.mean))
-    rr.send_columns(f"{entity}/values", indexes=index, columns=values, recording=stream)
+    send_rows(stream, f"{entity}/values", timeline, [place], values)
 
 
 def send_frame(
@@ -217,8 +216,6 @@ def send_frame(
         Names of x and y.
 
     """
-    import rerun as rr
-
     labels = map_labels(error_map, reach, words)
     points = rr.Points2D(
         labels.places,
@@ -248,8 +245,6 @@ def map_view(entity: str, error_map: ErrorMap, name: str) -> Spatial2DView:
         Of the view.
 
     """
-    import rerun.blueprint as rrb
-
     rows, columns = error_map.mean.shape
     bounds: Any = rrb.VisualBounds2D(
         x_range=(-3.0 * CELL, CELL * columns + BAR_GAP + BAR_WIDTH + 3.8 * CELL),

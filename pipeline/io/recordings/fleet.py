@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import rerun.blueprint as rrb
+from rerun.blueprint import Blueprint
+from rerun.blueprint.table import TableBlueprint
 
 from pipeline.io.recordings.fleet_columns import APPLICATION, CAPTURE, SHOWN, STEPS_A_CAPTURE
 from pipeline.io.recordings.stream import ROW
@@ -24,10 +28,6 @@ from pipeline.io.recordings.views import (
 )
 from pipeline.views.names import quantity_words
 
-if TYPE_CHECKING:
-    from rerun.blueprint import Blueprint
-    from rerun.blueprint.table import TableBlueprint
-
 PREVIEW_REACH = 2.0
 MOTOR = "property:motor"
 
@@ -43,8 +43,6 @@ def motor_layout(signals: Sequence[str], captures: int) -> Blueprint:
         How many captures there is room for.
 
     """
-    import rerun.blueprint as rrb
-
     colours = (RESIDUAL, *PALETTE[1:], MODEL, MEASURED)
     lines = tuple(
         Line(f"/overview/{name}", "percent", quantity_words(name), colours[place % len(colours)])
@@ -91,8 +89,6 @@ def table_layout(captures: int) -> TableBlueprint:
         How many captures the previews have room for.
 
     """
-    import rerun.blueprint as rrb
-
     table = rrb.table
     preview = table.PreviewCell(
         rrb.TimeSeriesView(

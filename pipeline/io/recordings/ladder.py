@@ -15,11 +15,13 @@ In the viewer it has one workspace a signal, and one for all.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun import RecordingStream
+from rerun.blueprint import Blueprint
 
 from pipeline.io.recordings.datasheet_page import plain
 from pipeline.io.recordings.error_map import map_view, send_frame, send_map
@@ -31,8 +33,14 @@ from pipeline.io.recordings.ladder_scales import (
     error_scale,
     map_reach,
 )
-from pipeline.io.recordings.seal import write_checksummed
-from pipeline.io.recordings.stream import Bars, recording, send_axis_ends, send_bars, send_property
+from pipeline.io.recordings.stream import (
+    Bars,
+    recording,
+    send_axis_ends,
+    send_bars,
+    send_property,
+    send_rows,
+)
 from pipeline.io.recordings.views import (
     MEASURED,
     MODEL,
@@ -48,30 +56,7 @@ from pipeline.records.diagnosis import Diagnosis
 from pipeline.views.ladder import CURRENT, SPEED, LadderView, angle_of, ladder_view, mapped_signals
 from pipeline.views.names import quantity_words
 
-if TYPE_CHECKING:
-    from rerun import RecordingStream
-    from rerun.blueprint import Blueprint
-
 WORDS = ("speed [rad/s]", "iq [A]")
-
-
-def write_ladder_recording(result: Diagnosis, path: Path) -> None:
-    """Writes the search of one motor as a recording.
-
-    Parameters
-    ----------
-    result
-        The diagnosis.
-    path
-        The .rrd file.
-
-    Raises
-    ------
-    MachineError
-        The disk refuses.
-
-    """
-    write_checksummed(path, ladder_bytes(result))
 
 
 def ladder_bytes(result: Diagnosis) -> bytes:
@@ -97,26 +82,15 @@ def ladder_bytes(result: Diagnosis) -> bytes:
     return recorded.content
 
 
-def _send(stream: RecordingStream, entity: str, steps: Sequence[int], columns: Any) -> None:
-    import rerun as rr
-
-    index = rr.TimeColumn(TIMELINE, sequence=list(steps))
-    rr.send_columns(entity, indexes=[index], columns=columns, recording=stream)
-
-
 def _send_sheets(stream: RecordingStream, result: Diagnosis) -> None:
-    import rerun as rr
-
     pages = [drawable(step_markdown(result, place)) for place in range(len(result.ladder))]
     kinds = [rr.MediaType.MARKDOWN] * len(pages)
-    steps = range(len(pages))
-    _send(stream, "/sheet", steps, rr.TextDocument.columns(text=pages, media_type=kinds))
+    columns = rr.TextDocument.columns(text=pages, media_type=kinds)
+    send_rows(stream, "/sheet", TIMELINE, range(len(pages)), columns)
 
 
 def _send_errors(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
     """Bars that grow with the step, and the same over the noise floor as a line."""
-    import rerun as rr
-
     scale = error_scale(result, signal)
     errors = [step.errors[signal] for step in result.ladder]
     rmse = np.array([scale.shown(error.rmse) for error in errors])
@@ -127,9 +101,8 @@ def _send_errors(stream: RecordingStream, result: Diagnosis, signal: str) -> Non
             shown = np.where(places <= step, values, 0.0)
             bars = Bars(shown, places, 0.7, colour)
             send_bars(stream, f"/{entity}/{signal}", bars, (TIMELINE, step))
-    over = rmse / np.maximum(floor, 1e-300)
-    columns = rr.Scalars.columns(scalars=over)
-    _send(stream, f"/over/{signal}", range(rmse.size), columns)
+    columns = rr.Scalars.columns(scalars=rmse / np.maximum(floor, 1e-300))
+    send_rows(stream, f"/over/{signal}", TIMELINE, range(rmse.size), columns)
 
 
 def _send_maps(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
@@ -144,8 +117,7 @@ def _send_maps(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
         if turn is not None:
             edges = np.degrees(np.array(turn.x.edges))
             shown = np.nan_to_num(turn.mean) / 10.0 ** angle_scale(result, signal).exponent
-            width = float(edges[1] - edges[0])
-            bars = Bars(shown, edges[:-1], width, RESIDUAL)
+            bars = Bars.between(edges, shown, RESIDUAL)
             send_bars(stream, f"/angle/{signal}", bars, (TIMELINE, place))
 
 
@@ -161,8 +133,7 @@ def _send_spread(stream: RecordingStream, result: Diagnosis, signal: str) -> Non
             if spread.signal == signal:
                 edges = np.array(spread.edges)
                 share = 100.0 * np.array(spread.count) / max(sum(spread.count), 1)
-                width = float(edges[1] - edges[0])
-                bars = Bars(share, edges[:-1], width, MEASURED)
+                bars = Bars.between(edges, share, MEASURED)
                 send_bars(stream, f"/spread/{signal}", bars, (TIMELINE, place))
 
 
@@ -243,8 +214,6 @@ def _page() -> Any:
 
 
 def _workspace(result: Diagnosis, signal: str) -> Any:
-    import rerun.blueprint as rrb
-
     named = quantity_words(signal)
     unit, over = error_scale(result, signal).unit, angle_scale(result, signal).unit
     flat = result.ladder[0].map_of(signal, SPEED, CURRENT)
@@ -282,9 +251,6 @@ def _workspace(result: Diagnosis, signal: str) -> Any:
 
 
 def _overview(signals: tuple[str, ...]) -> Any:
-    import rerun as rr
-    import rerun.blueprint as rrb
-
     lines: dict[Any, Any] = {
         f"/over/{signal}": rr.SeriesLines(
             names=quantity_words(signal), colors=PALETTE[place % len(PALETTE)], widths=2.5

@@ -17,11 +17,13 @@ timeline serves every view at once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import polars as pl
+import rerun.blueprint as rrb
+from rerun import RecordingStream
+from rerun.blueprint import Blueprint
 
 from pipeline.io.recordings.datasheet_page import plain
 from pipeline.io.recordings.font import drawable, in_headings
@@ -37,10 +39,9 @@ from pipeline.io.recordings.lots_traces import (
     histogram,
     leading_order,
 )
-from pipeline.io.recordings.seal import write_checksummed
 from pipeline.io.recordings.stream import (
     Bars,
-    Trace,
+    placed,
     recording,
     send_bars,
     send_page,
@@ -67,10 +68,6 @@ from pipeline.records.naming import file_stem
 from pipeline.views.lots import ConstantRow, compared, lot_view
 from pipeline.views.names import quantity_words
 
-if TYPE_CHECKING:
-    from rerun import RecordingStream
-    from rerun.blueprint import Blueprint
-
 DIGITS = 5
 """Significant digits of a constant in the table of motors."""
 MOST_OUTLIERS = 12
@@ -88,25 +85,6 @@ def lots_name(result: LotRegression) -> str:
 
     """
     return f"lots-{file_stem(f'{result.baseline.selector} {result.candidate.selector}')}.rrd"
-
-
-def write_lots_recording(result: LotRegression, path: Path) -> None:
-    """Writes one comparison of lots as a recording with its checksum.
-
-    Parameters
-    ----------
-    result
-        The comparison.
-    path
-        The .rrd file.
-
-    Raises
-    ------
-    MachineError
-        The disk refuses.
-
-    """
-    write_checksummed(path, lots_bytes(result))
 
 
 def lots_bytes(result: LotRegression) -> bytes:
@@ -142,17 +120,15 @@ def lots_bytes(result: LotRegression) -> bytes:
 
 def _send_histograms(stream: RecordingStream, constant: ConstantResult) -> None:
     edges, counts = histogram(constant)
-    width = float(edges[1] - edges[0])
     for side in SIDES:
-        entity = f"/hist/{constant.name}/{side}"
-        send_bars(stream, entity, Bars(counts[side], edges[:-1], width, COLOURS[side]))
+        bars = Bars.between(edges, counts[side], COLOURS[side])
+        send_bars(stream, f"/hist/{constant.name}/{side}", bars)
 
 
 def _send_drift(stream: RecordingStream, constant: ConstantResult) -> None:
     moving = drift(constant)
     if moving is not None:
-        index = pl.Series(PLACE, np.arange(moving.height, dtype=np.int64))
-        send_trace(stream, Trace(f"/drift/{constant.name}", PLACE, moving.insert_column(0, index)))
+        send_trace(stream, placed(f"/drift/{constant.name}", PLACE, moving))
 
 
 def _send_orders(stream: RecordingStream, result: LotRegression) -> None:
@@ -173,7 +149,6 @@ def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
     shown = compared(result)
     motors = {motor.motor_id: motor for one in shown for motor in one.motors}
     ordered = sorted(motors.values(), key=lambda motor: (motor.side, motor.motor_id))
-    place = pl.Series(PLACE, np.arange(len(ordered), dtype=np.int64))
     if not ordered:
         return
     names = {
@@ -181,7 +156,7 @@ def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
         "production_lot": [drawable(motor.lot) for motor in ordered],
         "baseline_or_candidate": [motor.side for motor in ordered],
     }
-    send_trace(stream, Trace(MOTORS, PLACE, pl.DataFrame(names).insert_column(0, place)))
+    send_trace(stream, placed(MOTORS, PLACE, pl.DataFrame(names)))
     for one in shown:
         scale, values = constant_scale(one), {m.motor_id: m.value for m in one.motors}
         column = pl.Series(
@@ -189,8 +164,8 @@ def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
             [values.get(motor.motor_id) for motor in ordered],
             pl.Float64,
         )
-        frame = pl.DataFrame([place, (column / 10.0**scale.exponent).round_sig_figs(DIGITS)])
-        send_trace(stream, Trace(f"{MOTORS}/{one.name}", PLACE, frame))
+        shown_values = pl.DataFrame([(column / 10.0**scale.exponent).round_sig_figs(DIGITS)])
+        send_trace(stream, placed(f"{MOTORS}/{one.name}", PLACE, shown_values))
 
 
 def verdict_markdown(result: LotRegression) -> str:
@@ -260,8 +235,6 @@ def lots_layout(result: LotRegression) -> Blueprint:
         The comparison.
 
     """
-    import rerun.blueprint as rrb
-
     shown = compared(result)
     tabs: list[Any] = [_verdict_tab(result, shown)]
     if shown:
@@ -344,8 +317,6 @@ def cogging_plan(result: LotRegression) -> ViewPlan | None:
 
 
 def _verdict_tab(result: LotRegression, shown: Sequence[ConstantResult]) -> Any:
-    import rerun.blueprint as rrb
-
     pages: list[Any] = [page_view("/verdict", "Verdict")]
     shares = [1.4]
     if shown:

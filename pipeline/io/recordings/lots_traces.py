@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
-from pipeline.io.recordings.stream import Array, Trace
+from pipeline.io.recordings.stream import Array, Trace, placed
 from pipeline.io.recordings.views import BASELINE, CANDIDATE
 from pipeline.physics.notation import Scale, scale_for
 from pipeline.records.lot_constant import ConstantResult, Side
@@ -117,8 +117,7 @@ def band_trace(band: CoggingBand) -> Trace:
     frame = pl.DataFrame({name: v.astype(np.float32) for name, v in columns.items()})
     tenths = np.rint(10.0 * np.degrees(np.array(band.theta_mech_rad))).astype(np.int64)
     first = np.unique(tenths, return_index=True)[1]
-    index = pl.Series(PLACE, tenths[first])
-    return Trace(f"/cogging/{band.side}", PLACE, frame[first.tolist()].insert_column(0, index))
+    return placed(f"/cogging/{band.side}", PLACE, frame[first.tolist()], tenths[first])
 
 
 def leading_order(result: LotRegression) -> int:

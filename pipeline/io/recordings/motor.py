@@ -19,11 +19,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import polars as pl
+import rerun as rr
 from numpy.typing import NDArray
+from rerun import RecordingStream
 
 from pipeline.io.recordings.capture_maps import FULL_COLOUR_SHARE, signal_floor
 from pipeline.io.recordings.capture_traces import first_of_each, own_evidence
@@ -34,23 +36,21 @@ from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.stream import (
     ROW,
     Bars,
-    Trace,
+    placed,
     recording,
     send_bars,
     send_page,
     send_property,
+    send_rows,
     send_trace,
 )
+from pipeline.io.recordings.views import MEASURED, MODEL, RESIDUAL
 from pipeline.numerics.thinning import line_points
 from pipeline.records.capture import Array, Campaign
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
-
-if TYPE_CHECKING:
-    from rerun import RecordingStream
-
 
 POINTS_A_SERIES = 400
 WAVE_CELLS, PREVIEW_PERIODS = 720, 4
@@ -92,17 +92,11 @@ def motor_bytes(
 
     """
     strips = tuple(overview(campaign, evidence))
-    with recording(
-        datasheet.motor_id,
-        (),
-        motor_layout(signals_of(strips), len({strip.capture for strip in strips})),
-        (APPLICATION, segment_id(datasheet)),
-    ) as recorded:
-        send_page(
-            recorded.stream,
-            "/sheet",
-            sheet_markdown(datasheet, KEY_CONSTANTS),
-        )
+    signals = list(dict.fromkeys(strip.signal for strip in strips))
+    layout = motor_layout(signals, len({strip.capture for strip in strips}))
+    ids = APPLICATION, segment_id(datasheet)
+    with recording(datasheet.motor_id, (), layout, ids) as recorded:
+        send_page(recorded.stream, "/sheet", sheet_markdown(datasheet, KEY_CONSTANTS))
         send_page(recorded.stream, "/checks", checks_markdown(datasheet))
         _send_constants(recorded.stream, datasheet)
         _send_overview(recorded.stream, strips, refused=datasheet.status == "refused")
@@ -156,24 +150,9 @@ def overview(campaign: Campaign, evidence: Sequence[Evidence]) -> Iterator[Strip
             span = float(series.x[-1] - series.x[0]) or 1.0
             share = (series.x[rows] - series.x[0]) / span
             places = np.rint((number + share * 0.98) * STEPS_A_CAPTURE).astype(np.int64)
-            yield Strip(path, one.y_name, *_ended(places, percent[rows]))
-
-
-def _ended(places: NDArray[np.int64], values: Array) -> tuple[NDArray[np.int64], Array]:
-    """With a gap after the last value, so that no line is drawn to the next capture."""
-    return np.append(places, places[-1] + 1), np.append(values, np.nan)
-
-
-def signals_of(strips: Sequence[Strip]) -> tuple[str, ...]:
-    """The quantities of an overview, in the order in which they first appear.
-
-    Parameters
-    ----------
-    strips
-        Series of the overview.
-
-    """
-    return tuple(dict.fromkeys(strip.signal for strip in strips))
+            # a gap after the last value, so that no line is drawn to the next capture
+            places, values = np.append(places, places[-1] + 1), np.append(percent[rows], np.nan)
+            yield Strip(path, one.y_name, places, values)
 
 
 def _send_constants(stream: RecordingStream, datasheet: Datasheet) -> None:
@@ -193,21 +172,14 @@ def _send_constants(stream: RecordingStream, datasheet: Datasheet) -> None:
         "method": [e.method for e in estimates],
     }
     frame = pl.DataFrame({k: [drawable(t) for t in v] for k, v in texts.items()})
-    index = pl.Series(ROW, np.arange(len(estimates), dtype=np.int64))
-    table = pl.concat([frame, numbers], how="horizontal").insert_column(0, index)
-    send_trace(stream, Trace("/constants", ROW, table))
+    table = pl.concat([frame, numbers], how="horizontal")
+    send_trace(stream, placed("/constants", ROW, table))
 
 
 def _send_overview(stream: RecordingStream, strips: Sequence[Strip], *, refused: bool) -> None:
-    import rerun as rr
-
-    from pipeline.io.recordings.views import MEASURED, RESIDUAL
-
     for strip in strips:
         frame = pl.DataFrame({"percent": strip.percent.astype(np.float32)})
-        index = pl.Series(CAPTURE, strip.places)
-        trace = Trace(f"/overview/{strip.signal}", CAPTURE, frame.insert_column(0, index))
-        send_trace(stream, trace)
+        send_trace(stream, placed(f"/overview/{strip.signal}", CAPTURE, frame, strip.places))
     if not strips:
         return
     places = np.concatenate([strip.places for strip in strips])
@@ -219,25 +191,20 @@ def _send_overview(stream: RecordingStream, strips: Sequence[Strip], *, refused:
         aggregation_policy=rr.components.AggregationPolicy.MinMax,
     )
     stream.log("/preview/residual", style, static=True)
-    rr.send_columns(
-        "/preview/residual",
-        indexes=[rr.TimeColumn(CAPTURE, sequence=places[order])],
-        columns=rr.Scalars.columns(scalars=percent),
-        recording=stream,
-    )
-    starts = {strip.capture: int(strip.places[0]) for strip in reversed(strips)}
-    rr.send_columns(
-        "/overview_lane",
-        indexes=[rr.TimeColumn(CAPTURE, sequence=list(starts.values()))],
-        columns=rr.StateChange.columns(state=[drawable(_stem(name)) for name in starts]),
-        recording=stream,
-    )
+    columns = rr.Scalars.columns(scalars=percent)
+    send_rows(stream, "/preview/residual", CAPTURE, places[order].tolist(), columns)
+    starts = _starts(strips)
+    states = rr.StateChange.columns(state=[drawable(_stem(name)) for name in starts])
+    send_rows(stream, "/overview_lane", CAPTURE, list(starts.values()), states)
+
+
+def _starts(strips: Sequence[Strip]) -> dict[str, int]:
+    """Where each capture begins in the overview."""
+    return {strip.capture: int(strip.places[0]) for strip in reversed(strips)}
 
 
 def _send_cogging(stream: RecordingStream, evidence: Sequence[Evidence]) -> None:
     """Torque over one turn, both directions averaged so that friction drops out; its orders."""
-    from pipeline.io.recordings.views import MODEL, RESIDUAL
-
     of_cogging = [one for one in evidence if one.estimator == "cogging"]
     for one in of_cogging:
         if one.kind == "bars":
@@ -273,21 +240,14 @@ def _wave(evidence: Evidence) -> tuple[Array, Array]:
 def _send_findings(
     stream: RecordingStream, strips: Sequence[Strip], findings: Sequence[Finding]
 ) -> None:
-    import rerun as rr
-
-    order = {strip.capture: int(strip.places[0]) for strip in reversed(strips)}
-    ordered = sorted(findings)
+    starts, ordered = _starts(strips), sorted(findings)
     lines = [drawable(f"{_stem(f.file)}: {f.message}; {f.remedy} [{f.code}]") for f in ordered]
     levels = ["ERROR" if f.severity == "refused" else "WARN" for f in ordered]
-    places = [order.get(f.file, 0) for f in ordered]
-    rr.send_columns(
-        "/findings",
-        indexes=[rr.TimeColumn(CAPTURE, sequence=places or [0])],
-        columns=rr.TextLog.columns(
-            text=lines or ["no capture was refused or warned of"], level=levels or ["INFO"]
-        ),
-        recording=stream,
+    places = [starts.get(f.file, 0) for f in ordered]
+    columns = rr.TextLog.columns(
+        text=lines or ["no capture was refused or warned of"], level=levels or ["INFO"]
     )
+    send_rows(stream, "/findings", CAPTURE, places or [0], columns)
 
 
 def _send_properties(

@@ -13,17 +13,16 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import polars as pl
+import rerun as rr
 from numpy.typing import NDArray
+from rerun import RecordingStream
+from rerun.blueprint import Blueprint
 
 from pipeline.io.recordings.font import drawable
-
-if TYPE_CHECKING:
-    from rerun import RecordingStream
-    from rerun.blueprint import Blueprint
 
 Array = NDArray[np.float64]
 
@@ -92,8 +91,6 @@ def recording(
         wait for ever.
 
     """
-    import rerun as rr
-
     rr.set_strict_mode(True)
     shown = drawable(name)
     home, recording_id = ids or (application(shown), digest(identity))
@@ -183,6 +180,27 @@ def timed(entity: str, t_s: Array, values: pl.DataFrame) -> Trace:
     return Trace(entity, TIME, finite_values.insert_column(0, index))
 
 
+def placed(
+    entity: str, index: str, values: pl.DataFrame, places: NDArray[np.int64] | None = None
+) -> Trace:
+    """A trace on a timeline of whole numbers.
+
+    Parameters
+    ----------
+    entity
+        Where it lies.
+    index
+        The timeline.
+    values
+        Columns [n].
+    places
+        Where the rows stand [n]; None for 0, 1, ...
+
+    """
+    numbers = np.arange(values.height) if places is None else places
+    return Trace(entity, index, values.insert_column(0, pl.Series(index, numbers, pl.Int64)))
+
+
 def nanoseconds(t_s: Array) -> NDArray[np.int64]:
     """Instants as whole nanoseconds; a float of seconds would lose some.
 
@@ -211,13 +229,34 @@ def send_trace(stream: RecordingStream, trace: Trace) -> None:
         The table.
 
     """
-    import rerun as rr
-
     frame = trace.frame
     if trace.packed:
         frame = frame.select(trace.index, pl.struct(trace.columns).alias(PACK))
     for batch in frame.to_arrow().to_batches(max_chunksize=ROWS_A_CHUNK):
         rr.send_record_batch(batch, stream, index=trace.index, entity_path=trace.entity)
+
+
+def send_rows(
+    stream: RecordingStream, entity: str, timeline: str, places: Sequence[int], columns: Any
+) -> None:
+    """Sends columns whose rows stand at places of a timeline of whole numbers.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    entity
+        Where they lie.
+    timeline
+        Its name.
+    places
+        One a row.
+    columns
+        Of one archetype.
+
+    """
+    index = rr.TimeColumn(timeline, sequence=list(places))
+    rr.send_columns(entity, indexes=[index], columns=columns, recording=stream)
 
 
 def send_page(stream: RecordingStream, entity: str, markdown: str) -> None:
@@ -233,8 +272,6 @@ def send_page(stream: RecordingStream, entity: str, markdown: str) -> None:
         The text.
 
     """
-    import rerun as rr
-
     page = rr.TextDocument(drawable(markdown), media_type=rr.MediaType.MARKDOWN)
     stream.log(entity, page, static=True)
 
@@ -252,8 +289,6 @@ def send_property(stream: RecordingStream, name: str, values: dict[str, Any]) ->
         By key; None is left out.
 
     """
-    import rerun as rr
-
     stated = {key: _drawable(value) for key, value in values.items() if value is not None}
     if stated:
         stream.send_property(name, rr.AnyValues(**stated))
@@ -281,6 +316,22 @@ class Bars:
     width: float
     colour: Colour
 
+    @classmethod
+    def between(cls, edges: Array, values: Array, colour: Colour) -> Bars:
+        """Bars that fill the cells between even edges.
+
+        Parameters
+        ----------
+        edges
+            [B + 1].
+        values
+            Heights [B].
+        colour
+            Of all bars.
+
+        """
+        return cls(values, edges[:-1], float(edges[1] - edges[0]), colour)
+
 
 def send_bars(
     stream: RecordingStream, entity: str, bars: Bars, at: tuple[str, int] | None = None
@@ -299,8 +350,6 @@ def send_bars(
         A timeline and a place on it; None for all times.
 
     """
-    import rerun as rr
-
     if at is None:
         shown = rr.BarChart(bars.values, abscissa=bars.left, color=bars.colour, widths=[bars.width])
         stream.log(entity, shown, static=True)
@@ -311,8 +360,7 @@ def send_bars(
         color=[bars.colour],
         widths=[bars.width],
     )
-    index = rr.TimeColumn(at[0], sequence=[at[1]])
-    rr.send_columns(entity, indexes=[index], columns=columns, recording=stream)
+    send_rows(stream, entity, at[0], [at[1]], columns)
 
 
 def send_axis_ends(
@@ -332,8 +380,6 @@ def send_axis_ends(
         Right edge of the last bar.
 
     """
-    import rerun as rr
-
     step = 0.005 * abs(beyond) or 1.0
     places = [beyond + step * (1 + 2 * place) for place in range(len(ends))]
     widths = [step] * len(places)
@@ -350,8 +396,6 @@ def tensor(values: Array) -> Any:
         The array.
 
     """
-    import rerun as rr
-
     return rr.encodings.TensorData(array=np.ascontiguousarray(values))
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
+
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.blueprint import BarChartView, Blueprint, TextDocumentView, TimeSeriesView
+from rerun.blueprint.components import LinkAxis
+from rerun.blueprint.encodings import ComponentSourceKind, TextLogColumn, VisualizerComponentMapping
 
 from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.stream import PACK, TIME, Colour, Tinted
-
-if TYPE_CHECKING:
-    from rerun.blueprint import BarChartView, Blueprint, TextDocumentView, TimeSeriesView
 
 # Tones that read on a dark and on a light ground.
 MEASURED: Colour = (120, 144, 156)
@@ -69,9 +72,6 @@ def time_view(plan: ViewPlan) -> TimeSeriesView:
         What it shows.
 
     """
-    import rerun.blueprint as rrb
-    from rerun.blueprint.components import LinkAxis
-
     axis_x: Any = rrb.archetypes.TimeAxis(link=LinkAxis.LinkToGlobal)
     ranges: Any = None
     if plan.around_s is not None:
@@ -107,18 +107,12 @@ def rows_axis(rows: int) -> Any:
         How many.
 
     """
-    import rerun as rr
-    import rerun.blueprint as rrb
-
     first, last = (rr.TimeRangeBoundary.absolute(seq=place) for place in (0, max(rows, 1)))
     return rrb.archetypes.TimeAxis(view_range=rr.TimeRange(first, last))
 
 
 def _loupe(around_s: float) -> tuple[Any, Any]:
     """An axis that follows the cursor, and the stretch of data that it needs."""
-    import rerun as rr
-    import rerun.blueprint as rrb
-
     before = rr.TimeRangeBoundary.cursor_relative(seconds=-around_s)
     after = rr.TimeRangeBoundary.cursor_relative(seconds=around_s)
     axis = rrb.archetypes.TimeAxis(view_range=rr.TimeRange(before, after), zoom_lock=True)
@@ -127,9 +121,6 @@ def _loupe(around_s: float) -> tuple[Any, Any]:
 
 def _curve(line: Line) -> Any:
     """A curve of one column; MinMax, since averaging would hide a spike."""
-    import rerun as rr
-    from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
-
     mapping = VisualizerComponentMapping(
         target="Scalars:scalars",
         source_kind=ComponentSourceKind.SourceComponent,
@@ -158,8 +149,6 @@ def bar_view(name: str, *entities: str, legend: bool = False) -> BarChartView:
         Where the bars lie.
 
     """
-    import rerun.blueprint as rrb
-
     return rrb.BarChartView(
         name=drawable(name),
         origin="/",
@@ -179,8 +168,6 @@ def page_view(entity: str, name: str) -> TextDocumentView:
         Of the view.
 
     """
-    import rerun.blueprint as rrb
-
     return rrb.TextDocumentView(origin=entity, name=drawable(name))
 
 
@@ -195,9 +182,6 @@ def findings_view(entity: str, name: str) -> Any:
         Of the view.
 
     """
-    import rerun.blueprint as rrb
-    from rerun.blueprint.encodings import TextLogColumn
-
     columns = [TextLogColumn("LogLevel"), TextLogColumn("Body")]
     return rrb.TextLogView(
         origin=entity,
@@ -219,8 +203,6 @@ def workspace(*tabs: Any, timeline: str | None, panel: Panel = "collapsed") -> B
         The tabs.
 
     """
-    import rerun.blueprint as rrb
-
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
         rrb.TimePanel(state=panel, timeline=timeline, play_state="paused"),
@@ -242,6 +224,4 @@ def stacked(plans: Sequence[ViewPlan], **more: Any) -> Any:
         Further options of the container.
 
     """
-    import rerun.blueprint as rrb
-
     return rrb.Vertical(*map(time_view, plans), row_shares=[p.share for p in plans] or None, **more)

@@ -12,15 +12,16 @@ import polars as pl
 import pytest
 
 from pipeline.io.recordings.comparison import (
+    comparison_bytes,
     entity_of,
     loupes,
     planned,
     table_of,
-    write_comparison_recording,
 )
 from pipeline.io.recordings.error_map import CELL, diverging, map_labels, map_picture
-from pipeline.io.recordings.ladder import step_markdown, write_ladder_recording
+from pipeline.io.recordings.ladder import ladder_bytes, step_markdown
 from pipeline.io.recordings.ladder_scales import error_scale, map_reach
+from pipeline.io.recordings.seal import write_checksummed
 from pipeline.records.comparison import Comparison, SignalError, Trace
 from pipeline.views.ladder import ladder_view, mapped_signals
 from tests.unit.ladders import make_diagnosis, make_map
@@ -39,7 +40,7 @@ def rows(path: Path, entity: str, index: str = "step") -> Iterator[tuple[int, di
 @pytest.fixture(scope="module")
 def ladder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recordings") / "ladder.rrd"
-    write_ladder_recording(make_diagnosis(), path)
+    write_checksummed(path, ladder_bytes(make_diagnosis()))
     return path
 
 
@@ -117,7 +118,7 @@ def test_a_signal_stands_beside_the_model_before_and_after(tmp_path: Path) -> No
     from rerun.chunk import RrdReader
 
     result = make_comparison(added=True)
-    write_comparison_recording(result, tmp_path / "c.rrd")
+    write_checksummed(tmp_path / "c.rrd", comparison_bytes(result))
     stream = RrdReader(str(tmp_path / "c.rrd")).stream()
     chunks = stream.filter(content=entity_of(result.traces[0]), is_static=False)
     back = pl.concat([pl.from_arrow(c.to_record_batch()) for c in chunks]).sort("t")
@@ -141,7 +142,7 @@ def test_equal_work_has_equal_content_and_no_wall_clock(ladder: Path, tmp_path: 
     from rerun.chunk import RrdReader
 
     again = tmp_path / "again.rrd"
-    write_ladder_recording(make_diagnosis(), again)
+    write_checksummed(again, ladder_bytes(make_diagnosis()))
     ids = [RrdReader(str(p)).recordings()[0].recording_id for p in (ladder, again)]
     assert ids[0] == ids[1]
     for chunk in RrdReader(str(ladder)).stream().filter(is_static=False):
@@ -168,7 +169,7 @@ def test_a_comparisons_traces_come_back_with_their_gaps(tmp_path: Path) -> None:
     from rerun.chunk import RrdReader
 
     result = make_comparison()
-    write_comparison_recording(result, tmp_path / "c.rrd")
+    write_checksummed(tmp_path / "c.rrd", comparison_bytes(result))
     trace = result.traces[0]
     assert entity_of(trace) == "/a_drive_0.mcap/free_run/iq_a"
     stream = RrdReader(str(tmp_path / "c.rrd")).stream()

@@ -12,13 +12,13 @@ from pipeline.io.recordings.font import in_headings
 from pipeline.io.recordings.lots import (
     cogging_plan,
     drift_plan,
+    lots_bytes,
     lots_name,
     verdict_markdown,
-    write_lots_recording,
 )
 from pipeline.io.recordings.lots_traces import MOTORS, SIDES, constant_scale, drift, histogram
 from pipeline.io.recordings.readback import entities, recording_property
-from pipeline.io.recordings.seal import verify
+from pipeline.io.recordings.seal import verify, write_checksummed
 from pipeline.views.lots import compared
 from tests.unit.regressions import AFTER, BEFORE, COGGING_NM, make_regression
 
@@ -26,7 +26,7 @@ from tests.unit.regressions import AFTER, BEFORE, COGGING_NM, make_regression
 @pytest.fixture(scope="module")
 def lots(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recordings") / lots_name(make_regression())
-    write_lots_recording(make_regression(), path)
+    write_checksummed(path, lots_bytes(make_regression()))
     return path
 
 
