@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.report.charts.svg import band, line
+
 Array = NDArray[np.float64]
 COLUMN_PX, FEWEST_A_COLUMN, LEAST_HEIGHT_PX = 1.5, 4.0, 8.0
 """Width of a column; samples in one on average and median height, from which on it is dense."""
@@ -53,8 +55,7 @@ def filled(x_px: Array, y_px: Array) -> str:
 
     """
     return "".join(
-        f"{_path(x, top)}L{_path(x[::-1], bottom[::-1])[1:]}Z"
-        for x, top, bottom in _runs(x_px, y_px)
+        band(x.tolist(), top.tolist(), bottom.tolist()) for x, top, bottom in _runs(x_px, y_px)
     )
 
 
@@ -69,7 +70,7 @@ def outlined(x_px: Array, y_px: Array) -> str:
         Places down [n, px].
 
     """
-    return "".join(_path(x, top) + _path(x, bottom) for x, top, bottom in _runs(x_px, y_px))
+    return "".join(line(x, top) + line(x, bottom) for x, top, bottom in _runs(x_px, y_px))
 
 
 def _runs(x_px: Array, y_px: Array) -> Iterator[tuple[Array, Array, Array]]:
@@ -80,7 +81,3 @@ def _runs(x_px: Array, y_px: Array) -> Iterator[tuple[Array, Array, Array]]:
     cuts = np.flatnonzero(np.diff(ends[0]) > GAP_COLUMNS * COLUMN_PX) + 1
     parts = (np.split(one, cuts) for one in ends)
     yield from zip(*parts, strict=True)
-
-
-def _path(x: Array, y: Array) -> str:
-    return "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x.tolist(), y.tolist(), strict=True))

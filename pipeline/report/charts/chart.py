@@ -27,6 +27,7 @@ from pipeline.report.charts.residual import (
     residual_of,
     residual_scale,
 )
+from pipeline.report.charts.svg import text
 from pipeline.report.charts.ticks import x_ticks, y_ticks
 
 Array = NDArray[np.float64]
@@ -181,10 +182,8 @@ def _residual_marks(evidence: Evidence, panel: Panel, scale: ResidualScale) -> I
     if scale.noise is not None:
         lines = "".join(f"M{left:.1f} {y:.1f}H{right:.1f}" for y in (top, bottom))
         yield f'<path class="noise" d="{lines}"/>'
-    yield (
-        f'<text class="scale" x="{right:.1f}" y="{panel.y.end - 7:.1f}">'
-        f"{escape(residual_words(scale, panel.y))}{f', {beyond} beyond' if beyond else ''}</text>"
-    )
+    words = residual_words(scale, panel.y) + (f", {beyond} beyond" if beyond else "")
+    yield text("scale", right, panel.y.end - 7, words)
 
 
 def _drawn(css: str, evidence: Evidence, panel: Panel, series: Series, y: Array, index: int) -> str:
@@ -297,17 +296,18 @@ def _end_labels(series: tuple[Series, ...], panel: Panel) -> list[str]:
         places.append(max(place, places[-1] + LABEL_PITCH) if places else place)
     lift = max(places[-1] - panel.y.start, 0.0) if places else 0.0
     names = _short([one.label for one in series])
+    # a label has its curve's own colour where colours separate the curves
+    fitted = any(one.fitted.size for one in series)
     return [
-        f'<text class="end {_tone(series, index)}" '
-        f'x="{panel.x.end + 6:.1f}" y="{place - lift + 4:.1f}">'
-        f"<title>{escape(series[index].label)}</title>{escape(names[index])}</text>"
+        text(
+            f"end {'plain' if fitted else f't{index % PALETTE}'}",
+            panel.x.end + 6,
+            place - lift + 4,
+            names[index],
+            series[index].label,
+        )
         for place, (_, index) in zip(places, sorted(wanted), strict=True)
     ]
-
-
-def _tone(series: tuple[Series, ...], index: int) -> str:
-    """The colour class of a label: its curve's own where colours separate the curves."""
-    return "plain" if any(one.fitted.size for one in series) else f"t{index % PALETTE}"
 
 
 def _short(labels: Sequence[str]) -> list[str]:

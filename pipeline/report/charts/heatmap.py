@@ -10,8 +10,9 @@ import numpy as np
 
 from pipeline.physics.notation import quantity
 from pipeline.records.error_map import ErrorMap
-from pipeline.report.charts.axis import Axis, axis_for, symmetric_axis
+from pipeline.report.charts.axis import axis_for, symmetric_axis
 from pipeline.report.charts.chart import Panel
+from pipeline.report.charts.svg import picture, text
 from pipeline.report.charts.ticks import x_ticks, y_ticks
 from pipeline.views.names import quantity_words
 
@@ -66,11 +67,16 @@ def heatmap(error_map: ErrorMap, reach: float) -> str:
     frame = f'x="{LEFT:g}" y="{TOP:g}" width="{right - LEFT:g}" height="{HEIGHT:g}"'
     largest = quantity(error_map.reach, error_map.unit, 3)
     words = f"{error_map.signal} over speed and current, largest {largest}"
-    return (
-        f'<svg class="heat" viewBox="0 0 {WIDTH:g} {TOP + HEIGHT + BOTTOM:g}" role="img" '
-        f'aria-label="{escape(words)}"><rect class="gap" {frame}/>'
-        f"{''.join(_cells(error_map, reach, panel))}"
-        f'<rect class="frame" {frame}/>{_ticks(panel)}{_scale_bar(error_map, reach, right)}</svg>'
+    return picture(
+        "heat",
+        WIDTH,
+        TOP + HEIGHT + BOTTOM,
+        words,
+        f'<rect class="gap" {frame}/>',
+        *_cells(error_map, reach, panel),
+        f'<rect class="frame" {frame}/>',
+        _ticks(panel),
+        _scale_bar(error_map, reach, right),
     )
 
 
@@ -93,14 +99,9 @@ def _cells(error_map: ErrorMap, reach: float, panel: Panel) -> Iterator[str]:
 
 def _ticks(panel: Panel) -> str:
     x, y = panel.x, panel.y
-    marks = [x_ticks(x, y.start), y_ticks(y, x.start)]
-    middle = (x.start + x.end) / 2
-    marks.append(
-        f'<text class="title x" x="{middle:.1f}" y="{y.start + 31:.1f}">{escape(x.title)}</text>'
-    )
-    return (
-        "".join(marks) + f'<text class="title" x="2" y="{y.end - 7:.1f}">{escape(y.title)}</text>'
-    )
+    titles = text("title x", (x.start + x.end) / 2, y.start + 31, x.title)
+    titles += text("title", 2, y.end - 7, y.title)
+    return x_ticks(x, y.start) + y_ticks(y, x.start) + titles
 
 
 def _scale_bar(error_map: ErrorMap, reach: float, right: float) -> str:
@@ -112,10 +113,8 @@ def _scale_bar(error_map: ErrorMap, reach: float, right: float) -> str:
         for n in range(-STEPS, STEPS + 1)
     ]
     for value, place in ((reach, TOP + 8), (0.0, TOP + HEIGHT / 2 + 4), (-reach, TOP + HEIGHT)):
-        text = quantity(value, error_map.unit, 2) if value else "0"
-        parts.append(
-            f'<text class="tick" x="{left + BAR + 4:.1f}" y="{place:.1f}">{escape(text)}</text>'
-        )
+        number = quantity(value, error_map.unit, 2) if value else "0"
+        parts.append(text("tick", left + BAR + 4, place, number))
     return "".join(parts)
 
 
@@ -147,16 +146,14 @@ def angle_bars(error_map: ErrorMap, reach: float) -> str:
     )
     turn = "electrical" if error_map.x.variable == "theta_elec_rad" else "mechanical"
     words = f"{quantity_words(error_map.signal)} over the {turn} angle [°]"
-    return (
-        f'<svg class="heat" viewBox="0 0 {WIDTH:g} {TOP + ANGLE_HEIGHT + BOTTOM:g}" role="img" '
-        f'aria-label="{escape(words)}">{_angle_frame(x, y)}'
-        f'<path class="bars residual" d="{marks}"/>'
-        f'<text class="title x" x="{(LEFT + WIDTH - 14) / 2:.1f}" '
-        f'y="{TOP + ANGLE_HEIGHT + 31:.1f}">{turn} angle [°]</text>'
-        f'<text class="title" x="2" y="{TOP - 7:.1f}">mean error [{escape(y.scale.unit)}]</text>'
-        "</svg>"
+    return picture(
+        "heat",
+        WIDTH,
+        TOP + ANGLE_HEIGHT + BOTTOM,
+        words,
+        y_ticks(y, x.start, x.end),
+        x_ticks(x, y.start),
+        f'<path class="bars residual" d="{marks}"/>',
+        text("title x", (LEFT + WIDTH - 14) / 2, TOP + ANGLE_HEIGHT + 31, f"{turn} angle [°]"),
+        text("title", 2, TOP - 7, f"mean error [{y.scale.unit}]"),
     )
-
-
-def _angle_frame(x: Axis, y: Axis) -> str:
-    return y_ticks(y, x.start, x.end) + x_ticks(x, y.start)

@@ -12,6 +12,7 @@ from pipeline.physics.notation import quantity
 from pipeline.records.lot_constant import ConstantResult, LotMean, MotorValue
 from pipeline.records.lot_regression import CoggingBand, OrderLevel
 from pipeline.report.charts.axis import Axis, axis_for, padded
+from pipeline.report.charts.svg import band, line, picture, text
 from pipeline.report.charts.ticks import x_ticks, y_ticks
 
 WIDTH, LEFT, RIGHT, TOP, HEIGHT, BOTTOM = 640.0, 66.0, 12.0, 14.0, 190.0, 40.0
@@ -38,11 +39,7 @@ def lot_chart(constant: ConstantResult) -> str:
         own = [m for m in constant.motors if m.lot == lot.lot and m.side == lot.side]
         body.append(_column(lot, own, constant.unit, middle, min(pitch, 60.0), y))
     body += [_average(constant, y, pitch), _names(constant.lots, pitch)]
-    label = escape(f"{constant.name} by lot")
-    return (
-        f'<svg class="chart lots" viewBox="0 0 {WIDTH:g} {TOP + HEIGHT + BOTTOM:g}" role="img" '
-        f'aria-label="{label}">{"".join(body)}</svg>'
-    )
+    return picture("chart lots", WIDTH, TOP + HEIGHT + BOTTOM, f"{constant.name} by lot", *body)
 
 
 def _range(constant: ConstantResult) -> Axis:
@@ -61,8 +58,7 @@ def _range(constant: ConstantResult) -> Axis:
 
 
 def _grid(y: Axis) -> str:
-    title = f'<text class="title" x="2" y="10">{escape(y.title)}</text>'
-    return y_ticks(y, LEFT, WIDTH - RIGHT) + title
+    return y_ticks(y, LEFT, WIDTH - RIGHT) + text("title", 2, 10, y.title)
 
 
 def _margin(constant: ConstantResult, y: Axis) -> str:
@@ -152,10 +148,7 @@ def _names(lots: Sequence[LotMean], pitch: float) -> str:
             continue
         short = lot.lot if len(lot.lot) <= NAME_CHARS else lot.lot[: NAME_CHARS - 1] + "…"
         place = LEFT + pitch * (index + 0.5)
-        marks.append(
-            f'<text class="tick x" x="{place:.1f}" y="{TOP + HEIGHT + 15:.1f}">'
-            f"<title>{escape(lot.lot)}</title>{escape(short)}</text>"
-        )
+        marks.append(text("tick x", place, TOP + HEIGHT + 15, short, lot.lot))
     return "".join(marks)
 
 
@@ -174,33 +167,22 @@ def cogging_chart(bands: Sequence[CoggingBand], orders: Sequence[OrderLevel]) ->
         return ""
     common = math.gcd(*(level.order for level in orders)) if orders else 1
     window = 2.0 * math.pi / max(common, 1)
-    cut = [int(np.searchsorted(band.theta_mech_rad, window * 1.0001)) for band in bands]
-    low = min(min(band.low_nm[:n]) for band, n in zip(bands, cut, strict=True))
-    high = max(max(band.high_nm[:n]) for band, n in zip(bands, cut, strict=True))
+    cut = [int(np.searchsorted(one.theta_mech_rad, window * 1.0001)) for one in bands]
+    low = min(min(one.low_nm[:n]) for one, n in zip(bands, cut, strict=True))
+    high = max(max(one.high_nm[:n]) for one, n in zip(bands, cut, strict=True))
     x = axis_for("theta_mech_deg", 0.0, math.degrees(window), LEFT, WIDTH - RIGHT, 6)
     y = axis_for("torque_shaft_nm", *padded(low, high), TOP + HEIGHT, TOP, 4)
     body = [_grid(y), x_ticks(x, TOP + HEIGHT)]
-    for band, n in zip(bands, cut, strict=True):
-        css = "t-new" if band.side == "candidate" else "t-old"
-        px = x.pixels(np.degrees(np.array(band.theta_mech_rad[:n]))).tolist()
+    for side, n in zip(bands, cut, strict=True):
+        css = "t-new" if side.side == "candidate" else "t-old"
+        px = x.pixels(np.degrees(np.array(side.theta_mech_rad[:n]))).tolist()
         up, down, mean = (
             y.pixels(np.array(values[:n])).tolist()
-            for values in (band.high_nm, band.low_nm, band.mean_nm)
+            for values in (side.high_nm, side.low_nm, side.mean_nm)
         )
-        outline = [*zip(px, up, strict=True), *zip(px[::-1], down[::-1], strict=True)]
-        body.append(f'<path class="area {css}" d="M{_points(outline)}Z"/>')
-        line = _points(list(zip(px, mean, strict=True)))
-        body.append(f'<path class="mean {css}" d="M{line}"/>')
+        body.append(f'<path class="area {css}" d="{band(px, up, down)}"/>')
+        body.append(f'<path class="mean {css}" d="{line(px, mean)}"/>')
     middle = (LEFT + WIDTH - RIGHT) / 2.0
-    body.append(
-        f'<text class="title x" x="{middle:.1f}" y="{TOP + HEIGHT + 33:.1f}">'
-        "shaft angle [deg]</text>"
-    )
-    return (
-        f'<svg class="chart lots" viewBox="0 0 {WIDTH:g} {TOP + HEIGHT + BOTTOM:g}" role="img" '
-        f'aria-label="cogging torque of both sides">{"".join(body)}</svg>'
-    )
-
-
-def _points(points: Sequence[tuple[float, float]]) -> str:
-    return "L".join(f"{px:.1f} {py:.1f}" for px, py in points)
+    body.append(text("title x", middle, TOP + HEIGHT + 33, "shaft angle [deg]"))
+    words = "cogging torque of both sides"
+    return picture("chart lots", WIDTH, TOP + HEIGHT + BOTTOM, words, *body)

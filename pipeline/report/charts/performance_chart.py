@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.physics.notation import quantity
 from pipeline.records.performance import Curve, MapCell
 from pipeline.report.charts.axis import Axis, axis_for
+from pipeline.report.charts.svg import band, line, picture, text
 from pipeline.report.charts.ticks import x_ticks, y_ticks
 
 WIDTH, LEFT, TOP, HEIGHT, BOTTOM, LEGEND = 560.0, 66.0, 22.0, 230.0, 40.0, 18.0
@@ -46,21 +47,16 @@ def band_chart(curves: Sequence[Curve], y_name: str, regimes: Sequence[str] = ()
         marks += _legend(curves)
     words = f"{', '.join(one.words for one in curves)} over {x.title}"
     height = TOP + HEIGHT + BOTTOM + (LEGEND if len(curves) > 1 else 0.0)
-    return _svg(words, height, [*marks, _titles(x, y)])
+    return picture("heat", WIDTH, height, words, *marks, _titles(x, y))
 
 
 def _band(one: Curve, x: Axis, y: Axis, colour: int) -> str:
     at = x.pixels(np.array(one.x))
     low, high, value = (y.pixels(np.array(v)) for v in (one.low, one.high, one.value))
-    outline = [*zip(at, high, strict=True), *zip(at[::-1], low[::-1], strict=True)]
+    area = band(at.tolist(), high.tolist(), low.tolist())
     return (
-        f'<path class="range r{colour}" d="{_path(outline)}Z"/>'
-        f'<path class="c{colour}" d="{_path(list(zip(at, value, strict=True)))}"/>'
+        f'<path class="range r{colour}" d="{area}"/><path class="c{colour}" d="{line(at, value)}"/>'
     )
-
-
-def _path(points: Sequence[tuple[float, float]]) -> str:
-    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
 
 
 def _changes(one: Curve, regimes: Sequence[str], x: Axis) -> list[str]:
@@ -71,8 +67,7 @@ def _changes(one: Curve, regimes: Sequence[str], x: Axis) -> list[str]:
             place = x.pixel(0.5 * (one.x[k - 1] + one.x[k]))
             marks.append(
                 f'<path class="noise" d="M{place:.1f} {TOP:g}V{TOP + HEIGHT:g}"/>'
-                f'<text class="tick" x="{place + 4:.1f}" y="{TOP + 12:g}">'
-                f"{escape(regimes[k])}</text>"
+                + text("tick", place + 4, TOP + 12, regimes[k])
             )
     return marks
 
@@ -82,8 +77,7 @@ def _legend(curves: Sequence[Curve]) -> list[str]:
     base = TOP + HEIGHT + BOTTOM + 6
     return [
         f'<path class="c{n + 1}" d="M{LEFT + n * step:.1f} {base:.1f}h18"/>'
-        f'<text class="tick" x="{LEFT + n * step + 24:.1f}" y="{base + 4:.1f}">'
-        f"{escape(one.words)}</text>"
+        + text("tick", LEFT + n * step + 24, base + 4, one.words)
         for n, one in enumerate(curves)
     ]
 
@@ -124,13 +118,13 @@ def efficiency_chart(cells: Sequence[MapCell], envelope: Curve | None) -> str:
             f"<title>{escape(_cell_title(c))}</title></rect>"
         )
     if envelope is not None:
-        within = [(w, t) for w, t in zip(envelope.x, envelope.value, strict=True) if t <= top]
-        placed = [(x.pixel(w), y.pixel(t)) for w, t in within]
-        marks.append(f'<path class="ink" d="{_path(placed)}"/>')
+        within = np.array(envelope.value) <= top
+        speeds, peaks = np.array(envelope.x)[within], np.array(envelope.value)[within]
+        marks.append(f'<path class="ink" d="{line(x.pixels(speeds), y.pixels(peaks))}"/>')
     marks += [x_ticks(x, TOP + HEIGHT), y_ticks(y, LEFT), *_scale(low, high, right)]
     best = max(cells, key=lambda c: c.efficiency)
     words = f"efficiency over speed and torque, best {100 * best.efficiency:.1f} %"
-    return _svg(words, TOP + HEIGHT + BOTTOM, [*marks, _titles(x, y, right)])
+    return picture("heat", WIDTH, TOP + HEIGHT + BOTTOM, words, *marks, _titles(x, y, right))
 
 
 def heat_colour(share: float) -> str:
@@ -170,22 +164,9 @@ def _scale(low: float, high: float, right: float) -> list[str]:
         for n in range(STEPS)
     ]
     ends = ((high, TOP + 9.0), (0.5 * (low + high), TOP + HEIGHT / 2 + 4), (low, TOP + HEIGHT))
-    return bars + [
-        f'<text class="tick" x="{left + BAR + 4:.1f}" y="{y:.1f}">{100 * value:.0f} %</text>'
-        for value, y in ends
-    ]
+    return bars + [text("tick", left + BAR + 4, y, f"{100 * value:.0f} %") for value, y in ends]
 
 
 def _titles(x: Axis, y: Axis, right: float = WIDTH - RIGHT) -> str:
-    return (
-        f'<text class="title x" x="{(LEFT + right) / 2:.1f}" y="{TOP + HEIGHT + 32:.1f}">'
-        f"{escape(x.title)}</text>"
-        f'<text class="title" x="2" y="{TOP - 8:.1f}">{escape(y.title)}</text>'
-    )
-
-
-def _svg(words: str, height: float, marks: Sequence[str]) -> str:
-    return (
-        f'<svg class="heat" viewBox="0 0 {WIDTH:g} {height:g}" role="img" '
-        f'aria-label="{escape(words)}">{"".join(marks)}</svg>'
-    )
+    below = text("title x", (LEFT + right) / 2, TOP + HEIGHT + 32, x.title)
+    return below + text("title", 2, TOP - 8, y.title)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from html import escape
 
+from pipeline.report.charts.svg import line, picture, text
 from pipeline.views.names import quantity_words
 
 WIDTH, HEIGHT, LEFT, TOP, BOTTOM = 760.0, 250.0, 56.0, 22.0, 44.0
@@ -53,27 +53,21 @@ def step_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
     for decade in range(math.ceil(low), math.floor(high) + 1):
         place = y(10.0**decade)
         parts.append(f'<path class="grid" d="M{LEFT:g} {place:.1f}H{right:g}"/>')
-        parts.append(
-            f'<text class="tick y" x="{LEFT - 6:g}" y="{place + 4:.1f}">{10.0**decade:g}</text>'
-        )
+        parts.append(text("tick y", LEFT - 6, place + 4, f"{10.0**decade:g}"))
     levels = _levels(names, right - LEFT)
     for step, name in enumerate(names):
-        where = f'x="{x(step):.1f}" y="{bottom + 16 + LABEL_PITCH * (step % levels):.1f}"'
-        parts.append(f'<text class="tick x" {where}>{escape(name)}</text>')
+        parts.append(text("tick x", x(step), bottom + 16 + LABEL_PITCH * (step % levels), name))
     parts += _lines(over, ends, x, y)
     parts += [
-        f'<text class="tick x" x="{x(n):.1f}" y="{bottom - 6:.1f}">↓ {value:.1g}</text>'
+        text("tick x", x(n), bottom - 6, f"↓ {value:.1g}")
         for values in over.values()
         for n, value in enumerate(values)
         if value < LEAST
     ]
-    return (
-        f'<svg class="ladder" viewBox="0 0 {WIDTH:g} {bottom + BOTTOM:g}" role="img" '
-        'aria-label="error over noise floor of every signal, step by step">'
-        f'<text class="title" x="2" y="12">held-out error over noise floor</text>'
-        f'<text class="tick" x="{LEFT + 8:g}" y="{y(1.0) + 14:.1f}">noise floor</text>'
-        f"{''.join(parts)}</svg>"
-    )
+    words = "error over noise floor of every signal, step by step"
+    title = text("title", 2, 12, "held-out error over noise floor")
+    floor = text("tick", LEFT + 8, y(1.0) + 14, "noise floor")
+    return picture("ladder", WIDTH, bottom + BOTTOM, words, title, floor, *parts)
 
 
 def _short(text: str) -> str:
@@ -101,12 +95,9 @@ def _lines(
         places[name] = last
     lift = max(last - TOP - HEIGHT, 0.0)
     for number, (name, values) in enumerate(over.items()):
-        line = "".join(f"{'L' if n else 'M'}{x(n):.1f} {y(v):.1f}" for n, v in enumerate(values))
+        curve = line(map(x, range(len(values))), map(y, values))
         dots = "".join(f"M{x(n):.1f} {y(v):.1f}h0" for n, v in enumerate(values))
         css = f"c{number % COLOURS}"
-        yield f'<path class="{css}" d="{line}"/><path class="{css} dots few" d="{dots}"/>'
-        yield (
-            f'<text class="end t{number % COLOURS}" x="{x(len(values) - 1) + 12:.1f}" '
-            f'y="{places[name] - lift + 4:.1f}"><title>{escape(quantity_words(name))}</title>'
-            f"{escape(words[name])}</text>"
-        )
+        yield f'<path class="{css}" d="{curve}"/><path class="{css} dots few" d="{dots}"/>'
+        end, height = x(len(values) - 1) + 12, places[name] - lift + 4
+        yield text(f"end t{number % COLOURS}", end, height, words[name], quantity_words(name))

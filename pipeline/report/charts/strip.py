@@ -10,6 +10,7 @@ from statistics import median
 
 from pipeline.physics.notation import COVERAGE_FACTOR, reading
 from pipeline.report.charts.axis import Axis, axis_for, padded
+from pipeline.report.charts.svg import text
 from pipeline.report.charts.ticks import x_ticks
 
 WIDTH, LEFT, RIGHT, ROW, TOP, BOTTOM = 340.0, 76.0, 14.0, 24.0, 6.0, 24.0
@@ -68,9 +69,8 @@ def _lot(x: Axis, unit: str, lot: str, members: Sequence[Dot], index: int) -> st
         for place, dot in enumerate(members)
     )
     return (
-        f'<text class="lot" x="4" y="{top + ROW / 2 + 4:.1f}"><title>{escape(lot)}</title>'
-        f"{escape(short)}</text>"
-        f'<path class="median" d="M{middle:.1f} {top + 2:.1f}v{ROW - 4:.1f}"/>{dots}'
+        text("lot", 4, top + ROW / 2 + 4, short, lot)
+        + f'<path class="median" d="M{middle:.1f} {top + 2:.1f}v{ROW - 4:.1f}"/>{dots}'
     )
 
 

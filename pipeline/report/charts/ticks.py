@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.report.charts.axis import Axis
+from pipeline.report.charts.svg import text
 
 
 def x_ticks(x: Axis, below: float, lines: tuple[float, float] | None = None) -> str:
@@ -22,7 +23,7 @@ def x_ticks(x: Axis, below: float, lines: tuple[float, float] | None = None) -> 
     """
     return "".join(
         (f'<path class="grid" d="M{place:.1f} {lines[0]:.1f}V{lines[1]:.1f}"/>' if lines else "")
-        + f'<text class="tick x" x="{place:.1f}" y="{below + 15:.1f}">{label}</text>'
+        + text("tick x", place, below + 15, label)
         for place, label in zip(x.pixels(np.array(x.ticks)).tolist(), x.labels(), strict=True)
     )
 
@@ -42,6 +43,6 @@ def y_ticks(y: Axis, left: float, right: float | None = None) -> str:
     """
     return "".join(
         (f'<path class="grid" d="M{left:.1f} {place:.1f}H{right:.1f}"/>' if right else "")
-        + f'<text class="tick y" x="{left - 5:.1f}" y="{place + 4:.1f}">{label}</text>'
+        + text("tick y", left - 5, place + 4, label)
         for place, label in zip(y.pixels(np.array(y.ticks)).tolist(), y.labels(), strict=True)
     )
