@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.numerics.coasting import coasting_rows
-from pipeline.numerics.integrals import trapezoid
+from pipeline.numerics.shaft_log import shaft_log
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed
 from pipeline.records.capture import Array, Capture
 
@@ -123,7 +123,7 @@ def coast_setups(captures: Sequence[Capture], limits: Limits) -> tuple[Setup, ..
         if group is not None:
             group.append((capture, falls))
             continue
-        ratios.append(_ratio(falls, groups[0][0][1], limits) if groups else 1.0)
+        ratios.append(float(np.median(_ratios(falls, groups[0][0][1], limits))) if groups else 1.0)
         groups.append([(capture, falls)])
     return tuple(
         Setup(tuple(capture for capture, _ in group), ratio)
@@ -149,20 +149,14 @@ def setup_words(setups: Sequence[Setup]) -> str:
 
 
 def _falls(capture: Capture) -> list[Fall]:
-    column = "theta_mech_rad" if capture.has("theta_mech_rad") else "omega_mech_rad_s"
-    if not capture.has("t_s", column):
+    log = shaft_log(capture)
+    if log is None or log.t_s.size < 3 * LEAST_SAMPLES or not (np.diff(log.t_s) > 0.0).all():
         return []
-    data = capture.arrays("t_s", column)
-    fine = np.isfinite(data["t_s"]) & np.isfinite(data[column])
-    t, y = data["t_s"][fine], data[column][fine]
-    if t.size < 3 * LEAST_SAMPLES or not (np.diff(t) > 0.0).all():
-        return []
-    angle = y if column == "theta_mech_rad" else trapezoid(t, y)
     try:
-        speed = smooth_speed(t, angle, max(0.01, 20.0 * float(np.median(np.diff(t)))))
+        speed = smooth_speed(log.t_s, log.theta_rad, max(0.01, 20.0 * log.period_s))
     except ValueError:
         return []
-    return [Fall(sense, t[rows], sense * speed[rows]) for rows, sense in coasting_rows(speed)]
+    return [Fall(sense, log.t_s[rows], sense * speed[rows]) for rows, sense in coasting_rows(speed)]
 
 
 def _both(one: Fall, other: Fall, limits: Limits) -> Array | None:
@@ -190,7 +184,3 @@ def _ratios(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> li
 def _differ(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> bool:
     share = limits.share
     return any(abs(r - 1.0) > share * 0.5 * (r + 1.0) for r in _ratios(falls, others, limits))
-
-
-def _ratio(falls: Sequence[Fall], others: Sequence[Fall], limits: Limits) -> float:
-    return float(np.median(_ratios(falls, others, limits)))

@@ -83,6 +83,26 @@ class WeakRows:
             part = part - np.repeat(means, self.sizes)
         return _sums(part * kernel, self.sizes)
 
+    def clusters(self, length_s: float, capture: int) -> NDArray[np.int64]:
+        """Numbers of the stretches that the windows lie in, other ones in each capture.
+
+        Parameters
+        ----------
+        length_s
+            Of a stretch [s].
+        capture
+            Number of the capture.
+
+        Returns
+        -------
+        array [w] of int
+            One a window.
+
+        """
+        stretch = np.floor((self.centres_s - self.centres_s[0]) / length_s)
+        number: NDArray[np.int64] = stretch.astype(np.int64) + 1_000_000 * capture
+        return number
+
     def noise_gain(self, order: int) -> float:
         """How much white noise of the signal is left in the window averages.
 

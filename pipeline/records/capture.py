@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -294,10 +294,27 @@ class Capture:
         """
         home = self.table_of(*names)
         keep = self.kept(home) if masked else np.ones(self.tables[home].height, dtype=bool)
-        out = {}
-        for name in names:
-            out[name] = self._on_clock(name, home)[keep]
-        return out
+        return {name: self._on_clock(name, home)[keep] for name in names}
+
+    def finite(self, *names: str, needed: Collection[str] = ()) -> dict[str, Array]:
+        """Columns on a common clock, in the rows in which they are finite.
+
+        Parameters
+        ----------
+        *names
+            Names of the glossary.
+        needed
+            Those that must be; empty for all.
+
+        Returns
+        -------
+        dict of array [n]
+            By name.
+
+        """
+        data = self.arrays(*names)
+        finite = np.all([np.isfinite(data[name]) for name in needed or names], axis=0)
+        return {name: column[finite] for name, column in data.items()}
 
     def _on_clock(self, name: str, home: int) -> Array:
         table = self.tables[home]

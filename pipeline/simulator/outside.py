@@ -80,18 +80,13 @@ def _trapezoid(motor: Motor, size: float) -> Motor:
     return _with(motor, volt, torque)
 
 
-def _hot_spot(motor: Motor, size: float) -> Motor:
-    """The winding thermometer sits nearer the iron than the copper."""
-    return replace(motor, thermometer_share=1.0 - 0.3 * size)
-
-
 OUTSIDE: dict[str, Builder] = {
     "eddy_brake": _eddy_brake,
     "tight_spot": _tight_spot,
     "warm_grease": _warm_grease,
     "contact": _contact,
     "trapezoid": _trapezoid,
-    "hot_spot": _hot_spot,
+    "hot_spot": lambda motor, size: replace(motor, thermometer_share=1.0 - 0.3 * size),
 }
 
 

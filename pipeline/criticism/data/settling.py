@@ -9,8 +9,8 @@ import numpy as np
 from pipeline.criticism.data.traces import with_values
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.policy import Policy
-from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.plateaus import noise_about_cubics
+from pipeline.numerics.shaft_log import shaft_log
 from pipeline.numerics.weak_rows import smooth_speed, weak_rows
 from pipeline.records.capture import Capture
 
@@ -66,16 +66,11 @@ def unexplained_voltage(capture: Capture, policy: Policy) -> float | None:
 def _of_log(recorded: Capture, policy: Policy) -> tuple[float, float, float] | None:
     """Unexplained voltage over what acceleration takes, squared, time constant and delay [s]."""
     capture = with_values(recorded)
-    if capture is None or capture.has("iq_a") or not capture.has("t_s", "vq_v"):
+    log = None if capture is None or capture.has("iq_a") else shaft_log(capture, "vq_v")
+    if log is None or log.t_s.size < 2:
         return None
-    names = [n for n in ("theta_mech_rad", "omega_mech_rad_s") if capture.has("t_s", "vq_v", n)]
-    if not names:
-        return None
-    data = capture.arrays("t_s", "vq_v", names[0])
-    finite = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    t_s, volts, theta = (data[name][finite] for name in ("t_s", "vq_v", names[0]))
-    theta = theta if names[0] == "theta_mech_rad" else trapezoid(t_s, theta)
-    width = max(policy.cutting.load_window_s, policy.cutting.load_samples * _period(t_s))
+    t_s, volts, theta = log.t_s, log.data["vq_v"], log.theta_rad
+    width = max(policy.cutting.load_window_s, policy.cutting.load_samples * log.period_s)
     try:
         weak = weak_rows(t_s, width)
         speed = smooth_speed(t_s, theta, width / 8.0)
@@ -109,7 +104,3 @@ def _fitted(design: Array, target: Array) -> tuple[Array, float]:
     coefficients = np.asarray(np.linalg.lstsq(design, target, rcond=None)[0], dtype=np.float64)
     residual = target - design @ coefficients
     return coefficients, float(residual @ residual)
-
-
-def _period(t_s: Array) -> float:
-    return float(np.median(np.diff(t_s))) if t_s.size > 1 else 0.0

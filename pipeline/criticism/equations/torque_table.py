@@ -49,9 +49,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
     """
     names = ("iq_a", TORQUE, *(name for name in _BESIDE if capture.has(name)))
-    columns = capture.arrays(*names)
-    finite = np.all([np.isfinite(column) for column in columns.values()], axis=0)
-    columns = {name: column[finite] for name, column in columns.items()}
+    columns = capture.finite(*names)
     policy = machine.policy.tables
     torque, parts = columns[TORQUE], _parts(columns["iq_a"], policy)
     noise = None if parts is None else _noise(columns, policy.reading)

@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -278,14 +277,10 @@ def _line(error: BaseException, path: Path) -> int | None:
         return error.lineno
     line, trace = None, error.__traceback__
     while trace is not None:
-        if _of(trace) == str(path):
+        if trace.tb_frame.f_code.co_filename == str(path):
             line = trace.tb_lineno
         trace = trace.tb_next
     return line
-
-
-def _of(trace: TracebackType) -> str:
-    return trace.tb_frame.f_code.co_filename
 
 
 def _at(code: Any) -> str:

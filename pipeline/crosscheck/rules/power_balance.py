@@ -83,10 +83,8 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> Array:
     """
     speed = next(name for name in SPEEDS if capture.has(name))
     wanted = (*COLUMNS, speed, *(n for n in ("temp_winding_degc",) if capture.has(n)))
-    data = capture.arrays(*wanted)
-    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    data = {name: column[fine] for name, column in data.items()}
-    if np.count_nonzero(fine) < LEAST_ROWS:
+    data = capture.finite(*wanted)
+    if data["t_s"].size < LEAST_ROWS:
         return np.empty((0, 8))
     i_squared = data["id_a"] ** 2 + data["iq_a"] ** 2
     power = 1.5 * (data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"])

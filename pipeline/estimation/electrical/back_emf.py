@@ -163,9 +163,7 @@ def read_spin(capture: Capture, temp_column: str | None) -> Spin:
     others = [n for n in ("theta_mech_rad", "omega_mech_rad_s") if capture.has(n)]
     if temp_column is not None:
         others.append(temp_column)
-    data = capture.arrays("t_s", *chosen, *others)
-    keep = np.all([np.isfinite(data[n]) for n in ("t_s", *chosen)], axis=0)
-    data = {name: values[keep] for name, values in data.items()}
+    data = capture.finite("t_s", *chosen, *others, needed=("t_s", *chosen))
     channels = tuple(Channel(n, data[n], *chosen[n]) for n in chosen)
     return Spin(
         data["t_s"],

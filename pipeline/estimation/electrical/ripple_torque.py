@@ -158,9 +158,7 @@ def ripple_by_speed(capture: Capture, winding: Winding | None) -> tuple[Array, A
     if winding is None or not capture.has(*NEEDED):
         return blank, blank, blank
     extra = [WARMTH] if capture.has(WARMTH) else []
-    data = capture.arrays(*NEEDED, *extra)
-    finite = np.all([np.isfinite(data[name]) for name in NEEDED], axis=0)
-    data = {name: column[finite] for name, column in data.items()}
+    data = capture.finite(*NEEDED, *extra, needed=NEEDED)
     windows = _windows(winding.pole_pairs * data["theta_mech_rad"])
     each = [r for r in (_ripple(capture, data, rows, winding) for rows in windows) if r is not None]
     each.sort(key=lambda ripple: ripple.omega_mech_rad_s)
@@ -263,11 +261,9 @@ def _torque(
         late *= winding.pole_pairs * omega
         doubts_w += [drop_v * float(np.sqrt(square)), 0.5 * ripple.hold_s * late]
     u = 1.5 * float(np.linalg.norm(doubts_w)) / omega
-    return (
-        (torque, u)
-        if abs(torque) > abs(u)
-        else (0.0, float(np.copysign(np.hypot(torque, u), omega)))
-    )
+    if abs(torque) > abs(u):
+        return torque, u
+    return 0.0, float(np.copysign(np.hypot(torque, u), omega))
 
 
 def _ripple(

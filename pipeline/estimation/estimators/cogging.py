@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -99,9 +100,7 @@ def part_orders(
         bent shaft and an eccentric coupling make them in any motor.
 
     """
-    pairs = known.best("pole_pairs")
-    poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
-    slots_and_poles = {n for n in (poles, campaign.nameplate("slots")) if isinstance(n, int)}
+    slots_and_poles = {*slots_and_pole_pairs(known, campaign)} - {None}
     slow = [line for line in lines if line.order <= 2 and not slots_and_poles & {1, line.order}]
     return [line for line in lines if line not in slow], slow
 
@@ -157,30 +156,35 @@ def peak_orders(
 
 def _teeth(known: Constants, campaign: Campaign) -> list[int]:
     """Slots and poles a turn, as far as they are known."""
-    pairs, slots = known.best("pole_pairs"), campaign.nameplate("slots")
-    poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
-    counts = [slots, 2 * poles if isinstance(poles, int) else None]
-    return [n for n in counts if isinstance(n, int) and n > 1]
+    slots, pairs = slots_and_pole_pairs(known, campaign)
+    return [n for n in (slots or 0, 2 * (pairs or 0)) if n > 1]
+
+
+def slots_and_pole_pairs(known: Constants, campaign: Campaign) -> tuple[int | None, int | None]:
+    """Slots by the nameplate, and pole pairs as measured, else by the nameplate.
+
+    Parameters
+    ----------
+    known
+        Constants so far.
+    campaign
+        Captures of the motor.
+
+    """
+    slots = campaign.nameplate("slots")
+    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    return slots if isinstance(slots, int) else None, pairs
 
 
 def name_orders(lines: Sequence[OrderLine], known: Constants, campaign: Campaign) -> str:
     """What each order found says of the motor, in words."""
-    pairs, slots = known.best("pole_pairs"), campaign.nameplate("slots")
-    p = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
+    slots, pairs = slots_and_pole_pairs(known, campaign)
+    both = [(cogging_order(slots, pairs), " (LCM of slots and poles)")] if slots and pairs else []
+    causes = [*both, (slots, " (slots)"), (2 * (pairs or 0), " (poles)"), (pairs, " (pole pairs)")]
     words = []
     for line in lines[:8]:
-        k = line.order
-        if isinstance(slots, int) and isinstance(p, int) and k % cogging_order(slots, p) == 0:
-            why = " (LCM of slots and poles)"
-        elif isinstance(slots, int) and k % slots == 0:
-            why = " (slots)"
-        elif isinstance(p, int) and k % (2 * p) == 0:
-            why = " (poles)"
-        elif isinstance(p, int) and k % p == 0:
-            why = " (pole pairs)"
-        else:
-            why = ""
-        words.append(f"{k}{why}: {line.amplitude:.3g}")
+        why = next((why for order, why in causes if order and line.order % order == 0), "")
+        words.append(f"{line.order}{why}: {line.amplitude:.3g}")
     return ", ".join(words)
 
 
@@ -206,7 +210,7 @@ def _cogging(
     if sides:
         note += "; sidebands are those of an eccentric encoder and counted to the amplitude"
     peak, u_peak = half_peak_to_peak(peak_orders(lines, spec, _teeth(known, campaign), sides))
-    note += "; " * bool(unstated_note(captures, ("torque",))) + unstated_note(captures, ("torque",))
+    note = "; ".join(filter(None, (note, unstated_note(captures, ("torque",)))))
     dof = min(line.dof for line in lines)
     order = METHOD.measured("cogging_order", leading.order, captures=captures, notes=note)
     return (

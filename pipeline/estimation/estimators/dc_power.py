@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 
 import numpy as np
@@ -52,10 +52,6 @@ EXPERIMENT = (
     "record vdc_v, idc_a, torque_shaft_nm and the speed of a drive at several torques and speeds, "
     "a few seconds each"
 )
-MEANS = (
-    "dc_w", "shaft_w", "torque_nm", "torque2_nm2", "speed_rad_s", "speed2_rad2_s2",
-    "kinetic_rad2_s3", "warm", "torque_noise_nm",
-)  # fmt: skip
 COLUMNS = ("t_s", "vdc_v", "idc_a", "torque_shaft_nm")
 
 
@@ -92,6 +88,9 @@ class Blocks:
     warm: Array
     torque_noise_nm: Array
     capture: NDArray[np.int64]
+
+
+MEANS = tuple(field.name for field in fields(Blocks) if field.name != "capture")
 
 
 def losses(blocks: Blocks, at: Array) -> tuple[Array, Array]:
@@ -167,17 +166,15 @@ def _blocks(capture: Capture, number: int) -> Blocks | None:
     """Means over blocks of a second, ten rows at the least; None of a log with fewer than one."""
     motion = _motion(capture)
     warm = first_temperature(capture, "winding")
-    data = capture.arrays(*COLUMNS, motion, *([warm] if warm else []))
-    finite = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    t_s = data["t_s"][finite]
+    data = capture.finite(*COLUMNS, motion, *([warm] if warm else []))
+    t_s = data["t_s"]
     if t_s.size < 20:
         return None
     size = max(10, round(1.0 / float(np.median(np.diff(t_s)))))
-    omega = data[motion][finite]
-    omega = np.gradient(omega, t_s) if motion == "theta_mech_rad" else omega
-    torque = data["torque_shaft_nm"][finite]
-    degc = data[warm][finite] if warm else np.full(t_s.size, REFERENCE_DEGC)
-    power = data["vdc_v"][finite] * data["idc_a"][finite]
+    omega = np.gradient(data[motion], t_s) if motion == "theta_mech_rad" else data[motion]
+    torque = data["torque_shaft_nm"]
+    degc = data[warm] if warm else np.full(t_s.size, REFERENCE_DEGC)
+    power = data["vdc_v"] * data["idc_a"]
     count = t_s.size // size
     if count < 1:
         return None
@@ -299,8 +296,12 @@ def _moved(
 
 def _thermometer(capture: Capture) -> str:
     """Source of the winding's temperature in a capture."""
-    logged = first_temperature(capture, "winding") is not None
-    return temperature_source(capture.meta) if logged else "assumed:temp_winding_degc"
+    return temperature_source(capture.meta) if _warm(capture) else "assumed:temp_winding_degc"
+
+
+def _warm(capture: Capture) -> bool:
+    """Whether the winding's temperature was logged."""
+    return first_temperature(capture, "winding") is not None
 
 
 def _estimates(
@@ -340,8 +341,9 @@ def _estimates(
             note = f"no more than its uncertainty beside the rest of the losses; {EXPERIMENT}"
             estimates.append(METHOD.missing(name, note))
             continue
-        notes_here = [one for one in (*words, *notes) if one]
-        estimates.append(METHOD.measured(name, float(values[k]), parts, captures, at, notes_here))
+        estimates.append(
+            METHOD.measured(name, float(values[k]), parts, captures, at, [*words, *notes])
+        )
     return tuple(estimates)
 
 
@@ -354,10 +356,6 @@ def _notes(captures: Sequence[Capture], blocks: Blocks, chosen: Sequence[str]) -
         allowed_for(chosen),
         unstated_note(captures, ("voltage", "current", "torque")),
     ]
-
-
-def _warm(capture: Capture) -> bool:
-    return first_temperature(capture, "winding") is not None
 
 
 def _partitions(blocks: Blocks, weights: Array) -> list[Partition]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +34,9 @@ from pipeline.estimation.uncertainty.regimes import (
     signs,
 )
 from pipeline.numerics.clusters import cluster_covariance
-from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns
+from pipeline.numerics.shaft_log import shaft_log
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.records.capture import Array, Campaign, Capture
@@ -142,33 +143,24 @@ def _rows(captures: Sequence[Capture], pole_pairs: int | None) -> VoltageRows | 
         return None
     shared = set.intersection(*(set(piece) for piece in pieces))
     joined = {k: np.concatenate([p[k] for p in pieces]) for k in pieces[0] if k in shared}
+    own: dict[str, Any] = {
+        field.name: joined.pop(field.name) for field in fields(VoltageRows) if field.name in joined
+    }
     return VoltageRows(
         captures=tuple(used),
-        capture=joined.pop("capture").astype(np.int64),
-        cluster=joined.pop("cluster").astype(np.int64),
-        time_s=joined.pop("time_s"),
-        voltage_v=joined.pop("voltage_v"),
-        current_a=joined.pop("current_a"),
-        speed_rad_s=joined.pop("speed_rad_s"),
-        warm_current_k_a=joined.pop("warm_current_k_a"),
-        warm_speed_k_rad_s=joined.pop("warm_speed_k_rad_s"),
         period_s=float(np.median(joined.pop("period"))),
         hold_doubt=float(np.sqrt(np.mean(joined.pop("hold") ** 2))),
         columns=joined,
+        **own,
     )
 
 
 def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[str, Array] | None:
-    angle = "theta_mech_rad" if capture.has("theta_mech_rad") else "omega_mech_rad_s"
-    if not capture.has("t_s", "vq_v", "iq_a", angle):
+    optional = ("id_a", "vd_v", "temp_winding_degc", "temp_magnet_degc")
+    log = shaft_log(capture, "vq_v", "iq_a", optional=optional)
+    if log is None or log.t_s.size < 10 * LEAST_SAMPLES:
         return None
-    data = _finite(capture, angle)
-    t, theta = data["t_s"], data[angle]
-    if t.size < 10 * LEAST_SAMPLES:
-        return None
-    if angle == "omega_mech_rad_s":
-        theta = trapezoid(t, theta)
-    period = float(np.median(np.diff(t)))
+    data, t, theta, period = log.data, log.t_s, log.theta_rad, log.period_s
     window, usual = policy().inverter, 3 * LEAST_SAMPLES * period
     width = min(max(window.shortest_window_s, usual), window.longest_window_s)
     try:
@@ -178,9 +170,8 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
         return None
     v_d, v_q = _instant(capture, data, speed, pole_pairs, period)
     columns = {
-        "capture": np.full(weak.count, float(index)),
-        "cluster": np.floor((weak.centres_s - weak.centres_s[0]) / policy().evidence.cluster_s)
-        + 1e6 * index,
+        "capture": np.full(weak.count, index),
+        "cluster": weak.clusters(policy().evidence.cluster_s, index),
         "time_s": weak.centres_s,
         "voltage_v": weak.integral(v_q),
         **_integrals(weak, data, theta, speed),
@@ -191,15 +182,6 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
     if v_d is not None:
         columns["turned"] = weak.integral(speed * v_d)
     return columns
-
-
-def _finite(capture: Capture, angle: str) -> dict[str, Array]:
-    """Columns of a drive log, those samples that are finite in all of them."""
-    optional = ("id_a", "vd_v", "temp_winding_degc", "temp_magnet_degc")
-    names = ["t_s", "vq_v", "iq_a", angle, *(n for n in optional if capture.has(n))]
-    data = capture.arrays(*names)
-    finite = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    return {name: column[finite] for name, column in data.items()}
 
 
 def _integrals(
@@ -361,11 +343,11 @@ def _estimates(
     type_b = contributions(values, gains)
     per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
     paths = sorted(c.path for c in rows.captures)
-    words = [f"{rows.voltage_v.size} windows, {np.std(fit.residuals):.2g} V left"]
-    if chosen:
-        words.append(allowed_for(chosen))
-    unstated = unstated_note(rows.captures, ("voltage", "current"))
-    words += [unstated] if unstated else []
+    words = [
+        f"{rows.voltage_v.size} windows, {np.std(fit.residuals):.2g} V left",
+        allowed_for(chosen),
+        unstated_note(rows.captures, ("voltage", "current")),
+    ]
     estimates = []
     for i, name in enumerate(GIVES):
         value, u = float(fit.coefficients[i]), float(deviation[i])
@@ -380,9 +362,9 @@ def _estimates(
         parts += [] if doubt is None else [doubt.part(f"{METHOD.name}:{name}", value)]
         remarks = [] if doubt is None else [doubt.words("the value")]
         assumed, assumptions = _unlogged(rows, fit, name, value, magnet)
-        note = "; ".join([*remarks, *words, *assumptions])
+        notes = [*remarks, *words, *assumptions]
         at = {PLACE[name]: 25.0, "omega_mech_rad_s": float(np.max(np.abs(rows.speed_rad_s)))}
-        estimates.append(METHOD.measured(name, value, [*parts, *assumed], paths, at, note))
+        estimates.append(METHOD.measured(name, value, [*parts, *assumed], paths, at, notes))
     return tuple(estimates)
 
 

@@ -26,9 +26,9 @@ from pipeline.estimation.uncertainty.regimes import (
     scatter,
     signs,
 )
-from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.numerics.plateaus import noise_about_cubics
+from pipeline.numerics.shaft_log import shaft_log
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Array, Campaign, Capture
@@ -195,23 +195,15 @@ def _about(parts: Sequence[Part], columns: Sequence[int], delay_s: float) -> Sol
 
 def _part(capture: Capture) -> Part | None:
     """The log where it holds voltage and motion, and neither current nor a load's torque."""
-    angle = "theta_mech_rad" if capture.has("theta_mech_rad") else "omega_mech_rad_s"
-    if not capture.has("t_s", "vq_v", angle) or capture.has("iq_a"):
+    log = None if capture.has("iq_a") else shaft_log(capture, "vq_v")
+    if log is None or log.t_s.size < 3 * LEAST_SAMPLES:
         return None
-    data = capture.arrays("t_s", "vq_v", angle)
-    finite = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    t, volts, theta = (data[name][finite] for name in ("t_s", "vq_v", angle))
-    if t.size < 3 * LEAST_SAMPLES:
-        return None
-    if angle == "omega_mech_rad_s":
-        theta = trapezoid(t, theta)
-    period = float(np.median(np.diff(t)))
     try:
-        weak, quiet = _windows(t, theta, period)
-        speed = smooth_speed(t, theta, max(0.005, 10.0 * period))
+        weak, quiet = _windows(log.t_s, log.theta_rad, log.period_s)
+        speed = smooth_speed(log.t_s, log.theta_rad, max(0.005, 10.0 * log.period_s))
     except ValueError:
         return None
-    return Part(capture, t, volts, theta, speed, weak, quiet)
+    return Part(capture, log.t_s, log.data["vq_v"], log.theta_rad, speed, weak, quiet)
 
 
 def _windows(t_s: Array, theta_rad: Array, period_s: float) -> tuple[WeakRows, bool]:
@@ -237,14 +229,11 @@ def _rows(parts: Sequence[Part], delay_s: float, columns: Sequence[int]) -> Rows
         slowest = np.array([np.min(np.abs(part.speed_rad_s[a:b])) for a, b in ends])
         turning = slowest > policy().shaft_rows.slowest_share * fastest
         turning &= part.since_pause_s[weak.starts] >= delay_s
-        cluster = np.floor((weak.centres_s - weak.centres_s[0]) / policy().evidence.cluster_s)
-        number = np.full(weak.count, float(index))
-        piece = [design[:, columns], volts, number, cluster + 1e6 * index, weak.centres_s]
+        cluster = weak.clusters(policy().evidence.cluster_s, index)
+        number = np.full(weak.count, index)
+        piece = [design[:, columns], volts, number, cluster, weak.centres_s]
         pieces.append([column[turning] for column in piece])
-    design, volts, number, cluster, time = (
-        np.concatenate(one) for one in zip(*pieces, strict=True)
-    )
-    return Rows(design, volts, number.astype(np.int64), cluster.astype(np.int64), time)
+    return Rows(*(np.concatenate(one) for one in zip(*pieces, strict=True)))
 
 
 def _noise_v(rows: Rows) -> Array:

@@ -21,6 +21,7 @@ from pipeline.estimation.policy import DEFAULT
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import SOURCE
 from pipeline.estimation.uncertainty.instruments import (
+    in_shares,
     instrument_uncertainties,
     unstated_note,
     voltage_source,
@@ -106,8 +107,8 @@ def _flux(
     alpha = options["alpha_assumed_1_k"] if coefficient is None else coefficient.number
     excesses = [_temperature(c, options["temp_assumed_degc"]) - 25.0 for c, _ in turns]
     values = [t.psi_wb / (1.0 + alpha * e) for (_, t), e in zip(turns, excesses, strict=True)]
-    weights = [1.0 / max(turn.u_psi_wb, 1e-12) ** 2 for _, turn in turns]
-    share = np.array(weights) / np.sum(weights)
+    weights = np.array([1.0 / max(turn.u_psi_wb, 1e-12) ** 2 for _, turn in turns])
+    share = weights / np.sum(weights)
     value = float(share @ np.array(values))
     scatter = tuple(
         Contribution(f"{k}", float(w) * turn.u_psi_wb, "A", turn.dof)
@@ -122,14 +123,12 @@ def _flux(
     of_alpha = assumed if coefficient is None else coefficient.budget
     parts = [METHOD.scatter("psi", u, dof)]
     parts += propagate([(-value * excess, of_alpha)])
-    for source, gain in instrument_uncertainties(captures, ("voltage",)).items():
-        members = [voltage_source(c.meta) == source for c, _ in turns]
-        parts.append(Contribution(source, value * gain * float(share[members].sum()), "B"))
-    for source, offset in magnet_uncertainties(captures).items():
-        members = [magnet_source(c) == source for c, _ in turns]
-        parts.append(
-            Contribution(source, -value * alpha * offset * float(share[members].sum()), "B")
-        )
+    voltmeters = [voltage_source(c.meta) for c, _ in turns]
+    gains = in_shares(instrument_uncertainties(captures, ("voltage",)), voltmeters, weights)
+    parts += [Contribution(source, value * u, "B") for source, u in gains.items()]
+    thermometers = [magnet_source(c) for c, _ in turns]
+    offsets_k = in_shares(magnet_uncertainties(captures), thermometers, weights)
+    parts += [Contribution(source, -value * alpha * u, "B") for source, u in offsets_k.items()]
     notes = [unlogged_note(captures), unstated_note(captures, ("voltage", "temperature"))]
     at = {"temp_magnet_degc": 25.0, "temp_measured_degc": round(excess + 25.0, 2)}
     return METHOD.measured("psi_pm_wb", value, parts, captures, at, notes)

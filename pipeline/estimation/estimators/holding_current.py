@@ -7,7 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.estimation.estimators.cogging import name_orders, part_orders, spectrum_bars
+from pipeline.estimation.estimators.cogging import (
+    name_orders,
+    part_orders,
+    slots_and_pole_pairs,
+    spectrum_bars,
+)
 from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
@@ -281,11 +286,10 @@ def _true_order(
     On n positions the orders k and m n ± k look alike; the one that slots and poles make is taken
     if there is exactly one of them.
     """
-    slots, pairs = campaign.nameplate("slots"), known.best("pole_pairs")
-    poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
-    if positions is None or not isinstance(slots, int) or not isinstance(poles, int):
+    slots, pairs = slots_and_pole_pairs(known, campaign)
+    if positions is None or slots is None or pairs is None:
         return order, ""
-    fundamental = cogging_order(slots, poles)
+    fundamental = cogging_order(slots, pairs)
     alike = [order, *(m * positions + s * order for m in (1, 2, 3) for s in (-1, 1))]
     fits = [k for k in alike if k % fundamental == 0]
     if order % fundamental == 0 or len(fits) != 1:

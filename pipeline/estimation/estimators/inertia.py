@@ -376,7 +376,7 @@ def _estimates(
     scatter = drag.scatter()
     paths = sorted(c.path for c in rows.captures)
     words = (*_words(rows, torque, drag), *_load_words(rows, doubts.share, left_out))
-    note = "; ".join([*doubts.words(logged), *words])
+    notes = [*doubts.words(logged), *words]
     at = {"omega_mech_rad_s": rows.fastest_rad_s, "temp_magnet_degc": 25.0}
     estimates = []
     for i, name in enumerate(GIVES):
@@ -392,7 +392,7 @@ def _estimates(
         slopes = [float(slope[i]) for slope in (per_kt, per_rel, per_alpha)]
         budgets = (torque.kt_budget, torque.reluctance_budget, torque.magnet_budget)
         budget = propagate([(1.0, (*parts, *type_b[i])), *zip(slopes, budgets, strict=True)])
-        estimates.append(METHOD.measured(name, float(constants[i]), budget, paths, at, note))
+        estimates.append(METHOD.measured(name, float(constants[i]), budget, paths, at, notes))
     return tuple(estimates)
 
 
@@ -434,8 +434,7 @@ def _words(rows: ShaftRows, torque: Torque, drag: DragFit) -> list[str]:
         words.append("id_a not logged, its torque taken as none")
     if not np.any(rows.kind == COAST):
         words.append("no spin_down: friction from driven motion alone")
-    unstated = unstated_note(rows.captures, ("current", "torque"))
-    return [*words, *([unstated] if unstated else [])]
+    return [*words, unstated_note(rows.captures, ("current", "torque"))]
 
 
 def _load_words(rows: ShaftRows, strange: float, left_out: Sequence[str]) -> list[str]:

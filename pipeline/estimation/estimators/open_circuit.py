@@ -21,6 +21,7 @@ from pipeline.estimation.policy import DEFAULT, policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import SOURCE
 from pipeline.estimation.uncertainty.instruments import (
+    in_shares,
     instrument_uncertainties,
     unstated_note,
     voltage_source,
@@ -164,7 +165,7 @@ def _flux_estimates(
     wide = float(np.ptp(excess)) >= options["least_span_k"]
     logged = all(magnet_column(c) == "temp_magnet_degc" for c in used)
     measured = logged and wide and free.full_rank and u_alpha <= options["worst_u_alpha_1_k"]
-    shared = _instrument_shares(groups, used)
+    gains, offsets_k = _instrument_shares(groups, used)
     at = _conditions(groups, excess)
     extra: list[Contribution] = []
     words = [*notes, unlogged_note(used)]
@@ -179,14 +180,14 @@ def _flux_estimates(
         words.append(f"magnet coefficient {alpha:g} 1/K assumed to reach 25 degC")
     widened, dof = _birge(chosen)
     parts = [METHOD.scatter("psi", chosen.u(0) * math.sqrt(widened), dof), *extra]
-    parts += [Contribution(source, value * u, "B") for source, u in shared["voltage"]]
-    parts += [Contribution(source, -value * alpha * u, "B") for source, u in shared["temperature"]]
+    parts += [Contribution(source, value * u, "B") for source, u in gains.items()]
+    parts += [Contribution(source, -value * alpha * u, "B") for source, u in offsets_k.items()]
     psi_25 = METHOD.measured("psi_pm_wb", value, parts, used, at, words)
     name = "temp_coeff_magnet_1_k"
     if not measured:
         return {psi_25.name: psi_25, name: METHOD.missing(name, WARM)}
     scatter = METHOD.scatter("alpha", u_alpha * math.sqrt(widened), dof)
-    offset = [Contribution(s, alpha**2 * u, "B") for s, u in shared["temperature"]]
+    offset = [Contribution(s, alpha**2 * u, "B") for s, u in offsets_k.items()]
     coefficient = METHOD.measured(name, alpha, [scatter, *offset], used, at, words)
     return {psi_25.name: psi_25, name: coefficient}
 
@@ -233,18 +234,16 @@ def _beyond_chance(chi2_dof: float, dof: int) -> bool:
 
 def _instrument_shares(
     groups: Sequence[Group], used: Sequence[Capture]
-) -> dict[str, list[tuple[str, float]]]:
+) -> tuple[dict[str, float], dict[str, float]]:
     """Each source's standard uncertainty times the share of the weight read through it."""
     weights = np.array([1.0 / max(g.flux.u_psi_wb, 1e-150) ** 2 for g in groups])
-    weights = weights / weights.sum()
-    shares: dict[str, list[tuple[str, float]]] = {"voltage": [], "temperature": []}
-    for source, u in instrument_uncertainties(used, ("voltage",)).items():
-        of_source = [voltage_source(g.capture.meta) == source for g in groups]
-        shares["voltage"].append((source, u * float(weights[of_source].sum())))
-    for source, u in magnet_uncertainties(used).items():
-        of_source = [magnet_source(g.capture) == source for g in groups]
-        shares["temperature"].append((source, u * float(weights[of_source].sum())))
-    return shares
+    gains = instrument_uncertainties(used, ("voltage",))
+    voltmeters = [voltage_source(g.capture.meta) for g in groups]
+    thermometers = [magnet_source(g.capture) for g in groups]
+    return (
+        in_shares(gains, voltmeters, weights),
+        in_shares(magnet_uncertainties(used), thermometers, weights),
+    )
 
 
 def _couplings(psi: Estimate, pairs: Estimate) -> dict[str, Estimate]:

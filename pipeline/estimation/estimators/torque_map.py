@@ -381,15 +381,12 @@ def _note(
     words = [table.note()]
     if not _d_logged(points):
         words.append("id_a not logged: the reluctance torque of a d current would be in it")
-    if still := standstill_words(points, table.points):
-        words.append(still)
-    if chosen:
-        words.append(allowed_for(chosen))
-    words += [unlogged] if (unlogged := unlogged_note(captures)) else []
+    words.append(standstill_words(points, table.points))
+    words += [allowed_for(chosen), unlogged_note(captures)]
     if np.unique(np.sign(_column(points, "iq_a").round(6))).size < 2:
         words.append("one sign of q current only")
-    unstated = unstated_note(captures, ("current", "torque"))
-    return "; ".join([*words, *([unstated] if unstated else [])])
+    words.append(unstated_note(captures, ("current", "torque")))
+    return "; ".join(filter(None, words))
 
 
 def _evidence(

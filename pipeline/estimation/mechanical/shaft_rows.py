@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from pipeline.estimation.policy import policy
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.plateaus import noise_about_cubics
+from pipeline.numerics.shaft_log import SPEED, motion_column
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.records.capture import Array, Capture
 
@@ -163,31 +165,22 @@ def shaft_rows(
         for i, part in enumerate(parts)
     ]
     joined = {name: np.concatenate([piece[name] for piece, _ in pieces]) for name in pieces[0][0]}
+    own: dict[str, Any] = {
+        field.name: joined.pop(field.name) for field in fields(ShaftRows) if field.name in joined
+    }
     rows = ShaftRows(
         captures=tuple(part.capture for part in parts),
-        capture=joined.pop("capture").astype(np.int64),
-        kind=joined.pop("kind").astype(np.int64),
-        cluster=joined.pop("cluster").astype(np.int64),
-        time_s=joined.pop("time_s"),
-        acceleration_rad_s2=joined.pop("acceleration_rad_s2"),
-        q_current_a=joined.pop("q_current_a"),
-        warm_current_k_a=joined.pop("warm_current_k_a"),
-        product_a2=joined.pop("product_a2"),
-        load_nm=joined.pop("load_nm"),
-        ripple_nm=joined.pop("ripple_nm"),
-        u_ripple_nm=joined.pop("u_ripple_nm"),
-        speed_rad_s=joined.pop("speed_rad_s"),
-        sense=joined.pop("sense"),
         columns=joined,
         fastest_rad_s=fastest,
         dropped=sum(dropped for _, dropped in pieces),
+        **own,
     )
     return rows if rows.count else None
 
 
 def _part(capture: Capture, winding: Winding | None) -> _Part | None:
     kind = COAST if capture.meta.test == "spin_down" else DRIVE
-    angle = "theta_mech_rad" if capture.has("theta_mech_rad") else "omega_mech_rad_s"
+    angle = motion_column(capture)
     if not capture.has("t_s", angle) or (kind == DRIVE and not capture.has("iq_a")):
         return None
     required = ["t_s", angle]
@@ -202,7 +195,7 @@ def _part(capture: Capture, winding: Winding | None) -> _Part | None:
     t, theta = data["t_s"], data[angle]
     if t.size < LEAST_SAMPLES:
         return None
-    if angle == "omega_mech_rad_s":
+    if angle == SPEED:
         theta = trapezoid(t, theta)
     try:
         weak = _windows(t, theta, kind)
@@ -291,11 +284,10 @@ def _rows(
 ) -> tuple[dict[str, Array], int]:
     """Columns of one capture's windows, and how many of these were dropped."""
     weak = part.weak
-    clock = np.floor((weak.centres_s - weak.centres_s[0]) / policy().evidence.cluster_s)
     columns = {
-        "capture": np.full(weak.count, float(index)),
-        "kind": np.full(weak.count, float(part.kind)),
-        "cluster": clock + 1e6 * index,
+        "capture": np.full(weak.count, index),
+        "kind": np.full(weak.count, part.kind),
+        "cluster": weak.clusters(policy().evidence.cluster_s, index),
         "time_s": weak.centres_s,
         "acceleration_rad_s2": weak.integral(part.theta, 2),
         "q_current_a": weak.integral(part.current),

@@ -7,8 +7,10 @@ GUM 5.1.3 note 2 (numerical sensitivity) and H.1.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from pipeline.records.capture import UNSTATED_U, Array, Capture, CaptureMeta
 from pipeline.records.estimate import Estimate
@@ -166,6 +168,33 @@ def unstated_note(
         elif not any(stated):
             words.append(f"{key} stated as 0, as if the instrument had no error")
     return ", ".join(words)
+
+
+def in_shares(
+    uncertainties: Mapping[str, float], sources: Sequence[str], weights: Array
+) -> dict[str, float]:
+    """Uncertainties of instruments, each times the share of what it measured.
+
+    Parameters
+    ----------
+    uncertainties
+        By source.
+    sources
+        Of each part.
+    weights
+        Of each part, in any unit [n].
+
+    Returns
+    -------
+    dict of float
+        By source.
+
+    """
+    share = weights / np.sum(weights)
+    return {
+        source: u * float(share[[of_part == source for of_part in sources]].sum())
+        for source, u in uncertainties.items()
+    }
 
 
 def contributions(

@@ -13,10 +13,6 @@ from pipeline.plugins import discover
 from pipeline.records.errors import CaptureError, UsageError
 
 
-def _nothing(_: bytes) -> Mapping[str, str]:
-    return {}
-
-
 @dataclass(frozen=True, slots=True)
 class Reader:
     """How one foreign form becomes raw tables, one a clock.
@@ -28,7 +24,7 @@ class Reader:
 
     name: str
     read: Callable[[bytes], Sequence[RawTable]]
-    metadata: Callable[[bytes], Mapping[str, str]] = _nothing
+    metadata: Callable[[bytes], Mapping[str, str]] = lambda _: {}
     suffixes: tuple[str, ...] = ()
 
 

@@ -152,9 +152,8 @@ def _record(capture: Capture, needed: tuple[str, ...]) -> dict[str, Array] | Non
         return None
     optional = ("id_a", "temp_winding_degc", "temp_magnet_degc")
     names = dict.fromkeys(("t_s", angle, *needed, *(n for n in optional if capture.has(n))))
-    data = capture.arrays(*names)
-    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    return {name: column[fine] for name, column in data.items()} if fine.any() else None
+    data = capture.finite(*names)
+    return data if data["t_s"].size else None
 
 
 def _windows(t_s: Array) -> _Windows | None:
