@@ -14,7 +14,7 @@ from pipeline.api.by_motor import Shown
 from pipeline.execution.tasks.captures import ReadTask, usable_captures
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
-from pipeline.io.ingest.survey import Entry, survey
+from pipeline.io.ingest.survey import survey
 from pipeline.io.maps.places import source_maps
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.capture import Campaign, Capture
@@ -190,15 +190,13 @@ def read(
     input_folder(place)
     sources = source_maps(source)
     surveyed = survey(Path(place), sources, recover=recover)
-    entries: dict[str, list[Entry]] = {}
-    for entry in surveyed.entries:
-        entries.setdefault(entry.stated["motor_id"], []).append(entry)
+    entries = surveyed.motors
     if motor is not None and motor not in entries:
-        there = f"there are {', '.join(sorted(entries))}" if entries else "there is none"
+        there = f"there are {', '.join(entries)}" if entries else "there is none"
         raise UsageError(f"no capture of motor {motor} in {place}", there)
     findings, campaigns = list(surveyed.findings), {}
-    for name in sorted(entries) if motor is None else [motor]:
-        task = ReadTask(name, place, tuple(entries[name]), limits or ReadLimits(), gates or {})
+    for name in entries if motor is None else [motor]:
+        task = ReadTask(name, place, entries[name], limits or ReadLimits(), gates or {})
         captures, doubts = usable_captures(task)
         findings += doubts
         if captures:

@@ -38,6 +38,11 @@ class Failure(NamedTuple):
     remedy: str
 
 
+def estimator_terms() -> dict[str, Term]:
+    """Constants of the estimators' own, beside those of the glossary, by name."""
+    return {term.name: term for estimator in estimators() for term in estimator.terms}
+
+
 def homes() -> Mapping[str, str]:
     """The module of every estimator by the estimator's name.
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from pathlib import Path
 
 from pipeline.criticism.library.effect_tables import effect_tables
-from pipeline.estimation.registry import estimators
+from pipeline.estimation.registry import estimator_terms
 from pipeline.export.protocol import Exporter, Source
 from pipeline.export.registry import exporters
 from pipeline.io.registry.store import Registry, one_of
@@ -19,6 +18,7 @@ from pipeline.records.ledger import Selection, Version, in_force
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
 from pipeline.settings import ExportSettings
+from pipeline.stages.steps.registry import history_of, opened, revision_number
 from pipeline.views.status_text import exported, not_exported
 
 MOST_LINES = 200
@@ -47,15 +47,10 @@ def main(settings: ExportSettings) -> Outcome:
         if name not in exporter.options:
             has = ", ".join(exporter.options) or "none"
             raise UsageError(f"options.{name}: {exporter.name} has no such option", f"it has {has}")
-    place = settings.registry
-    if place in ("", "auto"):
-        place = (Path(settings.output) / "registry").as_posix()
-    registry = Registry(place, {k: str(v) for k, v in settings.registry_options.items()})
+    registry = opened(settings)
     version, notes = _version(registry, settings)
     (sheet,) = registry.datasheets([version])
-    of_estimators = {term.name: term for estimator in estimators() for term in estimator.terms}
-    terms = {**of_estimators, **CONSTANTS}
-    source = Source(sheet, version.revision, terms, _effects(sheet))
+    source = Source(sheet, version.revision, estimator_terms() | CONSTANTS, _effects(sheet))
     text = exporter.render(source, options)
     ending = dict.fromkeys((exporter.name, exporter.extension))
     name = ".".join((file_stem(version.motor_id), *ending))
@@ -93,18 +88,15 @@ def _exporter(settings: ExportSettings) -> Exporter:
 
 def _version(registry: Registry, settings: ExportSettings) -> tuple[Version, tuple[str, ...]]:
     """The requested version, or the newest released one; raises UsageError for none released."""
-    history = registry.history(settings.motor)
-    if not history:
-        raise UsageError(
-            f"no motor {settings.motor!r} in {registry.place}", "`registry list` shows all"
-        )
+    history = history_of(registry, settings.motor)
     if settings.revision is None and settings.version is None:
         in_force_now, last = in_force(history), history[-1]
         if in_force_now is None:
             raise _unreleased(last, settings)
         newer = f"note: {not_exported(last)}"
         return in_force_now, (newer,) * (last.revision > in_force_now.revision)
-    wanted = Selection(settings.motor, revision=_whole(settings.revision), version=settings.version)
+    number = None if settings.revision is None else revision_number(settings.revision)
+    wanted = Selection(settings.motor, revision=number, version=settings.version)
     version = one_of([v for v in history if wanted.takes(v)], wanted, registry.place)
     if version.status != "released":
         raise _unreleased(version, settings)
@@ -119,11 +111,3 @@ def _unreleased(version: Version, settings: ExportSettings) -> UsageError:
     remedy = "complete it first" if points else f"`{approve}` releases it"
     why = f": {points}" if points else ""
     return UsageError(f"{name} is {version.status}, not released{why}", remedy)
-
-
-def _whole(text: str | None) -> int | None:
-    if text is None:
-        return None
-    if not (text.isascii() and text.isdigit() and len(text) < 19):
-        raise UsageError(f"revision={text} is no revision", "a whole number: 1, 2, ...")
-    return int(text)

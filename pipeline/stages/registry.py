@@ -7,7 +7,6 @@ import shlex
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime, time
 from functools import partial
-from pathlib import Path
 from typing import Literal
 
 from pipeline.execution.outputs.statuses import show_decision
@@ -26,6 +25,7 @@ from pipeline.report.text.registry_text import (
     versions_table,
 )
 from pipeline.settings import RegistrySettings
+from pipeline.stages.steps.registry import history_of, opened, revision_number, unknown_motor
 from pipeline.views.status_text import decision, when
 from pipeline.views.table_text import safe
 
@@ -50,29 +50,14 @@ def main(settings: RegistrySettings) -> Outcome:
     if settings.action not in ACTIONS:
         problem = f"no action {settings.action!r}" if settings.action else "the action is missing"
         raise UsageError(f"registry: {problem}", meant(settings.action, ACTIONS))
-    options = {name: str(value) for name, value in settings.registry_options.items()}
-    return ACTIONS[settings.action](Registry(place_of(settings), options), settings)
-
-
-def place_of(settings: RegistrySettings) -> str:
-    """Folder or URL of the registry that the keys name.
-
-    Parameters
-    ----------
-    settings
-        The keys of `registry`.
-
-    """
-    if settings.registry in ("", "auto"):
-        return (Path(settings.output) / "registry").as_posix()
-    return settings.registry
+    return ACTIONS[settings.action](opened(settings), settings)
 
 
 def _list(registry: Registry, settings: RegistrySettings) -> Outcome:
     events = registry.events()
     selected = select(events, Selection(motor_id=settings.motor))
     if settings.motor is not None and not selected:
-        raise _unknown(registry, settings.motor)
+        raise unknown_motor(registry, settings.motor)
     motors = len({version.motor_id for version in selected})
     lines = [versions_table(selected), ""] if selected else []
     count = f"{counted(motors, 'motor')}, {counted(len(selected), 'version')}"
@@ -104,12 +89,10 @@ def _where(settings: RegistrySettings) -> str:
 
 def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
     motor, *revisions = _needed(settings, "motor", "from", "to")
-    history = registry.history(motor)
-    if not history:
-        raise _unknown(registry, motor)
+    history = history_of(registry, motor)
     pair = []
     for name, revision in zip(("from", "to"), revisions, strict=True):
-        number = _whole(name, revision)
+        number = revision_number(revision, name)
         wanted = Selection(motor_id=motor, revision=number)
         pair.append(one_of([v for v in history if wanted.takes(v)], wanted, registry.place))
     one, other = registry.datasheets(pair)
@@ -137,7 +120,7 @@ def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
     return Outcome(text="\n".join([in_force_table(rows), "", text]), result=current)
 
 
-def _verify(registry: Registry, settings: RegistrySettings) -> Outcome:
+def _verify(registry: Registry, _: RegistrySettings) -> Outcome:
     broken = registry.verify()
     count = f"{counted(broken.versions, 'version')}, {counted(broken.decisions, 'decision')}"
     faults = counted(len(broken.faults), "mismatch")
@@ -146,7 +129,7 @@ def _verify(registry: Registry, settings: RegistrySettings) -> Outcome:
         *(f"mismatch: {line}" for line in broken.faults),
         *(f"note: {n}" for n in broken.notes),
     )
-    text = f"{place_of(settings)}: {count}, {verdict}"
+    text = f"{registry.place}: {count}, {verdict}"
     return Outcome(1 if broken.faults else 0, text, errors, result=broken)
 
 
@@ -239,9 +222,7 @@ def moment(text: str) -> datetime:
 def _version(registry: Registry, settings: RegistrySettings, *, newest: bool) -> Version:
     """The version that `motor` and `revision` or `version` name, else the newest of the motor."""
     wanted = _wanted(settings)
-    history = registry.history(wanted.motor_id or "")
-    if not history:
-        raise _unknown(registry, wanted.motor_id or "")
+    history = history_of(registry, wanted.motor_id or "")
     versions = [version for version in history if wanted.takes(version)]
     if newest and wanted.revision is None and wanted.version is None:
         versions = versions[-1:]
@@ -253,7 +234,7 @@ def _wanted(settings: RegistrySettings) -> Selection:
     revision, version = settings.revision, settings.version
     if version is not None and not PREFIX.fullmatch(version):
         raise UsageError(f"version={version} is no digest", "at least its first 4 hex digits")
-    number = None if revision is None else _whole("revision", revision)
+    number = None if revision is None else revision_number(revision)
     return Selection(motor_id=motor, revision=number, version=version)
 
 
@@ -269,13 +250,3 @@ def _needed(settings: RegistrySettings, *names: str) -> tuple[str, ...]:
         add = " ".join(f"{name}=..." for name in missing)
         raise UsageError(f"registry {settings.action}: {keys} {verb} missing", f"add {add}")
     return tuple(str(value) for value in given.values())
-
-
-def _whole(name: str, text: str) -> int:
-    if not (text.isascii() and text.isdigit() and len(text) < 19):
-        raise UsageError(f"{name}={text} is no revision", "a whole number: 1, 2, ...")
-    return int(text)
-
-
-def _unknown(registry: Registry, motor: str) -> UsageError:
-    return UsageError(f"no motor {motor!r} in {registry.place}", "`registry list` shows all")

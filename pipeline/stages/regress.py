@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline.estimation.registry import estimators
+from pipeline.estimation.registry import estimator_terms
 from pipeline.execution.outputs.page_links import LOTS, links_of, relink_index
 from pipeline.io.recordings.seal import write_checksummed
-from pipeline.io.registry.store import Registry
 from pipeline.io.storage.diagnoses import read_diagnoses
 from pipeline.io.storage.limits import limits_file, read_limits
 from pipeline.io.storage.publish import canonical_json, output_folder, write_whole
@@ -24,6 +23,7 @@ from pipeline.report.pages.lot_page import render_regression
 from pipeline.report.text.junit import junit_xml
 from pipeline.report.text.lot_text import regression_text
 from pipeline.settings import RegressSettings
+from pipeline.stages.steps.registry import opened
 from pipeline.stages.steps.selection import Chosen, choose
 
 MODES = ("auto", "lots", "code")
@@ -43,7 +43,7 @@ def main(settings: RegressSettings) -> Outcome:
         The keys of `regress`.
 
     """
-    terms = _terms()
+    terms = estimator_terms() | CONSTANTS
     limits = read_limits(limits_file(settings.limits, settings.config_dir))
     faults = lint(limits, terms)
     if faults:
@@ -56,13 +56,8 @@ def main(settings: RegressSettings) -> Outcome:
     for name in ("baseline", "candidate"):
         if not getattr(settings, name).strip():
             raise UsageError(f"regress: {name}= is missing", f"write {name}=lot:A, or a tag, ...")
-    chosen = choose(
-        Registry(_place(settings), {k: str(v) for k, v in settings.registry_options.items()}),
-        settings.baseline,
-        settings.candidate,
-        settings.mode,
-        limits.golden,
-    )
+    registry, mode = opened(settings), settings.mode
+    chosen = choose(registry, settings.baseline, settings.candidate, mode, limits.golden)
     output = output_folder(settings.output)
     regression = _compare(settings, chosen, limits, terms)
     files = _write(output, regression)
@@ -70,18 +65,6 @@ def main(settings: RegressSettings) -> Outcome:
     return Outcome(
         EXIT_CODES.get(regression.verdict, UNDECIDED), text, result=regression.document()
     )
-
-
-def _place(settings: RegressSettings) -> str:
-    if settings.registry in ("", "auto"):
-        return (Path(settings.output) / "registry").as_posix()
-    return settings.registry
-
-
-def _terms() -> dict[str, Term]:
-    """Every constant of the glossary and of the estimators' files."""
-    of_estimators = {term.name: term for estimator in estimators() for term in estimator.terms}
-    return {**of_estimators, **CONSTANTS}
 
 
 def _compare(
@@ -102,7 +85,7 @@ def _diagnosis_folders(settings: RegressSettings) -> Sequence[Path]:
             if not folder.is_dir():
                 raise UsageError(f"diagnoses={folder} is no folder", "name what `diagnose` wrote")
         return folders
-    place = _place(settings)
+    place = opened(settings).place
     beside = [] if "://" in place else [Path(place).parent / "diagnosis"]
     return [*beside, Path(settings.output) / "diagnosis"]
 

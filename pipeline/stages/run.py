@@ -38,7 +38,7 @@ from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.files import input_folder, size_bytes
 from pipeline.io.ingest.guard import ReadLimits
-from pipeline.io.ingest.survey import Answer, Entry, Question, Survey, settled, survey
+from pipeline.io.ingest.survey import Answer, Question, Survey, settled, survey
 from pipeline.io.maps.places import source_maps
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.registry.store import Registry
@@ -57,6 +57,7 @@ from pipeline.report.text.progress import progress
 from pipeline.report.text.waiting import waiting
 from pipeline.settings import RunSettings
 from pipeline.stages.steps.beside import beside_motors, due_jobs
+from pipeline.stages.steps.registry import opened
 
 PROGRESS = ".work"
 COMMITTED = 50
@@ -97,7 +98,7 @@ def main(settings: RunSettings) -> Outcome:
         raise UsageError(f"settle_s={settings.settle_s} is negative", "1 is usual")
     if settings.workers < 0:
         raise UsageError(f"workers={settings.workers} is negative", "0 is one a core")
-    registry = _registry(settings)
+    registry = None if settings.registry is None else opened(settings)
     cluster = Cluster(settings.scheduler, settings.tls_ca, settings.tls_cert, settings.tls_key)
     pool = open_pool(settings.executor, cluster)
     output = output_folder(settings.output)
@@ -247,16 +248,6 @@ def _contents(
     )
 
 
-def _registry(settings: RunSettings) -> Registry | None:
-    """The registry of this run; raises UsageError for an impossible place."""
-    if settings.registry is None:
-        return None
-    place = settings.registry
-    if place in ("", "auto"):
-        place = (Path(settings.output) / "registry").as_posix()
-    return Registry(place, {name: str(v) for name, v in settings.registry_options.items()})
-
-
 def _register(
     registry: Registry | None, output: Path, results: Sequence[MotorResult]
 ) -> Registered:
@@ -317,16 +308,13 @@ def _answers(
 
 
 def _jobs(settings: RunSettings, survey: Survey, limits: Path) -> list[MotorJob]:
-    motors: dict[str, list[Entry]] = {}
-    for entry in survey.entries:
-        motors.setdefault(entry.stated["motor_id"], []).append(entry)
     required, model_gates = release_conditions(limits)
     changes = policy_changes(settings.policy)
     model = ModelSpec(settings.model.name, tuple(settings.model.effects), policy=changes)
     jobs = [
         MotorJob(
             motor_id=motor_id,
-            entries=tuple(entries),
+            entries=entries,
             input=settings.input,
             output=settings.output,
             config_sha256=configuration_digest(
@@ -347,7 +335,7 @@ def _jobs(settings: RunSettings, survey: Survey, limits: Path) -> list[MotorJob]
             findings=tuple(f for f in survey.findings if f.file in {e.path for e in entries}),
             limits=ReadLimits(settings.read_seconds, settings.read_memory_mb),
         )
-        for motor_id, entries in sorted(motors.items())
+        for motor_id, entries in survey.motors.items()
     ]
     return [_keyed(job) for job in jobs] if settings.cache else jobs
 

@@ -341,9 +341,8 @@ def _estimates(
             note = f"no more than its uncertainty beside the rest of the losses; {EXPERIMENT}"
             estimates.append(METHOD.missing(name, note))
             continue
-        estimates.append(
-            METHOD.measured(name, float(values[k]), parts, captures, at, [*words, *notes])
-        )
+        words += notes
+        estimates.append(METHOD.measured(name, float(values[k]), parts, captures, at, words))
     return tuple(estimates)
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.registry import homes
-from pipeline.execution.caches.keys import fit_parts, key_of
+from pipeline.execution.caches.keys import FitParts, key_of
 from pipeline.execution.caches.run_cache import FOLDER
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.tasks.work import Stamp
@@ -59,16 +59,8 @@ class FitMemory:
     ) -> Fit:
         """The cached fit, or a new one."""
         home = self._homes.get(estimator.name, estimator.fit.__module__)
-        key = key_of(
-            fit_parts(
-                closure_digest(home),
-                libraries_version(home),
-                self._campaign,
-                options,
-                known.estimates,
-                self._revoked,
-            )
-        )
+        code, libraries, constants = closure_digest(home), libraries_version(home), known.estimates
+        key = key_of(FitParts(code, libraries, self._campaign, options, constants, self._revoked))
         kept = self._kept.get(estimator.name)
         if kept is not None and kept[0] == key:
             self._used[estimator.name] = kept

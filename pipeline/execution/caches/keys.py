@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import Any
+from typing import Any, NamedTuple
 
 from pipeline.execution.jobs import MotorJob
 from pipeline.io.ingest.guard import ReadLimits
@@ -36,7 +36,7 @@ NOT_OF_A_BATCH = frozenset(
 """Settings of folders and of how the work is done; they do not change the results."""
 
 
-def key_of(parts: Parts) -> str:
+def key_of(parts: Parts | NamedTuple) -> str:
     """sha256 of the parts.
 
     Parameters
@@ -45,30 +45,21 @@ def key_of(parts: Parts) -> str:
         What the result depends on, by name.
 
     """
-    return content_digest(dict(parts))
+    return content_digest(parts._asdict() if isinstance(parts, tuple) else dict(parts))
 
 
-def answer_parts(
-    tools: str,
-    question: Question,
-    file_sha256: str,
-    sidecar_sha256: str | None,
-    sources: Mapping[str, SourceMap],
-    limits: ReadLimits,
-    *,
-    recover: bool,
-) -> Parts:
-    """What the survey's answer on one file depends on; the question holds its manifest row.
+class AnswerParts(NamedTuple):
+    """What the survey's answer on one file depends on.
 
-    Parameters
+    Attributes
     ----------
     tools
         Version of the code and of the libraries that give the result.
     question
         The file and its row of the manifest.
-    file_sha256
+    file
         Digest of the file.
-    sidecar_sha256
+    sidecar
         Digest of its sidecar; None without one.
     sources
         Source maps by name.
@@ -78,15 +69,14 @@ def answer_parts(
         Whether damaged MCAP files are read up to the damage.
 
     """
-    return {
-        "tools": tools,
-        "question": question,
-        "file": file_sha256,
-        "sidecar": sidecar_sha256,
-        "sources": dict(sources),
-        "limits": limits,
-        "recover": recover,
-    }
+
+    tools: str
+    question: Question
+    file: str
+    sidecar: str | None
+    sources: Mapping[str, SourceMap]
+    limits: ReadLimits
+    recover: bool
 
 
 def motor_parts(tools: str, job: MotorJob) -> Parts:
@@ -153,10 +143,10 @@ def campaign_key(campaign: Campaign, readings: Sequence[str]) -> list[Any]:
     return [parts, list(readings)]
 
 
-def version_parts(code: str, libraries: str, campaign: Sequence[Any], config_sha256: str) -> Parts:
+class VersionParts(NamedTuple):
     """What a datasheet depends on: captures as they were read, configuration, code, libraries.
 
-    Parameters
+    Attributes
     ----------
     code
         Version of the code.
@@ -164,49 +154,40 @@ def version_parts(code: str, libraries: str, campaign: Sequence[Any], config_sha
         Versions of the libraries.
     campaign
         The result of `campaign_key`.
-    config_sha256
+    config
         Digest of the configuration.
 
     """
-    return {
-        "campaign": campaign,
-        "config": config_sha256,
-        "code": code,
-        "libraries": libraries,
-    }
+
+    code: str
+    libraries: str
+    campaign: Sequence[Any]
+    config: str
 
 
-def superseding_parts(version: str, superseded: Superseded) -> Parts:
+class SupersedingParts(NamedTuple):
     """What a version depends on that supersedes a revoked one of the same work.
 
-    Parameters
+    Attributes
     ----------
     version
         Digest of the datasheet's version.
-    superseded
+    supersedes
         The revoked version.
 
     """
-    return {"version": version, "supersedes": superseded}
+
+    version: str
+    supersedes: Superseded
 
 
-def fit_parts(
-    code: str,
-    libraries: str,
-    campaign: Sequence[Any],
-    options: Mapping[str, float],
-    known: Sequence[Estimate],
-    revoked: object,
-) -> Parts:
+class FitParts(NamedTuple):
     """What the fit of one estimator depends on.
 
-    Its code, the captures as they were read, its options, the constants that it uses, and the
-    revocations of a version that was made of such fits (`revoked`).
-
-    Parameters
+    Attributes
     ----------
     code
-        Version of the code.
+        Version of its code.
     libraries
         Versions of the libraries.
     campaign
@@ -219,35 +200,22 @@ def fit_parts(
         Revocations of versions that were made of these results.
 
     """
-    return {
-        "code": code,
-        "libraries": libraries,
-        "campaign": campaign,
-        "options": dict(options),
-        "known": list(known),
-        "revoked": revoked,
-    }
+
+    code: str
+    libraries: str
+    campaign: Sequence[Any]
+    options: Mapping[str, float]
+    known: Sequence[Estimate]
+    revoked: object
 
 
-def model_parts(
-    code: str,
-    libraries: str,
-    campaign: Sequence[Any],
-    model: ModelSpec,
-    start: Sequence[Estimate],
-    revoked: object,
-    *,
-    search: bool,
-) -> Parts:
+class ModelParts(NamedTuple):
     """What the residual test of one motor depends on.
 
-    The code of criticism, the captures as they were read, the model, the constants that it starts
-    from, the revocations, as for fits, and whether what is missing is searched for.
-
-    Parameters
+    Attributes
     ----------
     code
-        Version of the code.
+        Version of the code of criticism.
     libraries
         Versions of the libraries.
     campaign
@@ -262,12 +230,11 @@ def model_parts(
         Whether missing effects are searched for.
 
     """
-    return {
-        "code": code,
-        "libraries": libraries,
-        "campaign": campaign,
-        "model": model,
-        "start": list(start),
-        "revoked": revoked,
-        "search": search,
-    }
+
+    code: str
+    libraries: str
+    campaign: Sequence[Any]
+    model: ModelSpec
+    start: Sequence[Estimate]
+    revoked: object
+    search: bool

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from pipeline.execution.caches.keys import key_of, model_parts
+from pipeline.execution.caches.keys import ModelParts, key_of
 from pipeline.execution.caches.run_cache import FOLDER
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.tasks.work import Stamp
@@ -46,12 +46,9 @@ class ModelMemory:
             Constants that the fit starts from.
 
         """
-        code, libraries = closure_digest(TEST), libraries_version(TEST)
-        known = start.estimates
-        search, revoked = self._search, self._revoked
-        return key_of(
-            model_parts(code, libraries, self._campaign, model, known, revoked, search=search)
-        )
+        code, libraries, known = closure_digest(TEST), libraries_version(TEST), start.estimates
+        given = self._campaign, model, known, self._revoked, self._search
+        return key_of(ModelParts(code, libraries, *given))
 
     def recall(self, key: str) -> ModelVerdict | None:
         """The cached verdict of this key, else None.

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pipeline.execution.caches.keys import answer_parts, key_of
+from pipeline.execution.caches.keys import AnswerParts, key_of
 from pipeline.execution.caches.versions import SURVEY, tools
 from pipeline.execution.jobs import Files, Finished
 from pipeline.io.ingest.guard import ReadLimits
@@ -140,7 +140,7 @@ class RunCache:
         """
         entries = (read_checksummed(self._notes / "survey.json") if self.on else None) or {}
         self._context = partial(
-            answer_parts, tools(SURVEY), sources=sources, limits=limits, recover=recover
+            AnswerParts, tools(SURVEY), sources=sources, limits=limits, recover=recover
         )
         known = {}
         for number, question in enumerate(questions):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Sequence
 
-from pipeline.execution.caches.keys import campaign_key, key_of, version_parts
+from pipeline.execution.caches.keys import VersionParts, campaign_key, key_of
 from pipeline.execution.caches.versions import datasheet_code, datasheet_libraries
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.tasks.work import Stamp
@@ -30,7 +30,7 @@ def stamp_of(job: MotorJob, campaign: Campaign) -> Stamp:
     readings = tuple(content_digest(capture) for capture in campaign.captures)
     code, libraries = datasheet_code(), datasheet_libraries()
     given = campaign_key(campaign, readings)
-    version = key_of(version_parts(code, libraries, given, job.config_sha256))
+    version = key_of(VersionParts(code, libraries, given, job.config_sha256))
     return Stamp(version, readings, job.config_sha256, code, libraries, given)
 
 

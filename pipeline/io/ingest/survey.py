@@ -103,6 +103,14 @@ class Survey:
     others: tuple[str, ...]
 
     @property
+    def motors(self) -> dict[str, tuple[Entry, ...]]:
+        """Captures of every motor, in the order of their serial numbers."""
+        of_motor: dict[str, list[Entry]] = {}
+        for entry in self.entries:
+            of_motor.setdefault(entry.stated["motor_id"], []).append(entry)
+        return {motor_id: tuple(of_motor[motor_id]) for motor_id in sorted(of_motor)}
+
+    @property
     def note(self) -> str:
         """One line that counts and names the files that are no captures, or an empty text."""
         if not self.others:

@@ -17,7 +17,7 @@ from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
-from pipeline.io.ingest.survey import Entry, Survey, survey
+from pipeline.io.ingest.survey import Survey, survey
 from pipeline.io.maps.places import source_maps
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import MachineError, UsageError, meant
@@ -96,13 +96,11 @@ def _of_files(survey: Survey, only: Collection[str] | None) -> Survey:
 
 
 def _tasks(folder: str, survey: Survey, motor: str | None, limits: ReadLimits) -> list[ReadTask]:
-    motors: dict[str, list[Entry]] = {}
-    for entry in survey.entries:
-        motors.setdefault(entry.stated["motor_id"], []).append(entry)
+    motors = survey.motors
     if motor is not None and motor not in motors:
-        raise UsageError(f"no capture of motor {motor} in {folder}", meant(motor, sorted(motors)))
-    wanted = sorted(motors) if motor is None else [motor]
-    return [ReadTask(name, folder, tuple(motors[name]), limits) for name in wanted]
+        raise UsageError(f"no capture of motor {motor} in {folder}", meant(motor, motors))
+    wanted = motors if motor is None else [motor]
+    return [ReadTask(name, folder, motors[name], limits) for name in wanted]
 
 
 def outcome_of(

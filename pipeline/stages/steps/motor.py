@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.estimation.registry import BROKEN, estimators
+from pipeline.estimation.registry import BROKEN, estimator_terms, estimators
 from pipeline.execution.caches.fits import FitMemory
-from pipeline.execution.caches.keys import key_of, superseding_parts
+from pipeline.execution.caches.keys import SupersedingParts, key_of
 from pipeline.execution.caches.model_memory import ModelMemory
 from pipeline.execution.caches.run_cache import note_motor
 from pipeline.execution.caches.stamp import stamp_of
@@ -150,7 +150,7 @@ def superseding(sheet: Datasheet, revoked: Sequence[Revocation]) -> Datasheet:
         if hashlib.sha256(work.content_of(sheet)).hexdigest() == old.content_sha256:
             return sheet
         place = Superseded(old.version, old.by, old.why)
-        version = key_of(superseding_parts(sheet.version, place))
+        version = key_of(SupersedingParts(sheet.version, place))
         sheet = replace(sheet, version=version, supersedes=place)
     return sheet
 
@@ -195,7 +195,7 @@ def _write(
         from pipeline.report.pages.sheet_page import render_sheet
 
         with watch.stage("report"):
-            terms = {term.name: term for estimator in estimators() for term in estimator.terms}
+            terms = estimator_terms()
             coming = [f"recordings/motor-{stem}.rrd"] if job.recordings else []
             coming += [] if judged.diagnosis is None else [f"diagnosis/{stem}.html"]
             links = links_of(Path(job.output), "report/{}.html", job.motor_id, coming)

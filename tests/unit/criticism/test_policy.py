@@ -11,7 +11,7 @@ from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.policy.policy import DEFAULT, policy_changes, policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.execution.caches.keys import key_of, model_parts
+from pipeline.execution.caches.keys import ModelParts, key_of
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -47,7 +47,7 @@ def test_a_fit_goes_by_it():
 
 def test_a_kept_verdict_of_another_policy_does_not_count():
     keys = {
-        key_of(model_parts("code", "libraries", [], spec, [], None, search=True))
+        key_of(ModelParts("code", "libraries", [], spec, [], None, search=True))
         for spec in (ModelSpec(), ModelSpec(policy=CHANGES))
     }
     assert len(keys) == 2
