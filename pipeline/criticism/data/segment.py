@@ -218,14 +218,14 @@ def segment_of(
     kind: str,
     instrument: str,
     period: float,
-    *,
     recorded: Mapping[str, Array],
     sensors: Sensors,
+    *,
     channels: tuple[str, ...],
-    weak: Projection | None,
+    weak: Projection | None = None,
     blocks: NDArray[np.int64] | None = None,
     offsets: Array | None = None,
-    **fixed: float,
+    fixed: Mapping[str, float] | None = None,
 ) -> Segment:
     """A segment with what the capture's metadata says of it.
 
@@ -251,7 +251,7 @@ def segment_of(
         Part of each window [W]; None to hold the capture out as a whole.
     offsets
         Offsets of prior size [K, n].
-    **fixed
+    fixed
         Further numbers of the capture.
 
     Returns
@@ -262,9 +262,9 @@ def segment_of(
     """
     stated = capture.meta.ambient_degc
     ambient = 0.0 if stated is None else stated - REFERENCE_DEGC
-    pwm_hz = capture.meta.pwm_hz
-    if pwm_hz:
-        fixed |= {"pwm_s": 1.0 / pwm_hz, "vdc_v": capture.meta.vdc_v or 0.0}
+    numbers = {"ambient_k": ambient, **(fixed or {})}
+    if pwm_hz := capture.meta.pwm_hz:
+        numbers |= {"pwm_s": 1.0 / pwm_hz, "vdc_v": capture.meta.vdc_v or 0.0}
     meter = "gain_commanded" if capture.meta.voltage_kind == "commanded" else "gain_voltage"
     return Segment(
         capture=capture.path,
@@ -278,7 +278,7 @@ def segment_of(
         sensors=replace(
             sensors, steps={name: step for name, step in sensors.steps.items() if name in recorded}
         ),
-        fixed={"ambient_k": ambient, **fixed},
+        fixed=numbers,
         disturbances=Disturbances(offsets),
         blocks=blocks,
     )

@@ -92,14 +92,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     columns, starts = thinned(columns, keep, window, most)
     weak = projection(columns["theta_mech_rad"], starts, window, orders)
     segment = segment_of(
-        capture,
-        "dq",
-        "drive",
-        period,
-        recorded=columns,
-        sensors=sensors,
-        channels=channels,
-        weak=weak,
+        capture, "dq", "drive", period, columns, sensors, channels=channels, weak=weak
     )
     return replace(segment, unthinned=Unthinned(full, log))
 

@@ -70,18 +70,18 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     keep = log.keep & turns & (at >= 0) & log.keep[np.maximum(at, 0)]
     window = window_of(log.period_s, keep.size, policy.cutting)
     weak = projection(columns["theta_mech_rad"], window_starts(keep, window), window, ())
-    segment = segment_of(
+    return segment_of(
         capture,
         "driven",
         "drive",
         log.period_s,
-        recorded=columns,
-        sensors=log.sensors,
+        columns,
+        log.sensors,
         channels=(VOLTAGE,),
         weak=weak,
         blocks=in_time(weak.starts + window // 2, keep.size),
+        fixed={LATE_VOLTAGE: 1.0, ELECTRICAL: 1.0},
     )
-    return replace(segment, fixed={**segment.fixed, LATE_VOLTAGE: 1.0, ELECTRICAL: 1.0})
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

@@ -44,15 +44,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     # rows of one d current are held out together: a map is often its own mirror image in i_q
     blocks = levels if levels.max(initial=0) + 1 >= policy.levels else None
     return segment_of(
-        capture,
-        "flux_map",
-        "drive",
-        1.0,
-        recorded=columns,
-        sensors=Sensors(noise),
-        channels=LINKAGES,
-        weak=None,
-        blocks=blocks,
+        capture, "flux_map", "drive", 1.0, columns, Sensors(noise), channels=LINKAGES, blocks=blocks
     )
 
 

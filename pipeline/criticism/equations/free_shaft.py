@@ -74,14 +74,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     columns, starts = thinned(columns, keep, window, policy.windows)
     weak = projection(columns["theta_mech_rad"], starts, window, ())
     return segment_of(
-        capture,
-        "shaft",
-        "bench",
-        period,
-        recorded=columns,
-        sensors=sensors,
-        channels=(channel,),
-        weak=weak,
+        capture, "shaft", "bench", period, columns, sensors, channels=(channel,), weak=weak
     )
 
 
@@ -133,14 +126,7 @@ def _slow_turn(
     starts = 1 + window_starts(keep[1:-1], window)
     weak = projection(columns["theta_mech_rad"], starts, window, orders, cycles=0.9, margin=12.0)
     return segment_of(
-        capture,
-        "shaft",
-        "bench",
-        period * factor,
-        recorded=columns,
-        sensors=sensors,
-        channels=(channel,),
-        weak=weak,
+        capture, "shaft", "bench", period * factor, columns, sensors, channels=(channel,), weak=weak
     )
 
 

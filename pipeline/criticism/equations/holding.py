@@ -43,10 +43,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "standing",
         "drive",
         1.0,
-        recorded={"theta_mech_rad": cells.theta_mech_rad, "iq_a": cells.iq_a, "sense": cells.sense},
-        sensors=Sensors({"iq_a": cells.noise_a}),
+        {"theta_mech_rad": cells.theta_mech_rad, "iq_a": cells.iq_a, "sense": cells.sense},
+        Sensors({"iq_a": cells.noise_a}),
         channels=("iq_a",),
-        weak=None,
         blocks=cells.sector,
     )
 

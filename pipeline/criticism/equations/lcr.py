@@ -55,16 +55,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
             scatter, resolution(columns[name], machine.policy.sensor_noise) / math.sqrt(12), least
         )
     channels = tuple(n for n in ("lab_h", "rab_ohm") if n in columns)
-    return segment_of(
-        capture,
-        "lcr",
-        "lcr",
-        1.0,
-        recorded=columns,
-        sensors=Sensors(noise),
-        channels=channels,
-        weak=None,
-    )
+    return segment_of(capture, "lcr", "lcr", 1.0, columns, Sensors(noise), channels=channels)
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from pipeline.criticism.data.drive_log import in_time
@@ -66,20 +64,18 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     orders = electrical_orders(machine) if by_angle else ()
     weak = projection(cut_out["theta_mech_rad"], starts, window, orders)
     middle = np.rint(cut_out["t_s"][weak.starts + window // 2] / period)
-    blocks = in_time(middle, size)
-    segment = segment_of(
+    return segment_of(
         capture,
         "load",
         "drive",
         period,
-        recorded=cut_out,
-        sensors=sensors,
+        cut_out,
+        sensors,
         channels=(TORQUE,),
         weak=weak,
-        blocks=blocks,
+        blocks=in_time(middle, size),
+        fixed={} if "id_a" in cut_out else {SHARE: 1.0},
     )
-    share = {} if "id_a" in cut_out else {SHARE: 1.0}
-    return replace(segment, fixed={**segment.fixed, **share})
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

@@ -63,17 +63,16 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion, pad)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     middle = np.rint(shaft["t_s"][starts + window // 2] / log.period_s)
-    blocks = in_time(middle, log.keep.size)
     segment = segment_of(
         capture,
         "motion",
         "drive",
         log.period_s,
-        recorded=shaft,
-        sensors=log.sensors,
+        shaft,
+        log.sensors,
         channels=(TORQUE,),
         weak=weak,
-        blocks=blocks,
+        blocks=in_time(middle, log.keep.size),
     )
     return replace(segment, unthinned=Unthinned(full))
 

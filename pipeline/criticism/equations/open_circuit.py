@@ -73,17 +73,17 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     columns, starts = thinned(columns, keep, window, policy.windows)
     weak = projection(columns["theta_mech_rad"], starts, window, electrical_orders(machine))
     weak = weak.only(_steady(weak, columns["theta_mech_rad"], policy))
-    segment = segment_of(
+    return segment_of(
         capture,
         "open",
         "bench",
         period,
-        recorded=columns,
-        sensors=sensors,
+        columns,
+        sensors,
         channels=("vd_v", "vq_v"),
         weak=weak,
+        fixed={} if encoder else {_VOLTAGE_FRAME: 1.0},
     )
-    return segment if encoder else replace(segment, fixed={**segment.fixed, _VOLTAGE_FRAME: 1.0})
 
 
 def _by_voltage(

@@ -49,18 +49,18 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     window = window_of(log.period_s, log.keep.size, machine.policy.cutting)
     starts = window_starts(log.keep, window)
     weak = projection(log.columns["theta_mech_rad"], starts, window, ())
-    segment = segment_of(
+    return segment_of(
         capture,
         "q",
         "drive",
         log.period_s,
-        recorded=log.columns,
-        sensors=log.sensors,
+        log.columns,
+        log.sensors,
         channels=("vq_v", SPEED) if log.speed and log.angle else ("vq_v",),
         weak=weak,
         blocks=in_time(weak.starts + window // 2, log.keep.size),
+        fixed={UNSAMPLED: 1.0},
     )
-    return replace(segment, fixed={**segment.fixed, UNSAMPLED: 1.0})
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

@@ -57,10 +57,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "steady",
         "drive",
         1.0,
-        recorded=columns,
-        sensors=Sensors(noise),
+        columns,
+        Sensors(noise),
         channels=("vq_v",),
-        weak=None,
         blocks=levels,
         offsets=offsets.astype(float),
     )

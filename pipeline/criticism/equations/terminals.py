@@ -64,13 +64,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "terminal",
         "bench",
         period,
-        recorded=columns,
-        sensors=sensors,
+        columns,
+        sensors,
         channels=("v_pair_v",),
         weak=weak,
-        blocks=None,
-        offsets=None,
-        **fixed,
+        fixed=fixed,
     )
 
 

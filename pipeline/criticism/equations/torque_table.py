@@ -60,10 +60,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "torque_table",
         "drive",
         1.0,
-        recorded=columns,
-        sensors=Sensors({TORQUE: noise}),
+        columns,
+        Sensors({TORQUE: noise}),
         channels=(TORQUE,),
-        weak=None,
         blocks=parts,
         offsets=np.full((1, torque.size), float(np.abs(torque).max())),
     )
