@@ -21,23 +21,6 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
-__all__ = [
-    "Comparisons",
-    "Datasheets",
-    "Diagnoses",
-    "Figure",
-    "Fits",
-    "Recordings",
-    "check",
-    "compare",
-    "diagnose",
-    "fit",
-    "load",
-    "operate",
-    "read",
-    "simulate",
-]
-
 _HOMES = {
     "Comparisons": "models",
     "Datasheets": "datasheets",
@@ -54,6 +37,7 @@ _HOMES = {
     "read": "recordings",
     "simulate": "simulated",
 }
+__all__ = list(_HOMES)
 
 
 def __getattr__(name: str) -> Any:

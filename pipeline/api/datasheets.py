@@ -24,16 +24,12 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.diagnosis_summary import DiagnosisSummary
 from pipeline.records.outcome import Stopwatch
 from pipeline.settings import ModelSettings, RunSettings
-from pipeline.views.tables import CONSTANT_SCHEMA, constant_rows
+from pipeline.views.tables import CONSTANT_SCHEMA, constant_rows, texts
 
 DATASHEET_SCHEMA = {
-    "motor_id": pl.String,
-    "motor_type": pl.String,
-    "lot": pl.String,
-    "status": pl.String,
+    **texts("motor_id motor_type lot status"),
     "why": pl.List(pl.String),
-    "version": pl.String,
-    "code_version": pl.String,
+    **texts("version code_version"),
 }
 
 

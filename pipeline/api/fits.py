@@ -20,20 +20,13 @@ from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.evidence import Evidence
 from pipeline.settings import RunSettings
-from pipeline.views.tables import CONSTANT_SCHEMA, constant_rows
+from pipeline.views.tables import CONSTANT_SCHEMA, constant_rows, numbers, texts
 
 RESIDUAL_SCHEMA = {
-    "motor_id": pl.String,
-    "estimator": pl.String,
-    "plot": pl.String,
-    "capture": pl.String,
-    "series": pl.String,
-    "x_name": pl.String,
+    **texts("motor_id estimator plot capture series x_name"),
     "x": pl.Float64,
     "y_name": pl.String,
-    "measured": pl.Float64,
-    "fitted": pl.Float64,
-    "residual": pl.Float64,
+    **numbers("measured fitted residual"),
 }
 
 

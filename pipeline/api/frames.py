@@ -10,37 +10,25 @@ import polars as pl
 from pipeline.records.capture import Campaign
 from pipeline.records.datasheet import Check
 from pipeline.records.finding import Finding
+from pipeline.views.tables import numbers, texts
 
 CAPTURE_SCHEMA = {
-    "motor_id": pl.String,
-    "path": pl.String,
-    "test": pl.String,
-    "station": pl.String,
-    "started_at": pl.String,
-    "integrity": pl.String,
+    **texts("motor_id path test station started_at integrity"),
     "rows": pl.Int64,
     "masked": pl.Int64,
     "duration_s": pl.Float64,
     "columns": pl.List(pl.String),
 }
 CHECK_SCHEMA = {
-    "motor_id": pl.String,
-    "check": pl.String,
-    "status": pl.String,
-    "value": pl.Float64,
-    "limit": pl.Float64,
-    "unit": pl.String,
-    "meaning": pl.String,
-    "suspect": pl.String,
+    **texts("motor_id check status"),
+    **numbers("value limit"),
+    **texts("unit meaning suspect"),
 }
 FINDING_SCHEMA = {
-    "file": pl.String,
-    "severity": pl.String,
-    "code": pl.String,
+    **texts("file severity code"),
     "first_row": pl.Int64,
     "last_row": pl.Int64,
-    "message": pl.String,
-    "remedy": pl.String,
+    **texts("message remedy"),
 }
 
 

@@ -20,27 +20,16 @@ from pipeline.records.comparison import Comparison, ModelSpec
 from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.errors import UsageError
 from pipeline.records.evidence import Evidence, Series
+from pipeline.views.tables import numbers, texts
 
 ERROR_SCHEMA = {
-    "motor_id": pl.String,
-    "signal": pl.String,
-    "capture": pl.String,
-    "kind": pl.String,
-    "split": pl.String,
-    "rmse": pl.Float64,
-    "noise_floor": pl.Float64,
-    "ratio": pl.Float64,
+    **texts("motor_id signal capture kind split"),
+    **numbers("rmse noise_floor ratio"),
     "unit": pl.String,
     "n": pl.Int64,
     "n_eff": pl.Float64,
 }
-PARAMETER_SCHEMA = {
-    "motor_id": pl.String,
-    "parameter": pl.String,
-    "value": pl.Float64,
-    "u": pl.Float64,
-    "unit": pl.String,
-}
+PARAMETER_SCHEMA = texts("motor_id parameter") | numbers("value u") | texts("unit")
 LADDER_SCHEMA = {
     "motor_id": pl.String,
     "step": pl.Int64,
@@ -55,12 +44,9 @@ RANKING_SCHEMA = {
     "motor_id": pl.String,
     "effect": pl.String,
     "missing": pl.Boolean,
-    "score": pl.Float64,
-    "held_out_drop": pl.Float64,
-    "p_value": pl.Float64,
+    **numbers("score held_out_drop p_value"),
     "confused_with": pl.List(pl.String),
-    "explanation": pl.String,
-    "experiment": pl.String,
+    **texts("explanation experiment"),
 }
 
 

@@ -31,85 +31,37 @@ def _convention(number: float, label: str, words: str, *enters: Quantity) -> Con
 
 # A current convention enters torque per ampere and power; one of voltage enters both as well. A
 # time constant is a ratio of impedances: no convention of torque, speed or amplitude is in it.
+_BOTH: tuple[Quantity, ...] = ("coupling", "power")
+_WINDING: tuple[Quantity, ...] = ("impedance", "time_constant")
 CONVENTIONS: tuple[Convention, ...] = (
-    _convention(
-        math.pi / 3.0,
-        "1.0472",
-        "six-step no-load speed per DC volt against line-line peak",
-        "coupling",
-    ),
-    _convention(
-        2.0 * math.sqrt(3.0) / math.pi,
-        "1.1027",
-        "torque per DC ampere, six-step, against peak",
-        "coupling",
-        "power",
-    ),
-    _convention(
-        2.0 / math.sqrt(3.0),
-        "1.1547",
-        "Kt = Ke line-line peak, the DC form, against 1.5 p psi",
-        "coupling",
-    ),
-    _convention(
-        math.sqrt(1.5),
-        "1.2247",
-        "power-invariant against amplitude-invariant frame",
-        "coupling",
-        "power",
-    ),
-    _convention(math.sqrt(2.0), "1.4142", "peak against rms", "coupling", "power"),
-    _convention(
-        1.5,
-        "1.5",
-        "the factor 3/2 of the amplitude-invariant frame left out",
-        "coupling",
-        "power",
-    ),
-    _convention(
-        1.5,
-        "1.5",
+    _convention(math.pi / 3.0, "1.0472",
+        "six-step no-load speed per DC volt against line-line peak", "coupling"),
+    _convention(2.0 * math.sqrt(3.0) / math.pi, "1.1027",
+        "torque per DC ampere, six-step, against peak", *_BOTH),
+    _convention(2.0 / math.sqrt(3.0), "1.1547",
+        "Kt = Ke line-line peak, the DC form, against 1.5 p psi", "coupling"),
+    _convention(math.sqrt(1.5), "1.2247",
+        "power-invariant against amplitude-invariant frame", *_BOTH),
+    _convention(math.sqrt(2.0), "1.4142", "peak against rms", *_BOTH),
+    _convention(1.5, "1.5",
+        "the factor 3/2 of the amplitude-invariant frame left out", *_BOTH),
+    _convention(1.5, "1.5",
         "one terminal against the two others in parallel, or a delta's winding against its "
-        "terminals",
-        "impedance",
-        "time_constant",
-    ),
-    _convention(math.sqrt(3.0), "1.7321", "line-line against phase", "coupling", "power"),
+        "terminals", *_WINDING),
+    _convention(math.sqrt(3.0), "1.7321", "line-line against phase", *_BOTH),
     _convention(1.8, "1.8", "degrees Fahrenheit against Celsius", "temperature_coefficient"),
-    _convention(
-        2.0,
-        "2",
+    _convention(2.0, "2",
         "poles against pole pairs, peak to peak against peak, or both amplitudes rms",
-        "coupling",
-        "power",
-        "count",
-    ),
-    _convention(2.0, "2", "line-line against phase impedance", "impedance", "time_constant"),
+        *_BOTH, "count"),
+    _convention(2.0, "2", "line-line against phase impedance", *_WINDING),
     _convention(3.0 / math.sqrt(2.0), "2.1213", "torque per rms ampere against p psi", "coupling"),
-    _convention(
-        3.0, "3", "a delta's winding against its wye equivalent", "impedance", "time_constant"
-    ),
-    _convention(
-        2.0 * math.pi,
-        "2*pi",
-        "per cycle against per radian",
-        "coupling",
-        "power",
-        "impedance",
-        "time_constant",
-    ),
-    _convention(60.0 / (2.0 * math.pi), "9.5493", "rpm against rad/s", "coupling", "power"),
-    _convention(100.0, "100", "hundredths against the unit: N·cm against N·m", "coupling", "power"),
-    _convention(
-        1000.0,
-        "1000",
-        "thousandths against the unit: ms, mA, mV, mH or mN·m",
-        "coupling",
-        "power",
-        "impedance",
-        "time_constant",
-    ),
-)
+    _convention(3.0, "3", "a delta's winding against its wye equivalent", *_WINDING),
+    _convention(2.0 * math.pi, "2*pi", "per cycle against per radian", *_BOTH, *_WINDING),
+    _convention(60.0 / (2.0 * math.pi), "9.5493", "rpm against rad/s", *_BOTH),
+    _convention(100.0, "100", "hundredths against the unit: N·cm against N·m", *_BOTH),
+    _convention(1000.0, "1000",
+        "thousandths against the unit: ms, mA, mV, mH or mN·m", *_BOTH, *_WINDING),
+)  # fmt: skip
 
 
 def convention_suspect(

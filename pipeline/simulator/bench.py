@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulator import driven, standing, turning
+from pipeline.simulator import driven, protocols, standing, turning
 from pipeline.simulator.design import Bench, Motor, Recording
 from pipeline.simulator.plant import plant_of
-from pipeline.simulator.protocols import PROTOCOLS
 from pipeline.simulator.sensors import Session
 from pipeline.simulator.truth import truth
 
@@ -20,20 +19,20 @@ __all__ = ["CAMPAIGN", "campaign", "record", "truth"]
 
 Table = dict[str, NDArray[np.float64]]
 
-_TESTS: Mapping[str, Callable[[Session, Any], Recording]] = {
-    "resistance": standing.resistance,
-    "current_step": standing.current_step,
-    "lcr": standing.lcr,
-    "open_circuit": turning.open_circuit,
-    "hand_turn": turning.hand_turn,
-    "cogging": turning.cogging,
-    "torque_map": driven.torque_map,
-    "spin_down": turning.spin_down,
-    "heat_run": standing.heat_run,
-    "holding_current": standing.holding_current,
-    "flux_map": standing.flux_map,
-    "torque_table": standing.torque_table,
-    "drive": driven.drive,
+_TESTS: Mapping[str, tuple[type, Callable[[Session, Any], Recording]]] = {
+    "resistance": (protocols.Resistance, standing.resistance),
+    "current_step": (protocols.CurrentStep, standing.current_step),
+    "lcr": (protocols.Lcr, standing.lcr),
+    "open_circuit": (protocols.OpenCircuit, turning.open_circuit),
+    "hand_turn": (protocols.HandTurn, turning.hand_turn),
+    "cogging": (protocols.Cogging, turning.cogging),
+    "torque_map": (protocols.TorqueMap, driven.torque_map),
+    "spin_down": (protocols.SpinDown, turning.spin_down),
+    "heat_run": (protocols.HeatRun, standing.heat_run),
+    "holding_current": (protocols.HoldingCurrent, standing.holding_current),
+    "flux_map": (protocols.FluxMap, standing.flux_map),
+    "torque_table": (protocols.TorqueTable, standing.torque_table),
+    "drive": (protocols.Drive, driven.drive),
 }
 
 CAMPAIGN: tuple[tuple[str, str, Mapping[str, Any]], ...] = (
@@ -117,10 +116,11 @@ def record(
     if since > 0.0 and test not in ("torque_map", "drive"):
         raise ValueError(f"nothing changes within a {test}")
     motor = motor if since > 0.0 else other
-    how = PROTOCOLS[test](**protocol)
+    protocol_of, recorded = _TESTS[test]
+    how = protocol_of(**protocol)
     plants = plant_of(motor), plant_of(other)
     session = Session(motor, plants[0], bench, bench.drawn(rng), rng, plants[1], since)
-    recording = _TESTS[test](session, how)
+    recording = recorded(session, how)
     if bench.temperature_hz is None:
         return recording
     return replace(recording, tables=_by_rate(recording.tables[0], bench.temperature_hz))

@@ -27,26 +27,10 @@ from pipeline.simulator.plant import Plant
 
 HISTORY = 256
 COLUMNS = (
-    "i_alpha",
-    "i_beta",
-    "v_alpha",
-    "v_beta",
-    "theta_seen",
-    "omega_seen",
-    "torque_shaft",
-    "temp_winding",
-    "temp_magnet",
-    "theta",
-    "omega",
-    "i_alpha_true",
-    "i_beta_true",
-    "psi_alpha",
-    "psi_beta",
-    "torque_em",
-    "work_in",
-    "work_copper",
-    "work_switches",
-)
+    "i_alpha", "i_beta", "v_alpha", "v_beta", "theta_seen", "omega_seen", "torque_shaft",
+    "temp_winding", "temp_magnet", "theta", "omega", "i_alpha_true", "i_beta_true", "psi_alpha",
+    "psi_beta", "torque_em", "work_in", "work_copper", "work_switches",
+)  # fmt: skip
 Field = tuple[float, float, float, float, float, float, float, float, float]
 
 

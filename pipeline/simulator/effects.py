@@ -13,26 +13,11 @@ from dataclasses import dataclass
 from pipeline.simulator.design import Motor, Size
 
 Defaults = Callable[[Motor], dict[str, float]]
-NEVER_NEGATIVE = frozenset(
-    {
-        "copper_temperature",
-        "skin_effect",
-        "dead_time",
-        "current_delay",
-        "torque_lag",
-        "saturation",
-        "iron_eddy",
-        "iron_hysteresis",
-        "coulomb_friction",
-        "stribeck",
-        "windage",
-        "load_dependent_friction",
-        "presliding",
-        "cogging",
-        "compliance",
-        "backlash",
-    }
-)
+NEVER_NEGATIVE = frozenset({
+    "copper_temperature", "skin_effect", "dead_time", "current_delay", "torque_lag", "saturation",
+    "iron_eddy", "iron_hysteresis", "coulomb_friction", "stribeck", "windage",
+    "load_dependent_friction", "presliding", "cogging", "compliance", "backlash",
+})  # fmt: skip
 """Effects whose `size` is a loss, a time, a gap or an amplitude that has a phase of its own."""
 ALWAYS = ("copper_temperature", "magnet_temperature", "coulomb_friction")
 

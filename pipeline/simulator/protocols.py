@@ -173,20 +173,3 @@ class Drive:
     voltage_timing: str = "centred"
     temp_winding_degc: float | None = None
     temp_magnet_degc: float | None = None
-
-
-PROTOCOLS: dict[str, type] = {
-    "resistance": Resistance,
-    "current_step": CurrentStep,
-    "lcr": Lcr,
-    "open_circuit": OpenCircuit,
-    "hand_turn": HandTurn,
-    "cogging": Cogging,
-    "torque_map": TorqueMap,
-    "spin_down": SpinDown,
-    "heat_run": HeatRun,
-    "holding_current": HoldingCurrent,
-    "flux_map": FluxMap,
-    "torque_table": TorqueTable,
-    "drive": Drive,
-}

@@ -12,21 +12,37 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.uncertainty import type_a
 
-CONSTANT_SCHEMA: dict[str, Any] = {
-    "motor_id": pl.String,
-    "motor_type": pl.String,
-    "lot": pl.String,
-    "constant": pl.String,
+
+def texts(names: str) -> dict[str, Any]:
+    """Columns of text.
+
+    Parameters
+    ----------
+    names
+        With blanks between.
+
+    """
+    return dict.fromkeys(names.split(), pl.String)
+
+
+def numbers(names: str) -> dict[str, Any]:
+    """Columns of numbers.
+
+    Parameters
+    ----------
+    names
+        With blanks between.
+
+    """
+    return dict.fromkeys(names.split(), pl.Float64)
+
+
+CONSTANT_SCHEMA = {
+    **texts("motor_id motor_type lot constant"),
     "value": pl.Float64,
     "unit": pl.String,
-    "u": pl.Float64,
-    "u_a": pl.Float64,
-    "u_b": pl.Float64,
-    "dof": pl.Float64,
-    "low_95": pl.Float64,
-    "high_95": pl.Float64,
-    "status": pl.String,
-    "method": pl.String,
+    **numbers("u u_a u_b dof low_95 high_95"),
+    **texts("status method"),
     "captures": pl.List(pl.String),
     "note": pl.String,
 }

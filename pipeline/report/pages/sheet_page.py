@@ -14,22 +14,10 @@ from pipeline.views.motor import motor_rows
 from pipeline.views.performance import performance_view
 
 SHOWN = (
-    "r_phase_ohm",
-    "ld_h",
-    "lq_h",
-    "psi_pm_wb",
-    "pole_pairs",
-    "kt_peak_nm_a",
-    "kv_ll_peak_rpm_v",
-    "motor_constant_nm_sqrt_w",
-    "j_rotor_kgm2",
-    "torque_coulomb_nm",
-    "b_visc_nm_s_rad",
-    "cogging_amplitude_nm",
-    "tau_elec_s",
-    "tau_mech_s",
-    "rth_winding_k_w",
-)
+    "r_phase_ohm", "ld_h", "lq_h", "psi_pm_wb", "pole_pairs", "kt_peak_nm_a", "kv_ll_peak_rpm_v",
+    "motor_constant_nm_sqrt_w", "j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad",
+    "cogging_amplitude_nm", "tau_elec_s", "tau_mech_s", "rth_winding_k_w",
+)  # fmt: skip
 """Constants of the sheet, where they are known."""
 
 
