@@ -55,6 +55,10 @@ class Finding(PlainRecord):
         """
         return cls(file, "refused", error.code, error.message, error.remedy, error.rows)
 
+    def order(self) -> tuple[str, str, str, tuple[int, int], str]:
+        """Where it stands among others: by file, severity, code, rows and words."""
+        return self.file, self.severity, self.code, self.rows or (-1, -1), self.message
+
     def line(self) -> str:
         """The one line that standard error carries."""
         rows = "" if self.rows is None else f" rows {self.rows[0]}-{self.rows[1]}"

@@ -202,7 +202,8 @@ def _computed(
         datasheets = fleet.datasheets
         of_others = {one.motor_id: status_now(output, one, histories) for one in fleet.others}
         findings = sorted(
-            {f for r in results for f in r.finished.findings}.union(survey.findings), key=_order
+            {f for r in results for f in r.finished.findings}.union(survey.findings),
+            key=Finding.order,
         )
         files, removed = publish(
             settings, results, fleet, tuple(findings), {**of_others, **statuses}, others
@@ -410,10 +411,6 @@ def _process(
         ends[number] = end
     died = tuple(end for end in ends if isinstance(end, MachineError))
     return [end for end in ends if isinstance(end, MotorResult)], died
-
-
-def _order(finding: Finding) -> tuple[str, str, str, tuple[int, int]]:
-    return finding.file, finding.severity, finding.code, finding.rows or (-1, -1)
 
 
 def _size(settings: RunSettings, job: MotorJob) -> tuple[int, int]:

@@ -205,7 +205,7 @@ def survey(
     findings += [_absent(path) for path in sorted(set(manifests) - listed)]
     parts = [part for entry in entries.values() for part in _parts(entry)]
     captures = tuple(sorted(parts, key=lambda entry: entry.capture_path))
-    return Survey(captures, tuple(sorted(findings, key=_order)), tuple(not_captures))
+    return Survey(captures, tuple(sorted(findings, key=Finding.order)), tuple(not_captures))
 
 
 def _parts(entry: Entry) -> list[Entry]:
@@ -333,10 +333,6 @@ def _may_be_capture(folder: Path, file: _File, sources: Mapping[str, SourceMap])
         return True
     head = read_head(folder / file.path, _FIRST_BYTES)
     return head.startswith(MAGIC) or _CONTRACT.match(head) is not None
-
-
-def _order(finding: Finding) -> tuple[str, str, str]:
-    return finding.file, finding.code, finding.message
 
 
 def _duplicate(path: str, first: str) -> Finding:
