@@ -280,7 +280,14 @@ EQUATION = Equation(
     observes=Observes(
         (
             *("r_ohm", "lead_share", "ld_h", "lq_h", *STATE),
-            *("ripple_slope", "ripple_mean", "ripple_edge", "ripple_shift", "frame_lag_s"),
+            *(
+                "ripple_slope",
+                "ripple_mean",
+                "ripple_pulses",
+                "ripple_edge",
+                "ripple_shift",
+                "frame_lag_s",
+            ),
             *("ripple_torque", "ripple_held", "psi_wb", "j_kgm2", "b_nm_s_rad"),
         ),
         hooks=frozenset({"flux", "drop", "torque"}),

@@ -11,7 +11,7 @@ from pipeline.criticism.data.segment import Sensors, projected, row_index, slow_
 from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.effect import ShaftState
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.model import Model, mean_current, zero
+from pipeline.criticism.machine.model import Model, mean_current, ripple, zero
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linearise import effect_columns, linearise
 from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error
@@ -275,3 +275,44 @@ def test_a_coasting_sample_is_averaged_over_parts_enough(turn_rad):
     true = np.sinc(turn_rad / (2 * np.pi)) ** 2 * np.cos(order * theta)
     assert mean[2:-2] == pytest.approx(true[2:-2], abs=0.004)
     assert finer <= max(8, np.ceil(turn_rad / 3.0))
+
+
+def pulsed(voltage_v: complex, vdc_v: float, hold_s: float, r_ohm: float, l_h: float) -> complex:
+    """Mean of the current over a period of centred pulses, less its sample between them [A]: in the
+    steady state, of a machine at rest whose mean current is that of the voltage.
+    """
+    phases = np.exp(2j * np.pi / 3.0 * np.arange(3))
+    wanted = (voltage_v * np.conj(phases)).real
+    duty = 0.5 + (wanted - 0.5 * (wanted.max() + wanted.min())) / vdc_v
+    steps = 6000
+    h = hold_s / steps
+    t = (np.arange(steps) + 0.5) * h - 0.5 * hold_s
+    legs = vdc_v * (np.abs(t)[None, :] < 0.5 * hold_s * duty[:, None])
+    volts = 2.0 / 3.0 * phases @ legs
+    decay = np.exp(-r_ohm * h / l_h)
+    forced = 0j
+    for v in volts:
+        forced = decay * forced + (1.0 - decay) * v / r_ohm
+    now = forced / (1.0 - decay**steps)
+    currents = []
+    for v in volts:
+        currents.append(now)
+        now = decay * now + (1.0 - decay) * v / r_ohm
+    return complex(np.mean(currents) - currents[steps // 2])
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.7, 1.4])
+def test_the_drop_of_a_ripple_lifts_the_mean_current_above_its_samples(angle):
+    """Of little voltage, all of R T² v / (96 L²); where pulses fill the period, less."""
+    r_ohm, l_h, hold_s, vdc_v = 1.8, 1.1e-4, 5e-6, 24.0
+    v = 0.3 * np.exp(1j * angle)
+    x = replace(operating(1), id_a=np.array([v.real / r_ohm]), iq_a=np.array([v.imag / r_ohm]))
+    x = replace(x, omega_rad_s=np.zeros(1)).fed(hold_s=hold_s)
+    values = {**BASE, "r_ohm": r_ohm, "ld_h": l_h, "lq_h": l_h, "ripple_pulses": 1.0 / 96.0}
+    _, below = ripple(x, 0.0, values)
+    assert complex(-below[0]) == pytest.approx(pulsed(v, vdc_v, hold_s, r_ohm, l_h), rel=0.07)
+    center, u = PLAIN.priors()["ripple_pulses"]
+    large = pulsed(8.0 * np.exp(1j * angle), vdc_v, hold_s, r_ohm, l_h)
+    share = abs(large) / (r_ohm * (hold_s / l_h) ** 2 * 8.0)
+    assert abs(share - center) < 2.0 * u
+    assert abs(0.0 - center) < 2.0 * u
