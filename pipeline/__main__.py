@@ -135,10 +135,11 @@ def _print_outcome(outcome: Outcome) -> None:
         _print(line, sys.stderr)
     if outcome.text:
         _print(outcome.text, sys.stdout)
+    stream = sys.stderr if outcome.is_content else sys.stdout
     if outcome.wrote:
-        _print(f"wrote {outcome.wrote}", sys.stdout)
+        _print(f"wrote {outcome.wrote}", stream)
     if outcome.next:
-        _print(f"next: {program()} {printable(outcome.next)}", sys.stdout)
+        _print(f"next: {program()} {printable(outcome.next)}", stream)
     if outcome.timings:
         rows = [f"  {name:<12} {seconds:8.3f} s" for name, seconds in outcome.timings]
         _print("\n".join(["timings", *rows]), sys.stdout)

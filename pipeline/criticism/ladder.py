@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from pipeline.criticism.regression.goodness import HeldOut, signal_errors
 from pipeline.criticism.regression.identifiability import reported_parameters
 from pipeline.criticism.selection.stepwise import LadderStep
@@ -34,14 +30,13 @@ def step_record(step: LadderStep, held_out: HeldOut) -> StepRecord:
     policy = step.fit.policy.validation
     errors = window_errors(step.system, residual)
     flat = (speed_current_map(one, policy) for one in errors)
+    spreads = signal_errors(step.system, residual)
+    floors = signal_errors(step.system, step.system.noise_ratio)
     return StepRecord(
         step.added,
         held_out.total,
-        signal_errors(step.system, residual),
-        {
-            one.signal: StepError(_rms(one.error), _rms(one.sigma), unit_of(one.signal))
-            for one in errors
-        },
+        spreads,
+        {name: StepError(rms, floors[name], unit_of(name)) for name, rms in spreads.items()},
         parameters_of(step, held_out),
         (*(one for one in flat if one is not None), *angle_maps(step.fit)),
         histograms(errors, policy),
@@ -68,7 +63,3 @@ def parameters_of(step: LadderStep, held_out: HeldOut) -> dict[str, ReportedPara
     parameters = step.fit.model.parameters()
     selected = ((name, reported[name]) for name in parameters)
     return {name: ReportedParameter(p.value, p.u, p.unit) for name, p in selected}
-
-
-def _rms(values: np.ndarray) -> float:
-    return math.sqrt(float((values**2).mean()))

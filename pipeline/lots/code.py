@@ -19,6 +19,7 @@ from pipeline.lots.regression import used
 from pipeline.lots.sample import Member
 from pipeline.lots.verdict import overall
 from pipeline.physics.glossary import Term
+from pipeline.physics.notation import MINUS
 from pipeline.records.estimate import Estimate
 from pipeline.records.limits import Limits
 from pipeline.records.lot_constant import (
@@ -247,7 +248,11 @@ def _verdict(seen: _Seen, limits: Limits) -> tuple[Verdict, str]:
     worst, wider = seen.worst, seen.wider
     if worst is None:
         return "not_evaluated", "only the new version gives it"
-    size = "without a stated u" if math.isinf(worst.in_u) else f"{worst.in_u:+.3g} u"
+    size = (
+        "without a stated u"
+        if math.isinf(worst.in_u)
+        else f"{worst.in_u:+.3g} u".replace("-", MINUS)
+    )
     words = f"largest change {size} ({worst.motor_id})"
     if worst.decision == "fail":
         return "fail", f"{words}, above {limits.code_limit:g} u"

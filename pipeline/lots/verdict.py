@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from pipeline.lots.assess import Assessment
-from pipeline.physics.notation import quantity
+from pipeline.physics.notation import MINUS, quantity
 from pipeline.records.limits import ConstantLimits
 from pipeline.records.lot_constant import (
     MOST_RELATIVE,
@@ -207,7 +207,7 @@ def _moved(assessment: Assessment, unit: str) -> str:
     before = sum(assessment.base_means) / len(assessment.base_means)
     change = assessment.contrast.difference
     if before and abs(change) <= MOST_RELATIVE * abs(before):
-        return f"{100.0 * change / abs(before):+.3g} %"
+        return f"{100.0 * change / abs(before):+.3g} %".replace("-", MINUS)
     return f"{'+' if change > 0.0 else ''}{quantity(change, unit, 3)}"
 
 

@@ -97,6 +97,9 @@ class Outcome:
         The command that a user would sensibly give next.
     faults
         What `errors` says of files, and of what ended the command, as plain data.
+    is_content
+        Whether the text is what a file holds, so that it can be piped: `wrote` and `next` then go
+        to standard error.
 
     """
 
@@ -109,6 +112,7 @@ class Outcome:
     wrote: str = ""
     next: str = ""
     faults: tuple[Fault, ...] = ()
+    is_content: bool = False
 
 
 def first_that_applies(*codes: int) -> int:

@@ -61,9 +61,21 @@ def main(settings: ExportSettings) -> Outcome:
     lines = text.count("\n")
     return Outcome(
         text=text if lines <= MOST_LINES else f"{lines} lines, in {path.as_posix()}",
-        errors=(which, *notes, *left, f"note: wrote {path.as_posix()}"),
+        errors=(which, *notes, *left),
         result={"path": path, "content": text},
+        wrote=path.as_posix(),
+        next=_next(version, settings),
+        is_content=lines <= MOST_LINES,
     )
+
+
+def _next(version: Version, settings: ExportSettings) -> str:
+    """What was handed out gets a name, by which a later lot is held against it."""
+    places = (("output", settings.output), ("registry", settings.registry))
+    usual = {"output": ExportSettings().output, "registry": ExportSettings().registry}
+    where = "".join(f" {name}={shlex.quote(at)}" for name, at in places if at != usual[name])
+    which = f"{shlex.quote(version.motor_id)} revision={version.revision}"
+    return f"registry tag {which} tag=in-use by=NAME{where}"
 
 
 def _effects(sheet: Datasheet) -> EffectTables:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -50,7 +51,9 @@ def main(settings: RegressSettings) -> Outcome:
         lines = tuple(f"error: limits {limits.name}: {fault}" for fault in faults)
         return Outcome(2, errors=lines)
     if settings.lint:
-        return Outcome(text=f"limits {limits.name}: {len(limits.family())} constants, no fault")
+        text = f"limits {limits.name}: {len(limits.family())} constants, no fault"
+        trial = f"regress limits={shlex.quote(settings.limits)} baseline=lot:A candidate=lot:B"
+        return Outcome(text=text, next=trial)
     if settings.mode not in MODES:
         raise UsageError(f"regress: no mode {settings.mode!r}", f"one of {', '.join(MODES)}")
     for name in ("baseline", "candidate"):
@@ -63,8 +66,18 @@ def main(settings: RegressSettings) -> Outcome:
     files = _write(output, regression)
     text = regression_text(regression, files)
     return Outcome(
-        EXIT_CODES.get(regression.verdict, UNDECIDED), text, result=regression.document()
+        EXIT_CODES.get(regression.verdict, UNDECIDED),
+        text,
+        result=regression.document(),
+        next=_next(regression, settings.output),
     )
+
+
+def _next(regression: LotRegression, output: str) -> str:
+    """A look at the comparison of the candidate's lot, which its recording shows."""
+    lots = regression.candidate.lots
+    lot = f" lot={shlex.quote(lots[0])}" if lots and lots[0] else ""
+    return f"review{lot} output={shlex.quote(output)}"
 
 
 def _compare(

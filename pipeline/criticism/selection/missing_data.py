@@ -19,6 +19,7 @@ from pipeline.criticism.selection.alternatives import detectable
 from pipeline.criticism.selection.score_test import Candidate
 from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.numerics.coast_setups import REMEDY, setup_words
+from pipeline.physics.glossary import of_ohmmeter
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.diagnosis import Unexcited
 
@@ -89,6 +90,11 @@ def unusable_captures(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
 def _needs(capture: Capture) -> str:
     """What the equation that a capture is nearest to needs of it."""
     test = capture.meta.test
+    if of_ohmmeter(test, capture.columns):
+        return (
+            "no equation takes the readings of an ohmmeter, which show no current; a run makes "
+            "r_phase_ohm of them, and a test with a recorded current shows more"
+        )
     takers = [equation for equation in equations().values() if test in equation.tests]
     if not takers:
         return f"no equation takes a {test}"

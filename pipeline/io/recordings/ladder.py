@@ -240,7 +240,8 @@ def _workspace(result: Diagnosis, signal: str) -> Any:
                 f"/angle_axis/{signal}",
             )
         )
-    lower.append(bar_view("held-out error in noise floors, % of windows", f"/spread/{signal}"))
+    if any(spread.signal == signal for spread in result.ladder[0].histograms):
+        lower.append(bar_view("held-out error in noise floors, % of windows", f"/spread/{signal}"))
     shares = [1.0, 1.5][: len(upper)]
     return rrb.Vertical(
         rrb.Horizontal(*upper, column_shares=shares),

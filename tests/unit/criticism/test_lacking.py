@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import polars as pl
 import pytest
 
 from pipeline.criticism.comparison import compare
@@ -61,6 +62,23 @@ def test_the_second_harmonic_of_cogging_is_no_back_emf():
     found = diagnose(few, STANDARD, start_constants(few))
     assert found.missing == ("cogging",)
     assert found.ladder[-1].held_out < 1.0
+    for step in found.ladder:
+        assert step.errors.keys() == step.signals.keys(), "tables have a noise floor too"
+        assert all(one.noise_floor > 0.0 for one in step.errors.values())
+
+
+def test_an_ohmmeter_lacks_no_column():
+    """It said that it needs t_s: with one, it is used no more than without."""
+    rows = pl.DataFrame({"rab_ohm": [0.1, 0.1], "temp_winding_degc": [24.0, 25.0]})
+    readings = tuple(
+        replace(capture, tables=(rows.with_columns(t_s=pl.Series([0.0, 1.0])) if timed else rows,))
+        for capture, timed in zip(shipped().of("resistance")[:2], (False, True), strict=True)
+    )
+    found = compare(replace(shipped(), captures=readings), STANDARD, Constants())
+    assert not found.errors
+    (note,) = found.notes
+    assert "needs" not in note and "no equation takes the readings of an ohmmeter" in note
+    assert all(capture.path in note for capture in readings)
 
 
 def test_an_open_circuit_of_one_line_is_not_used_and_said_so():

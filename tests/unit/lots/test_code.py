@@ -126,7 +126,7 @@ def test_the_worst_of_several_motors_is_named() -> None:
     ]
     (constant,) = compared(before, after).constants
     assert constant.conformity.worst_motor == "m1"
-    assert constant.why.startswith("largest change -0.9 u (m1)")
+    assert constant.why.startswith("largest change −0.9 u (m1)")
     assert [(c.decision, c.motors) for c in constant.conformity.counts] == [
         ("conditional_pass", 2),
         ("pass", 1),

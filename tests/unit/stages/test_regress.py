@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -68,6 +69,7 @@ def test_an_unchanged_lot_passes(output: Path, capsys: pytest.CaptureFixture[str
     code, out, err = told(capsys, output, "baseline=lot:A", "candidate=lot:B")
     assert (code, err) == (0, "")
     assert out.startswith("pass: Lot B")
+    assert out.splitlines()[-1].endswith(f"review lot=B output={output}")
     said = report(output)
     jsonschema.Draft202012Validator(build_schemas()["lot-regression"]).validate(said)
     found = record_of(LotRegression, said)
@@ -264,7 +266,11 @@ def test_tags(output: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_linter(output: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert told(capsys, output, "lint=true")[:2] == (0, "limits default: 12 constants, no fault\n")
+    assert told(capsys, output, "lint=true")[:2] == (
+        0,
+        "limits default: 12 constants, no fault\nnext: python -m pipeline regress limits=default "
+        "baseline=lot:A candidate=lot:B\n",
+    )
     bad = tmp_path / "bad.yaml"
     bad.write_text(
         "required: []\nconstants: {psi_pm_wb: {nominal: 1, tolerance: 3 %, minimum: 0.99},"
@@ -347,7 +353,12 @@ def test_export_needs_a_release(output: Path, capsys: pytest.CaptureFixture[str]
     code, out, err = told(capsys, output, "csv", "A-0", command="export")
     assert code == 0
     assert "revision 2 is newer and provisional; it is not exported" in err
-    assert (output / "export" / "A-0.csv").read_text() == out
+    assert (output / "export" / "A-0.csv").read_text() == out, "it can be piped"
+    wrote, following = err.splitlines()[-2:]
+    assert wrote == f"wrote {output / 'export' / 'A-0.csv'}"
+    assert following.startswith("next: ") and f"output={output}" in following
+    tag = shlex.split(following.replace("by=NAME", "by=A"))
+    assert told(capsys, output, *tag[tag.index("registry") + 1 : -1], command="registry")[0] == 0
     main(["registry", "revoke", "A-0", "revision=1", "by=QE", "why=doubt", place])
     capsys.readouterr()
     assert told(capsys, output, "csv", "A-0", "revision=1", command="export")[0] == 2
