@@ -18,7 +18,7 @@ from pipeline.records.ledger import Selection, Version, in_force
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
 from pipeline.settings import ExportSettings
-from pipeline.stages.steps.registry import history_of, opened, revision_number
+from pipeline.stages.steps.registry import history_of, naming, opened, revision_number
 from pipeline.views.status_text import exported, not_exported
 
 MOST_LINES = 200
@@ -71,11 +71,8 @@ def main(settings: ExportSettings) -> Outcome:
 
 def _next(version: Version, settings: ExportSettings) -> str:
     """What was handed out gets a name, by which a later lot is held against it."""
-    places = (("output", settings.output), ("registry", settings.registry))
-    usual = {"output": ExportSettings().output, "registry": ExportSettings().registry}
-    where = "".join(f" {name}={shlex.quote(at)}" for name, at in places if at != usual[name])
     which = f"{shlex.quote(version.motor_id)} revision={version.revision}"
-    return f"registry tag {which} tag=in-use by=NAME{where}"
+    return f"registry tag {which} tag=in-use by=NAME{naming(settings)}"
 
 
 def _effects(sheet: Datasheet) -> EffectTables:

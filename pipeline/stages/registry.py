@@ -25,7 +25,13 @@ from pipeline.report.text.registry_text import (
     versions_table,
 )
 from pipeline.settings import RegistrySettings
-from pipeline.stages.steps.registry import history_of, opened, revision_number, unknown_motor
+from pipeline.stages.steps.registry import (
+    history_of,
+    naming,
+    opened,
+    revision_number,
+    unknown_motor,
+)
 from pipeline.views.status_text import decision, when
 from pipeline.views.table_text import safe
 
@@ -62,7 +68,7 @@ def _list(registry: Registry, settings: RegistrySettings) -> Outcome:
     lines = [versions_table(selected), ""] if selected else []
     count = f"{counted(motors, 'motor')}, {counted(len(selected), 'version')}"
     next_ = (
-        f"registry show {shlex.quote(selected[0].motor_id)}{_where(settings)}" if selected else ""
+        f"registry show {shlex.quote(selected[0].motor_id)}{naming(settings)}" if selected else ""
     )
     return Outcome(text="\n".join([*lines, count]), result=selected, next=next_)
 
@@ -77,14 +83,7 @@ def _show(registry: Registry, settings: RegistrySettings) -> Outcome:
     elif version.open_points:
         plan = f"plan motor={motor} output={shlex.quote(settings.output)}"
         return Outcome(text=text, result=sheet.document(), next=plan)
-    return Outcome(text=text, result=sheet.document(), next=next_ + _where(settings))
-
-
-def _where(settings: RegistrySettings) -> str:
-    """The keys that name the same registry in another command, but for those of the default."""
-    places = (("output", settings.output), ("registry", settings.registry))
-    usual = {"output": RegistrySettings().output, "registry": "auto"}
-    return "".join(f" {name}={shlex.quote(is_)}" for name, is_ in places if is_ != usual[name])
+    return Outcome(text=text, result=sheet.document(), next=next_ + naming(settings))
 
 
 def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -153,7 +152,7 @@ def _decide(
     return Outcome(
         text="\n".join(lines),
         result=version,
-        next=f"export json {motor} revision={version.revision}{_where(settings)}"
+        next=f"export json {motor} revision={version.revision}{naming(settings)}"
         if version.status == "released"
         else "",
     )

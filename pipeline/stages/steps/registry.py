@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 from pipeline.io.registry.store import Registry
@@ -25,6 +26,20 @@ def opened(settings: Keys) -> Registry:
     if place == "auto":
         place = (Path(settings.output) / "registry").as_posix()
     return Registry(place, {name: str(one) for name, one in settings.registry_options.items()})
+
+
+def naming(settings: Keys) -> str:
+    """The keys that name the same registry in another command, but for those of the default.
+
+    Parameters
+    ----------
+    settings
+        The keys of the command.
+
+    """
+    places = (("output", settings.output), ("registry", settings.registry or "auto"))
+    usual = {"output": RegistrySettings().output, "registry": "auto"}
+    return "".join(f" {name}={shlex.quote(at)}" for name, at in places if at != usual[name])
 
 
 def history_of(registry: Registry, motor_id: str) -> tuple[Version, ...]:
