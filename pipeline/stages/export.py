@@ -60,7 +60,7 @@ def main(settings: ExportSettings) -> Outcome:
     left = tuple(f"note: not in {exporter.name}: {line}" for line in exporter.omits(source))
     lines = text.count("\n")
     return Outcome(
-        text=text if lines <= MOST_LINES else f"{lines} lines, in {path.as_posix()}",
+        text=text if lines <= MOST_LINES else f"{lines} lines",
         errors=(which, *notes, *left),
         result={"path": path, "content": text},
         wrote=path.as_posix(),

@@ -48,19 +48,13 @@ def key_of(parts: Parts | NamedTuple) -> str:
     return content_digest(parts._asdict() if isinstance(parts, tuple) else dict(parts))
 
 
-class AnswerParts(NamedTuple):
-    """What the survey's answer on one file depends on.
+class AnswersParts(NamedTuple):
+    """What the survey's answers on all files depend on.
 
     Attributes
     ----------
     tools
         Version of the code and of the libraries that give the result.
-    question
-        The file and its row of the manifest.
-    file
-        Digest of the file.
-    sidecar
-        Digest of its sidecar; None without one.
     sources
         Source maps by name.
     limits
@@ -71,12 +65,31 @@ class AnswerParts(NamedTuple):
     """
 
     tools: str
-    question: Question
-    file: str
-    sidecar: str | None
     sources: Mapping[str, SourceMap]
     limits: ReadLimits
     recover: bool
+
+
+class AnswerParts(NamedTuple):
+    """What the survey's answer on one file depends on.
+
+    Attributes
+    ----------
+    survey
+        The key of what all answers depend on.
+    question
+        The file and its row of the manifest.
+    file
+        Digest of the file.
+    sidecar
+        Digest of its sidecar; None without one.
+
+    """
+
+    survey: str
+    question: Question
+    file: str
+    sidecar: str | None
 
 
 def motor_parts(tools: str, job: MotorJob) -> Parts:

@@ -10,11 +10,10 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pipeline.execution.caches.keys import AnswerParts, key_of
+from pipeline.execution.caches.keys import AnswerParts, AnswersParts, key_of
 from pipeline.execution.caches.versions import SURVEY, tools
 from pipeline.execution.jobs import Files, Finished
 from pipeline.io.ingest.guard import ReadLimits
@@ -115,6 +114,8 @@ class RunCache:
         self._inputs = Identities(folder, home)
         self._outputs = Identities(output, home)
         self._before: dict[str, Identity | None] = {}
+        self._valid: dict[str, Mapping[str, Any]] = {}
+        self._survey = ""
 
     def known_answers(
         self,
@@ -139,9 +140,7 @@ class RunCache:
 
         """
         entries = (read_checksummed(self._notes / "survey.json") if self.on else None) or {}
-        self._context = partial(
-            AnswerParts, tools(SURVEY), sources=sources, limits=limits, recover=recover
-        )
+        self._survey = key_of(AnswersParts(tools(SURVEY), sources, limits, recover))
         known = {}
         for number, question in enumerate(questions):
             self._before[question.path] = identity(self._folder / question.path)
@@ -149,6 +148,7 @@ class RunCache:
             note = entries.get(question.path)
             if sha256 and note and note["key"] == self._key(question, sha256):
                 known[number] = _answer(question.path, sha256, note, sources)
+                self._valid[question.path] = note
         return known
 
     def keep_answers(self, questions: Sequence[Question], answers: Sequence[Answer]) -> None:
@@ -171,7 +171,9 @@ class RunCache:
             before = self._before[answer.path]
             if before == identity(self._folder / answer.path):
                 self._inputs.note(answer.path, before, answer.sha256)
-                notes[answer.path] = _answer_note(self._key(question, answer.sha256), answer)
+                notes[answer.path] = self._valid.get(answer.path) or _answer_note(
+                    self._key(question, answer.sha256), answer
+                )
         keep_checksummed(self._notes / "survey.json", notes)
         self._inputs.save()
 
@@ -182,7 +184,7 @@ class RunCache:
                 beside = hashlib.sha256((self._folder / question.sidecar).read_bytes()).hexdigest()
             except OSError:
                 beside = ""
-        return key_of(self._context(question, sha256, beside))
+        return key_of(AnswerParts(self._survey, question, sha256, beside))
 
     def finished(self, motor_id: str, key: str) -> Finished | None:
         """The finished motor of this key, or None where a file of it is missing or changed.

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pipeline.io.storage.publish import canonical_json, write_whole
+from pipeline.io.storage.publish import write_whole
 from pipeline.records.errors import PipelineError
 
 _MAX_BYTES = 2**28
@@ -29,7 +29,9 @@ def write_checksummed(path: Path, document: Any) -> None:
         The disk refuses.
 
     """
-    body = canonical_json(document)
+    # without indent: the encoder in C takes a tenth of the time
+    text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    body = text.encode()
     write_whole(path, hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
 
 

@@ -83,16 +83,26 @@ SUPERSEDED = Superseded("v" * 64, "A. Smith", "unit")
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What is handed to the survey of one file."""
+class Answers:
+    """What is handed to the survey of every file."""
 
     tools: str = "1"
-    question: Question = QUESTION
-    file: str = "a" * 64
-    sidecar: str | None = "b" * 64
     sources: Mapping[str, SourceMap] = field(default_factory=lambda: {"hall": HALL})
     limits: ReadLimits = field(default_factory=ReadLimits)
     recover: bool = False
+
+    def parts(self) -> keys.Parts:
+        return _named(keys.AnswersParts, self)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is handed to the survey of one file."""
+
+    survey: str = "s" * 64
+    question: Question = QUESTION
+    file: str = "a" * 64
+    sidecar: str | None = "b" * 64
 
     def parts(self) -> keys.Parts:
         return _named(keys.AnswerParts, self)
@@ -191,7 +201,16 @@ def _readings(campaign: Campaign) -> Sequence[Any]:
     return keys.campaign_key(campaign, [content_digest(capture) for capture in campaign.captures])
 
 
-KEPT: tuple[Callable[[], Any], ...] = (Answer, Motor, Batch, Version, Superseding, Fit, Model)
+KEPT: tuple[Callable[[], Any], ...] = (
+    Answers,
+    Answer,
+    Motor,
+    Batch,
+    Version,
+    Superseding,
+    Fit,
+    Model,
+)
 OF_NO_WORK = {
     Motor: tuple(f"job.{name}" for name in keys.NOT_OF_A_MOTOR),
     # the entries of a survey are in the keys of its motors
