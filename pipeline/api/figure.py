@@ -35,8 +35,8 @@ class Figure:
 
     def _repr_html_(self) -> str:
         """The drawing as an image, so that its style sheet stays its own."""
-        data = base64.b64encode(self.svg.encode()).decode()
-        return f'<img alt="{escape(self.title)}" src="data:image/svg+xml;base64,{data}"/>'
+        encoded = base64.b64encode(self.svg.encode()).decode()
+        return f'<img alt="{escape(self.title)}" src="data:image/svg+xml;base64,{encoded}"/>'
 
     def save(self, path: str | Path) -> Path:
         """Writes the SVG document.

@@ -66,8 +66,8 @@ class Comparisons(ByMotor[Comparison]):
         """One row a signal and capture: rmse and noise floor [unit], and their ratio."""
         rows = [
             {"motor_id": name, **one.document(), "ratio": one.rmse / one.noise_floor}
-            for name, result in self.motors.items()
-            for one in result.errors
+            for name, model in self.motors.items()
+            for one in model.errors
         ]
         return frames.frame([_only(row, ERROR_SCHEMA) for row in rows], ERROR_SCHEMA)
 
@@ -76,8 +76,8 @@ class Comparisons(ByMotor[Comparison]):
         """One row a fitted parameter; a parameter that the data do not determine has no value."""
         rows = [
             _only({"motor_id": name, "parameter": key, **one.document()}, PARAMETER_SCHEMA)
-            for name, result in self.motors.items()
-            for key, one in result.parameters.items()
+            for name, model in self.motors.items()
+            for key, one in model.parameters.items()
         ]
         return frames.frame(rows, PARAMETER_SCHEMA)
 
@@ -100,8 +100,8 @@ class Comparisons(ByMotor[Comparison]):
                 pl.lit(one.split).alias("split"),
                 pl.all(),
             )
-            for name, result in self.motors.items()
-            for one in result.traces
+            for name, model in self.motors.items()
+            for one in model.traces
         ]
         return pl.concat(parts) if parts else pl.DataFrame()
 
@@ -164,9 +164,9 @@ class Diagnoses(ByMotor[Diagnosis]):
     def ladder(self) -> pl.DataFrame:
         """One row a step and signal: the held-out error as effects are added, 1 at the floor."""
         rows = []
-        for name, result in self.motors.items():
-            for step, at in enumerate(result.ladder):
-                before = result.ladder[step - 1].effects if step else ()
+        for name, model in self.motors.items():
+            for step, at in enumerate(model.ladder):
+                before = model.ladder[step - 1].effects if step else ()
                 added = ", ".join(e for e in at.effects if e not in before)
                 common = {"motor_id": name, "step": step, "added": added, "held_out": at.held_out}
                 rows += [
@@ -180,11 +180,11 @@ class Diagnoses(ByMotor[Diagnosis]):
         """One row an effect: its evidence, and the effects it could be confused with."""
         rows = [
             _only(
-                {"motor_id": name, "missing": one.effect in result.missing, **one.document()},
+                {"motor_id": name, "missing": one.effect in model.missing, **one.document()},
                 RANKING_SCHEMA,
             )
-            for name, result in self.motors.items()
-            for one in result.ranking
+            for name, model in self.motors.items()
+            for one in model.ranking
         ]
         return frames.frame(rows, RANKING_SCHEMA)
 

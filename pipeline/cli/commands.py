@@ -232,9 +232,9 @@ def _keys(settings: type[Any], group: str) -> list[_Key]:
     """Two lines or more a key; a group of keys as `group.key`."""
     keys = []
     for key in fields(settings):
-        made = None if key.default_factory is MISSING else key.default_factory()
-        if is_dataclass(made):
-            keys += _keys(type(made), f"{key.name}.")
+        default = None if key.default_factory is MISSING else key.default_factory()
+        if is_dataclass(default):
+            keys += _keys(type(default), f"{key.name}.")
             continue
         lines = [f"  {group}{key.name.rstrip('_')}={_default(key)}"]
         if words := key.metadata.get("words"):
@@ -269,8 +269,8 @@ def _default(key: Field[Any]) -> str:
     if key.default is not MISSING:
         return "null" if key.default is None else _lower(key.default)
     if key.default_factory is not MISSING:
-        made = key.default_factory()
-        return "{}" if made == {} else str(made).replace("'", "")
+        default = key.default_factory()
+        return "{}" if default == {} else str(default).replace("'", "")
     return "..."
 
 

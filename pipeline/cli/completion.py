@@ -64,12 +64,12 @@ def candidates(line: str) -> list[str]:
     """
     words = line.split(" ")[1:]
     last = words[-1] if words else ""
-    given = [word for word in words[:-1] if word and not word.startswith("-")]
+    typed = [word for word in words[:-1] if word and not word.startswith("-")]
     if last.startswith("-"):
         return _beginning(last, (flag.split()[0] for flag in FLAGS))
-    if not given:
+    if not typed:
         return _beginning(last, COMMANDS)
-    command = COMMANDS.get(given[0])
+    command = COMMANDS.get(typed[0])
     if command is None:
         return []
     keys = dict(_keys(command.settings, ""))

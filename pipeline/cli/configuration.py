@@ -225,7 +225,7 @@ def _composed(command: Command, overrides: list[str], config_dir: str | None) ->
             config = compose(None, overrides=overrides)
         if "${" in repr(OmegaConf.to_container(config, resolve=False)):
             raise UsageError(f"{config_dir} holds ${{...}}", "write the value itself")
-        made: Settings = typing.cast(Settings, OmegaConf.to_object(config))
+        settings: Settings = typing.cast(Settings, OmegaConf.to_object(config))
     except (HydraException, OmegaConfBaseException) as error:
         reasons = [str(one).splitlines()[0].rstrip(".") for one in (error, error.__cause__) if one]
         reason = ": ".join(dict.fromkeys(reasons))
@@ -233,7 +233,7 @@ def _composed(command: Command, overrides: list[str], config_dir: str | None) ->
             f"{command.name}: {reason}",
             f"`{program()} {command.name} --help` lists the keys",
         ) from error
-    return made
+    return settings
 
 
 def _is_text(kind: Any) -> bool:

@@ -71,7 +71,7 @@ def split_flags(arguments: Sequence[str]) -> tuple[Flags, list[str]]:
         if not word.startswith("-") or word == "-":
             rest.append(word)
             continue
-        typed, given, value = word.partition("=")
+        typed, equals, value = word.partition("=")
         name = _SHORT.get(typed, typed)
         field = name.removeprefix("--").replace("-", "_")
         if not name.startswith("--") or field not in Flags.__dataclass_fields__:
@@ -79,7 +79,7 @@ def split_flags(arguments: Sequence[str]) -> tuple[Flags, list[str]]:
         if name not in _TAKES:
             flags[field] = True
             continue
-        if not given:
+        if not equals:
             value = words.pop(0) if words else ""
         if not value or (_TAKES[name] and value not in _TAKES[name]):
             takes = " or ".join(_TAKES[name]) or "a folder"

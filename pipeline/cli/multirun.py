@@ -43,16 +43,16 @@ def sweep(command: Command, words: Sequence[str], run: Callable[[list[str]], Out
     if len(runs) > MOST_RUNS:
         raise UsageError(f"--multirun: {len(runs)} runs", f"at most {MOST_RUNS}; sweep fewer keys")
     as_json = asks_for_json(words)
-    texts, errors, codes, results = [], [], [], []
+    texts, errors, codes, of_runs = [], [], [], []
     for combination in runs:
         name = ",".join(combination[number] for number in swept)
         outcome = run(_run_words(command, combination, name))
         texts.append(outcome.text if as_json else f"[{name}]\n{outcome.text}".rstrip())
         errors += [f"[{name}] {line}" for line in outcome.errors]
-        results.append({"words": name, "exit_code": outcome.exit_code, "result": outcome.result})
+        of_runs.append({"words": name, "exit_code": outcome.exit_code, "result": outcome.result})
         codes.append(outcome.exit_code)
     text = f"[{','.join(texts)}]" if as_json else "\n".join(texts)
-    return Outcome(first_that_applies(*codes), text, tuple(errors), result=results)
+    return Outcome(first_that_applies(*codes), text, tuple(errors), result=of_runs)
 
 
 def _run_words(command: Command, words: Sequence[str], name: str) -> list[str]:
@@ -60,16 +60,16 @@ def _run_words(command: Command, words: Sequence[str], name: str) -> list[str]:
     fields = command.settings.__dataclass_fields__
     if "output" not in fields or fields["output"].metadata.get("result", True):
         return list(words)
-    given = [word.partition("=")[2] for word in words if word.startswith("output=")]
-    output = given[-1] if given else fields["output"].default
+    outputs = [word.partition("=")[2] for word in words if word.startswith("output=")]
+    output = outputs[-1] if outputs else fields["output"].default
     rest = [word for word in words if not word.startswith("output=")]
     return [*rest, f"output={output}/multirun/{name.replace('/', '_')}"]
 
 
 def _values(word: str) -> list[str]:
     """The words of which `key=a,b` is short; commas in brackets, braces and quotes part none."""
-    key, given, text = word.partition("=")
-    if not given:
+    key, equals, text = word.partition("=")
+    if not equals:
         return [word]
     values, depth, quote = [""], 0, ""
     for char in text:

@@ -78,15 +78,15 @@ def _statements(campaign: Campaign) -> list[Finding]:
     findings = []
     for used in stated_constants(campaign):
         for capture in campaign.captures:
-            given = capture.meta.extra.get(used.name)
-            if given is None or capture.path in used.captures or used.name in campaign.stated:
+            stated = capture.meta.extra.get(used.name)
+            if stated is None or capture.path in used.captures or used.name in campaign.stated:
                 continue
             findings.append(
                 Finding(
                     capture.path,
                     "warning",
                     "statement_contradiction",
-                    f"{used.name} is stated as {given}, but as {used.number:g} ± {used.u:.2g} in "
+                    f"{used.name} is stated as {stated}, but as {used.number:g} ± {used.u:.2g} in "
                     f"{used.captures[0]}{_beside(len(used.captures))}, which counts",
                     f"correct {used.name} or u_{used.name} of one of them",
                 )
@@ -204,8 +204,8 @@ def _step_clocks(campaign: Campaign) -> list[Finding]:
 def _settling_s(capture: Capture) -> float:
     """Time constant of a step's current [s], roughly; infinite where it has no edge."""
     names = [n for n in LINE_CURRENTS if capture.has("t_s", n)]
-    data = capture.arrays("t_s", *names)
-    current = data[names[0]][np.isfinite(data[names[0]])] if names else np.zeros(0)
+    columns = capture.arrays("t_s", *names)
+    current = columns[names[0]][np.isfinite(columns[names[0]])] if names else np.zeros(0)
     if current.size < 2:
         return math.inf
-    return samples_per_time_constant(current) * float(np.median(np.diff(data["t_s"])))
+    return samples_per_time_constant(current) * float(np.median(np.diff(columns["t_s"])))

@@ -142,8 +142,8 @@ def _without_computed_torque(capture: Capture) -> tuple[Capture, list[Finding]]:
     """
     if capture.meta.test != "drive" or not capture.has("iq_a", TORQUE):
         return capture, []
-    data = capture.arrays("iq_a", TORQUE)
-    factor = same_but_for_noise(data[TORQUE], data["iq_a"])
+    columns = capture.arrays("iq_a", TORQUE)
+    factor = same_but_for_noise(columns[TORQUE], columns["iq_a"])
     if factor is None:
         return capture, []
     tables = tuple(t.drop(TORQUE, strict=False) for t in capture.tables)

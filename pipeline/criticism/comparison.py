@@ -180,15 +180,15 @@ def _errors(system: LinearSystem, held_out: HeldOut) -> Iterator[SignalError]:
         in_group = system.group == place
         if order != 0 or not in_group.any():
             continue
-        out = bool(np.isfinite(held_out.residual[in_group]).all())
-        residual = held_out.residual[in_group] if out else system.residual[in_group]
+        predicted = bool(np.isfinite(held_out.residual[in_group]).all())
+        residual = held_out.residual[in_group] if predicted else system.residual[in_group]
         unit, expected = system.unit[in_group], (system.noise_ratio * held_out.widening)[in_group]
         segment = system.segments[number]
         signal = reported_signal(segment, channel)
         yield SignalError(
             signal,
             segment.capture,
-            "held_out" if out else "fit",
+            "held_out" if predicted else "fit",
             math.sqrt(float(((residual * unit) ** 2).mean())),
             math.sqrt(float(((unit * expected) ** 2).mean())),
             int(in_group.sum()),

@@ -189,9 +189,9 @@ def _largest(capture: Capture, name: str) -> float:
 
 def _fastest_rad_s(capture: Capture) -> float:
     """The speed that the angle reaches, over pieces of a hundredth of the capture [rad/s]."""
-    data = capture.arrays("t_s", "theta_mech_rad")
-    finite = np.isfinite(data["theta_mech_rad"])
-    t_s, angle = data["t_s"][finite], data["theta_mech_rad"][finite]
+    columns = capture.arrays("t_s", "theta_mech_rad")
+    finite = np.isfinite(columns["theta_mech_rad"])
+    t_s, angle = columns["t_s"][finite], columns["theta_mech_rad"][finite]
     step = max(1, t_s.size // 100)
     speed = np.abs(np.diff(angle[::step]) / np.diff(t_s[::step]))
     return float(np.percentile(speed, 95.0)) if speed.size else 0.0

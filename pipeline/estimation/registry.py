@@ -128,16 +128,16 @@ def _fit_all(
         if campaign.of(*estimator.tests):
             chosen = {**estimator.options, **options.get(estimator.name, {}), **changes}
             try:
-                result = _timed(
+                fitted = _timed(
                     estimator, campaign, _fitted(estimator, campaign, known, chosen, recall)
                 )
             except BROKEN as error:
                 reason = f"{estimator.name} broke on this data: {type(error).__name__}: {error}"
                 failures.append(Failure("estimator_failed", reason, REPORT))
-                result = Fit(_missing(estimator, reason))
+                fitted = Fit(_missing(estimator, reason))
         else:
-            result = Fit(_missing(estimator, estimator.experiment))
-        fits.append((estimator.rank, order, _possible(estimator, result)))
+            fitted = Fit(_missing(estimator, estimator.experiment))
+        fits.append((estimator.rank, order, _possible(estimator, fitted)))
         ranked = sorted(fits, key=lambda item: item[:2])
         measured = reconciled(Constants(tuple(e for _, _, fit in ranked for e in fit.estimates)))
         known = Constants((*measured.estimates, *stated))

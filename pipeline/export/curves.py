@@ -43,10 +43,10 @@ def bump_of(table: EffectTable) -> Bump | None:
     if drag is None or np.any(np.diff(drag) > OF_PEAK * drag[0]) or drag[-1] > 0.5 * drag[0]:
         return None
     tried = np.geomspace(speed[1], speed[-1], 400)
-    made = drag[0] * np.exp(-((speed / tried[:, None]) ** 2))
-    errors = np.sqrt(((made - drag) ** 2).sum(axis=1))
+    bumps = drag[0] * np.exp(-((speed / tried[:, None]) ** 2))
+    errors = np.sqrt(((bumps - drag) ** 2).sum(axis=1))
     best = int(errors.argmin())
-    return Bump(float(drag[0]), float(tried[best]), float(np.abs(made[best] - drag).max()))
+    return Bump(float(drag[0]), float(tried[best]), float(np.abs(bumps[best] - drag).max()))
 
 
 def drag_polynomial(table: EffectTable) -> Array | None:

@@ -100,8 +100,8 @@ def compare_lots(
         _material(one_limits, samples, limits, terms, order) for one_limits in limits.family()
     ]
     constants = tuple(
-        result(made, family, limits, dict(lots))
-        for made, family in zip(materials, _families(materials, limits), strict=True)
+        result(material, family, limits, dict(lots))
+        for material, family in zip(materials, _families(materials, limits), strict=True)
     )
     effects = _effects(samples, limits)
     verdict, reasons = overall(constants, effects)
@@ -171,8 +171,8 @@ def _material(
 
 def _families(materials: Sequence[Material], limits: Limits) -> list[Family]:
     """Holm over the constants, for the lot-level test and for that of the motors."""
-    lots = [_lot_p(made.assessment, limits.min_lots) for made in materials]
-    motors = [_motor_p(made.assessment) for made in materials]
+    lots = [_lot_p(material.assessment, limits.min_lots) for material in materials]
+    motors = [_motor_p(material.assessment) for material in materials]
     size = max(sum(p is not None for p in motors), 1)
     return [
         Family(lot, motor, size)
@@ -257,12 +257,12 @@ def _outliers(constants: Sequence[ConstantResult]) -> tuple[Outlier, ...]:
 def _notes(materials: Sequence[Material]) -> list[str]:
     """What the comparison left out, once each."""
     notes: dict[str, list[str]] = {}
-    for made in materials:
-        if made.assessment.unlinked and not made.assessment.confounded:
-            lots = ", ".join(made.assessment.unlinked)
+    for material in materials:
+        if material.assessment.unlinked and not material.assessment.confounded:
+            lots = ", ".join(material.assessment.unlinked)
             notes.setdefault(
                 f"baseline lots {lots} are of stations that nothing links to the candidate's, "
                 "and are left out",
                 [],
-            ).append(made.limits.name)
+            ).append(material.limits.name)
     return [f"{words} ({', '.join(names)})" for words, names in notes.items()]

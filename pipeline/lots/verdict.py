@@ -193,8 +193,8 @@ def _beyond(
 
 
 def _outside(conformity: Conformity) -> str:
-    out = {"fail", "conditional_fail"}
-    number = sum(count.motors for count in conformity.counts if count.decision in out)
+    failed = {"fail", "conditional_fail"}
+    number = sum(count.motors for count in conformity.counts if count.decision in failed)
     total = sum(count.motors for count in conformity.counts)
     kind = conformity.worst.replace("_", " ")
     return f"{number} of {total} motors outside the limits, {conformity.worst_motor} is a {kind}"

@@ -450,10 +450,10 @@ def waveform(lines: Sequence[OrderLine], theta_rad: Array) -> Array:
         Σ Re(c_k exp(j k θ)), without a mean, in the unit of the coefficients.
 
     """
-    out = np.zeros(theta_rad.size)
+    wave = np.zeros(theta_rad.size)
     for line in lines:
-        out += np.real(line.coefficient * np.exp(1j * line.order * theta_rad))
-    return out
+        wave += np.real(line.coefficient * np.exp(1j * line.order * theta_rad))
+    return wave
 
 
 def half_peak_to_peak(lines: Sequence[OrderLine]) -> tuple[float, float]:

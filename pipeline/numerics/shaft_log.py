@@ -61,10 +61,10 @@ def shaft_log(capture: Capture, *names: str, optional: tuple[str, ...] = ()) -> 
     ----------
     capture
         The log.
-    *names
-        Columns that it must hold.
     optional
         Columns that it may hold.
+    *names
+        Columns that it must hold.
 
     Returns
     -------
@@ -75,6 +75,6 @@ def shaft_log(capture: Capture, *names: str, optional: tuple[str, ...] = ()) -> 
     motion = motion_column(capture)
     if not capture.has("t_s", motion, *names):
         return None
-    data = capture.finite("t_s", motion, *names, *(n for n in optional if capture.has(n)))
-    theta = data[motion] if motion == ANGLE else trapezoid(data["t_s"], data[motion])
-    return ShaftLog(data, motion, theta)
+    columns = capture.finite("t_s", motion, *names, *(n for n in optional if capture.has(n)))
+    theta = columns[motion] if motion == ANGLE else trapezoid(columns["t_s"], columns[motion])
+    return ShaftLog(columns, motion, theta)

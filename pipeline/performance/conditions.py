@@ -43,15 +43,15 @@ def operation_of(campaign: Campaign, stated: Stated) -> Operation | None:
         a temperature limit that is not above the ambient.
 
     """
-    given = check_stated(stated)
+    known = check_stated(stated)
     usual = {
         "vdc_v": _bus_voltage(campaign),
         "current_a": _highest(campaign.captures, "id_a", "iq_a"),
     }
-    conditions = {name: given.get(name, value) for name, value in usual.items()}
+    conditions = {name: known.get(name, value) for name, value in usual.items()}
     if conditions["vdc_v"] is None or conditions["current_a"] is None:
         return None
-    origin = {name: STATED if name in given else SEEN for name in conditions}
+    origin = {name: STATED if name in known else SEEN for name in conditions}
     defaults = {
         "temp_winding_degc": (25.0, "the reference of the constants"),
         "temp_magnet_degc": (25.0, "the reference of the constants"),
@@ -59,14 +59,14 @@ def operation_of(campaign: Campaign, stated: Stated) -> Operation | None:
         "voltage_share": (1.0, "linear range of space-vector modulation"),
     }
     for name, (value, why) in defaults.items():
-        conditions[name] = given.get(name, value)
-        origin[name] = STATED if name in given else why
-    ambient = given.get("temp_ambient_degc", AMBIENT_DEGC)
-    conditions["temp_limit_degc"] = given.get("temp_limit_degc", ambient + RISE_K)
+        conditions[name] = known.get(name, value)
+        origin[name] = STATED if name in known else why
+    ambient = known.get("temp_ambient_degc", AMBIENT_DEGC)
+    conditions["temp_limit_degc"] = known.get("temp_limit_degc", ambient + RISE_K)
     origin["temp_limit_degc"] = (
-        STATED if "temp_limit_degc" in given else "80 K: IEC 60034-1, 8.10, class 130 (B)"
+        STATED if "temp_limit_degc" in known else "80 K: IEC 60034-1, 8.10, class 130 (B)"
     )
-    drops = {name: given.get(name) for name in ("drop_v", "on_ohm")}
+    drops = {name: known.get(name) for name in ("drop_v", "on_ohm")}
     return Operation(**conditions, **drops, origin=origin)  # type: ignore[arg-type]
 
 
@@ -89,11 +89,11 @@ def check_stated(stated: Stated) -> dict[str, float]:
         A number is not finite, not above 0 where it must be, or is that of no motor or inverter.
 
     """
-    given = {name: float(v) for name, v in stated.items() if v is not None}
-    ambient = given.get("temp_ambient_degc", AMBIENT_DEGC)
-    if not given.get("temp_limit_degc", math.inf) > ambient:
+    known = {name: float(v) for name, v in stated.items() if v is not None}
+    ambient = known.get("temp_ambient_degc", AMBIENT_DEGC)
+    if not known.get("temp_limit_degc", math.inf) > ambient:
         raise UsageError("operate.temp_limit_degc is not above the ambient", "state a higher one")
-    for name, value in given.items():
+    for name, value in known.items():
         if not math.isfinite(value):
             raise UsageError(f"operate.{name}={value} is no number", "state a finite one")
         if name in ("vdc_v", "current_a", "voltage_share") and value <= 0.0:
@@ -107,7 +107,7 @@ def check_stated(stated: Stated) -> dict[str, float]:
             raise UsageError(f"operate.{name}={value:g} is negative", "state 0 or more")
         if name.endswith("_degc") and not -100.0 < value < 500.0:
             raise UsageError(f"operate.{name}={value:g} is no motor's", "state it in degC")
-    return given
+    return known
 
 
 def _bus_voltage(campaign: Campaign) -> float | None:
@@ -127,8 +127,8 @@ def _highest(captures: Iterable[Capture], d: str, q: str) -> float | None:
     currents = []
     for capture in captures:
         if capture.has(d, q):
-            data = capture.arrays(d, q)
-            length = np.hypot(data[d], data[q])
+            columns = capture.arrays(d, q)
+            length = np.hypot(columns[d], columns[q])
             length = length[np.isfinite(length)]
             if length.size:
                 currents.append(float(np.percentile(length, HIGH)))

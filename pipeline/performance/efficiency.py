@@ -75,8 +75,10 @@ def point_cells(
     drag = drag_nm(machine, omega)
     shaft = torque_nm(machine, wide_d, wide_q) - drag
     copper, rotation = copper_w(machine, wide_d, wide_q), drag * omega
-    out = shaft * omega
-    efficiency = np.where(out > 0.0, out / np.maximum(out + copper + rotation, 1e-300), 0.0)
+    power_w = shaft * omega
+    efficiency = np.where(
+        power_w > 0.0, power_w / np.maximum(power_w + copper + rotation, 1e-300), 0.0
+    )
     low, high = np.percentile(efficiency[1:], [2.5, 97.5], axis=0)
     drop, ohm = operation.drop_v, operation.on_ohm
     known = drop is not None or ohm is not None

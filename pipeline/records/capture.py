@@ -301,10 +301,10 @@ class Capture:
 
         Parameters
         ----------
-        *names
-            Names of the glossary.
         needed
             Those that must be; empty for all.
+        *names
+            Names of the glossary.
 
         Returns
         -------
@@ -312,9 +312,9 @@ class Capture:
             By name.
 
         """
-        data = self.arrays(*names)
-        finite = np.all([np.isfinite(data[name]) for name in needed or names], axis=0)
-        return {name: column[finite] for name, column in data.items()}
+        columns = self.arrays(*names)
+        finite = np.all([np.isfinite(columns[name]) for name in needed or names], axis=0)
+        return {name: column[finite] for name, column in columns.items()}
 
     def _on_clock(self, name: str, home: int) -> Array:
         table = self.tables[home]

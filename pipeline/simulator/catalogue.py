@@ -157,7 +157,7 @@ def with_effects(motor: Motor, text: str) -> Motor:
     """
     inside = text.strip().removeprefix("[").removesuffix("]")
     chosen: dict[str, dict[str, float]] = {}
-    for word in (item.strip() for item in inside.split(",")):
+    for word in (part.strip() for part in inside.split(",")):
         if not word:
             continue
         match = _ITEM.fullmatch(word)
@@ -170,8 +170,8 @@ def with_effects(motor: Motor, text: str) -> Motor:
         if name not in FORMS:
             known = ", ".join([*sorted(FORMS), *sorted(OUTSIDE)])
             raise ValueError(f"no effect {name}; there are {known}")
-        given = {} if value is None else {key or "size": _number(value, word)}
-        chosen[name] = {**chosen.get(name, {}), **given}
+        sizes = {} if value is None else {key or "size": _number(value, word)}
+        chosen[name] = {**chosen.get(name, {}), **sizes}
         _possible(name, parameters(name, motor, chosen[name]))
     return motor.having(**chosen)
 

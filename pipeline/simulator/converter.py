@@ -100,8 +100,8 @@ def phase_drop(i: float, p: Plant) -> float:
     doi:10.1109/41.88903.
 
     """
-    given = p.given_v * min(max(i / p.given_ramp_a, -1.0), 1.0)
-    return float(p.dead_v * i / math.sqrt(i * i + p.dead_knee_a * p.dead_knee_a) - given)
+    given_v = p.given_v * min(max(i / p.given_ramp_a, -1.0), 1.0)
+    return float(p.dead_v * i / math.sqrt(i * i + p.dead_knee_a * p.dead_knee_a) - given_v)
 
 
 @njit(cache=True)
@@ -625,7 +625,7 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant, later: Plant, ch
         `COLUMNS` at the sampling instants, SI units.
 
     """
-    out = np.empty((reference.shape[0], len(COLUMNS)))
+    rows = np.empty((reference.shape[0], len(COLUMNS)))
     y, work, loop = beginning(c, p), np.zeros(3), np.zeros(3)
     warm = (c.temp_winding, c.temp_magnet)
     history, newest = np.zeros((HISTORY, 2)), 0
@@ -651,12 +651,12 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant, later: Plant, ch
             omega += blend * ((angle - before) / c.period_s - omega)
         before = angle
         shaft, torque = shaft_torque(y, want, volt, warm, c, p)
-        out[k, 0:9] = (seen[0], seen[1], volt[0], volt[1], angle, omega, shaft, warm[0], warm[1])
-        out[k, 9:16] = (y[2], y[3], true[0], true[1], y[0], y[1], torque)
-        out[k, 16:19] = work
+        rows[k, 0:9] = (seen[0], seen[1], volt[0], volt[1], angle, omega, shaft, warm[0], warm[1])
+        rows[k, 9:16] = (y[2], y[3], true[0], true[1], y[0], y[1], torque)
+        rows[k, 16:19] = work
         ahead = command(loop, seen, c.pole_pairs * angle, omega, want, c)
         rest = c.substeps - c.substeps_before
         newest = run_on(y, work, volt, want, warm, rest, history, newest, c, p)
         volt = ahead
         warm = heat(warm[0], warm[1], (work[1] - copper) / c.period_s, c.ambient, c.period_s, p)
-    return out
+    return rows

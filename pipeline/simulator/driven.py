@@ -170,12 +170,12 @@ def loop_noise(session: Session, n: int, period_s: float) -> Array:
 
     """
     t_s: Array = np.arange(n, dtype=np.float64) * period_s
-    out = np.zeros((n, 4))
+    errors = np.zeros((n, 4))
     for k in range(3):
-        out[:, k] = session.noise(n, session.current_sigma_a, t_s)
+        errors[:, k] = session.noise(n, session.current_sigma_a, t_s)
     if session.bench.encoder_noise_rad > 0.0:
-        out[:, 3] = session.noise(n, session.bench.encoder_noise_rad)
-    return out
+        errors[:, 3] = session.noise(n, session.bench.encoder_noise_rad)
+    return errors
 
 
 def log(session: Session, rows: Array, period_s: float) -> dict[str, Array]:

@@ -243,15 +243,15 @@ def parameters(name: str, motor: Motor, size: Size | None = None) -> dict[str, f
     if form is None:
         raise ValueError(f"no effect {name}; there are {', '.join(sorted(FORMS))}")
     full = form.typical(motor)
-    given: Mapping[str, float] = {}
+    sizes: Mapping[str, float] = {}
     if size is not None:
-        given = size if isinstance(size, Mapping) else {"size": float(size)}
-    strange = set(given) - set(full)
+        sizes = size if isinstance(size, Mapping) else {"size": float(size)}
+    strange = set(sizes) - set(full)
     if strange:
         raise ValueError(
             f"{name} has no parameter {', '.join(sorted(strange))}; it has {', '.join(full)}"
         )
-    full.update({key: float(value) for key, value in given.items()})
+    full.update({key: float(value) for key, value in sizes.items()})
     if math.isnan(full.get("size_d", 0.0)):
         full["size_d"] = 0.4 * full["size"]
     return full

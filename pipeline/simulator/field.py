@@ -352,10 +352,10 @@ def fluxes(i_d: Array, i_q: Array, eps: Array, degc: float, p: Plant) -> Array:
         The motor in numbers.
 
     """
-    out = np.empty((i_d.size, 2))
+    psi_wb = np.empty((i_d.size, 2))
     for k in range(i_d.size):
-        out[k, 0], out[k, 1] = flux(i_d[k], i_q[k], eps[k], degc, p)
-    return out
+        psi_wb[k, 0], psi_wb[k, 1] = flux(i_d[k], i_q[k], eps[k], degc, p)
+    return psi_wb
 
 
 @njit(cache=True)
@@ -376,12 +376,12 @@ def torques(i_d: Array, i_q: Array, eps: Array, degc: float, p: Plant) -> Array:
         The motor in numbers.
 
     """
-    out = np.empty(i_d.size)
+    torque_nm = np.empty(i_d.size)
     for k in range(i_d.size):
         d, q = flux(i_d[k], i_q[k], eps[k], degc, p)
         now_d, now_q, w_eps = current(d, q, eps[k], degc, p)
-        out[k] = torque_of(d, q, now_d, now_q, w_eps, p)
-    return out
+        torque_nm[k] = torque_of(d, q, now_d, now_q, w_eps, p)
+    return torque_nm
 
 
 @njit(cache=True)
@@ -398,13 +398,13 @@ def inductances(eps: Array, degc: float, p: Plant) -> Array:
         The motor in numbers.
 
     """
-    out = np.empty((eps.size, 3))
+    l_h = np.empty((eps.size, 3))
     for k in range(eps.size):
         md, mq, _, _ = magnet(eps[k], degc, p)
         g_dd, g_qq, g_dq = stiffness(md, mq, eps[k], degc, p)
         det = g_dd * g_qq - g_dq * g_dq
-        out[k, 0], out[k, 1], out[k, 2] = g_qq / det, g_dd / det, -g_dq / det
-    return out
+        l_h[k, 0], l_h[k, 1], l_h[k, 2] = g_qq / det, g_dd / det, -g_dq / det
+    return l_h
 
 
 @njit(cache=True)
@@ -421,15 +421,15 @@ def open_flux(eps: Array, degc: Array, p: Plant) -> Array:
         The motor in numbers.
 
     """
-    out = np.empty((eps.size, 3))
+    psi_wb = np.empty((eps.size, 3))
     for k in range(eps.size):
         d, q, _, _ = magnet(eps[k], degc[k], p)
         c, s = math.cos(eps[k]), math.sin(eps[k])
         alpha, beta = c * d - s * q, s * d + c * q
-        out[k, 0] = alpha
-        out[k, 1] = -0.5 * alpha + 0.5 * SQRT3 * beta
-        out[k, 2] = -0.5 * alpha - 0.5 * SQRT3 * beta
-    return out
+        psi_wb[k, 0] = alpha
+        psi_wb[k, 1] = -0.5 * alpha + 0.5 * SQRT3 * beta
+        psi_wb[k, 2] = -0.5 * alpha - 0.5 * SQRT3 * beta
+    return psi_wb
 
 
 @njit(cache=True)
@@ -453,13 +453,13 @@ def open_emf(eps: Array, omega_elec: Array, degc: Array, p: Plant) -> Array:
         a, b, c [V]: ω dψ/dε of `open_flux`.
 
     """
-    out = np.empty((eps.size, 3))
+    emf_v = np.empty((eps.size, 3))
     for k in range(eps.size):
         d, q, d_eps, q_eps = magnet(eps[k], degc[k], p)
         c, s = math.cos(eps[k]), math.sin(eps[k])
         rate_d, rate_q = (d_eps - q) * omega_elec[k], (q_eps + d) * omega_elec[k]
         alpha, beta = c * rate_d - s * rate_q, s * rate_d + c * rate_q
-        out[k, 0] = alpha
-        out[k, 1] = -0.5 * alpha + 0.5 * SQRT3 * beta
-        out[k, 2] = -0.5 * alpha - 0.5 * SQRT3 * beta
-    return out
+        emf_v[k, 0] = alpha
+        emf_v[k, 1] = -0.5 * alpha + 0.5 * SQRT3 * beta
+        emf_v[k, 2] = -0.5 * alpha - 0.5 * SQRT3 * beta
+    return emf_v

@@ -156,7 +156,7 @@ def pair_step(
 
     """
     volts, early = source[:, 0], source[:, 1]
-    out = np.empty((volts.size - 1, 2))
+    rows = np.empty((volts.size - 1, 2))
     c, s = np.cos(eps), np.sin(eps)
     way = (c * pair[0] + s * pair[1], c * pair[1] - s * pair[0])
     whole = pair[2] * resistance_rise(0.0, warm[0], p) + pair[3]
@@ -168,7 +168,7 @@ def pair_step(
     h = step_s / substeps
     for n in range(volts.size - 1):
         i = pair_current(flux, way, eps, warm[1], p)
-        out[n, 0], out[n, 1] = volts[n] - pair[3] * i, i
+        rows[n, 0], rows[n, 1] = volts[n] - pair[3] * i, i
         jump = volts[n + 1] - volts[n]
         if abs(jump) > edge:
             after = early[n + 1]
@@ -179,4 +179,4 @@ def pair_step(
                 flux = advanced(flux, circuit, (volts[n + 1], 0.0), last, spot, p)
         else:
             flux = advanced(flux, circuit, (volts[n], jump / step_s), (h, substeps), spot, p)
-    return out
+    return rows

@@ -386,13 +386,13 @@ def coast(start: Pair, step_s: float, substeps: int, count: int, t_m: float, p: 
         four.
 
     """
-    out = np.empty((count, 2))
+    rows = np.empty((count, 2))
     h = step_s / substeps
     theta, omega = start
     far, far_omega = start
     bristle = math.copysign(p.bristle, omega)
     for k in range(count):
-        out[k, 0], out[k, 1] = theta, omega
+        rows[k, 0], rows[k, 1] = theta, omega
         for _ in range(substeps):
             a1, b1 = free_rates((theta, omega, far, far_omega), bristle, t_m, p)
             w2, f2 = omega + 0.5 * h * a1, far_omega + 0.5 * h * b1
@@ -409,7 +409,7 @@ def coast(start: Pair, step_s: float, substeps: int, count: int, t_m: float, p: 
             omega += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
             far_omega += h * (b1 + 2.0 * b2 + 2.0 * b3 + b4) / 6.0
             bristle = bristle_after(bristle, travel, p)
-    return out
+    return rows
 
 
 @njit(cache=True)
@@ -432,13 +432,13 @@ def turned(theta: Array, omega: Array, t_m: float, p: Plant) -> Array:
         start.
 
     """
-    out = np.empty(theta.size)
+    torque_nm = np.empty(theta.size)
     bristle = -math.copysign(p.bristle, omega[0])
     for k in range(theta.size):
         if k > 0:
             bristle = bristle_after(bristle, theta[k] - theta[k - 1], p)
-        out[k] = free_torque(theta[k], omega[k], bristle, t_m, p)
-    return out
+        torque_nm[k] = free_torque(theta[k], omega[k], bristle, t_m, p)
+    return torque_nm
 
 
 @njit(cache=True)
@@ -505,13 +505,13 @@ def warmed(watt_25: Array, start: tuple[float, float], ambient: float, h: float,
         Of winding and magnets [degC].
 
     """
-    out = np.empty((watt_25.size, 2))
+    temperatures_k = np.empty((watt_25.size, 2))
     t_w, t_m = start
     for k in range(watt_25.size):
-        out[k, 0], out[k, 1] = t_w, t_m
+        temperatures_k[k, 0], temperatures_k[k, 1] = t_w, t_m
         watt = watt_25[k] * (1.0 + p.alpha_copper * (t_w - 25.0))
         t_w, t_m = heat(t_w, t_m, watt, ambient, h, p)
-    return out
+    return temperatures_k
 
 
 @njit(cache=True)
@@ -552,12 +552,12 @@ def played(x: Array, half_gap: float) -> Array:
         Half of the slot [unit of x].
 
     """
-    out = np.empty(x.size)
+    follower = np.empty(x.size)
     carried = x[0]
     for n in range(x.size):
         carried = dragged(carried, x[n], half_gap)
-        out[n] = carried
-    return out
+        follower[n] = carried
+    return follower
 
 
 @njit(cache=True)
@@ -572,12 +572,12 @@ def lagged(x: Array, blend: float) -> Array:
         Share of the difference that one sample takes [1].
 
     """
-    out = np.empty(x.size)
+    late = np.empty(x.size)
     y = x[0] if x.size else 0.0
     for k in range(x.size):
         y += blend * (x[k] - y)
-        out[k] = y
-    return out
+        late[k] = y
+    return late
 
 
 @njit(cache=True)
@@ -600,13 +600,13 @@ def passives(theta: Array, omega: Array, torque: Array, i_q: Array, t_m: float, 
         The motor in numbers.
 
     """
-    out = np.empty(theta.size)
+    passive_nm = np.empty(theta.size)
     for k in range(theta.size):
         bristle = math.copysign(p.bristle, omega[k])
-        out[k] = passive(theta[k], omega[k], bristle, torque[k], 1.0, p)
+        passive_nm[k] = passive(theta[k], omega[k], bristle, torque[k], 1.0, p)
         if p.extras > 0:
-            out[k] += extra(0, (theta[k], omega[k]), (0.0, i_q[k]), (t_m, t_m), p)
-    return out
+            passive_nm[k] += extra(0, (theta[k], omega[k]), (0.0, i_q[k]), (t_m, t_m), p)
+    return passive_nm
 
 
 @njit(cache=True)
@@ -625,9 +625,9 @@ def extra_volts(motion: Arrays, amps: Arrays, warm: Arrays, p: Plant) -> Array:
         The motor in numbers.
 
     """
-    out = np.empty((motion[0].size, 2))
-    for k in range(out.shape[0]):
+    volts = np.empty((motion[0].size, 2))
+    for k in range(volts.shape[0]):
         for axis in range(2):
             moved, flows = (motion[0][k], motion[1][k]), (amps[0][k], amps[1][k])
-            out[k, axis] = extra(1 + axis, moved, flows, (warm[0][k], warm[1][k]), p)
-    return out
+            volts[k, axis] = extra(1 + axis, moved, flows, (warm[0][k], warm[1][k]), p)
+    return volts

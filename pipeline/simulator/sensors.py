@@ -174,14 +174,14 @@ class Session:
         """
         bench = self.bench
         sigma = sigma * bench.noise_scale
-        out = sigma * self.rng.standard_normal(n)
+        errors = sigma * self.rng.standard_normal(n)
         if bench.drift_rel > 0.0 and n > 1:
             walk = np.cumsum(self.rng.standard_normal(n)) / math.sqrt(n)
-            out += bench.drift_rel * sigma * walk
+            errors += bench.drift_rel * sigma * walk
         if bench.hum_rel > 0.0 and t_s is not None:
             phase = self.rng.uniform(0.0, 2.0 * math.pi)
-            out += bench.hum_rel * sigma * np.sin(2.0 * math.pi * bench.hum_hz * t_s + phase)
-        return out
+            errors += bench.hum_rel * sigma * np.sin(2.0 * math.pi * bench.hum_hz * t_s + phase)
+        return errors
 
     @property
     def current_step_a(self) -> float:

@@ -37,20 +37,22 @@ def _judge(task: Task) -> Judged:
     from pipeline.criticism.comparison import compare
 
     with task.watch.stage("compare"):
-        result = compare(task.campaign, task.spec, task.start)
+        comparison = compare(task.campaign, task.spec, task.start)
     output, stem = task.output, file_stem(task.campaign.motor_id)
     write_whole(
-        output / "comparison" / f"{stem}.json", canonical_json(document := result.document())
+        output / "comparison" / f"{stem}.json", canonical_json(document := comparison.document())
     )
-    if result.traces:
+    if comparison.traces:
         from pipeline.io.recordings.comparison import comparison_bytes
 
         with task.watch.stage("recording"):
             path = output / "recordings" / f"comparison-{stem}.rrd"
-            write_checksummed(path, comparison_bytes(result))
+            write_checksummed(path, comparison_bytes(comparison))
     with task.watch.stage("page"):
-        _write_page(output, result)
-    return Judged(comparison_text(result), not result.errors, document, _next(task, result))
+        _write_page(output, comparison)
+    return Judged(
+        comparison_text(comparison), not comparison.errors, document, _next(task, comparison)
+    )
 
 
 def _next(task: Task, result: Comparison) -> str:

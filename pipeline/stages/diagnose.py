@@ -32,27 +32,27 @@ def _judge(task: Task) -> Judged:
     from pipeline.criticism.diagnosis import diagnose
 
     with task.watch.stage("diagnose"):
-        result = diagnose(task.campaign, task.spec, task.start)
+        diagnosis = diagnose(task.campaign, task.spec, task.start)
     output, stem = task.output, file_stem(task.campaign.motor_id)
     write_whole(
-        output / "diagnosis" / f"{stem}.json", canonical_json(document := result.document())
+        output / "diagnosis" / f"{stem}.json", canonical_json(document := diagnosis.document())
     )
-    if result.unknown is not None and result.unknown.sketch:
-        effect = output / "diagnosis" / "effects" / f"{result.unknown.effect}.py"
-        write_whole(effect, result.unknown.source.encode())
-    if result.ladder:
+    if diagnosis.unknown is not None and diagnosis.unknown.sketch:
+        effect = output / "diagnosis" / "effects" / f"{diagnosis.unknown.effect}.py"
+        write_whole(effect, diagnosis.unknown.source.encode())
+    if diagnosis.ladder:
         from pipeline.io.recordings.ladder import ladder_bytes
 
         with task.watch.stage("recording"):
-            write_checksummed(output / "recordings" / f"ladder-{stem}.rrd", ladder_bytes(result))
+            write_checksummed(output / "recordings" / f"ladder-{stem}.rrd", ladder_bytes(diagnosis))
     from pipeline.report.pages.ladder_page import render_ladder
 
     with task.watch.stage("page"):
-        links = links_of(output, "diagnosis/{}.html", result.motor_id)
-        page = render_ladder(result, links, task.folder, str(output))
+        links = links_of(output, "diagnosis/{}.html", diagnosis.motor_id)
+        page = render_ladder(diagnosis, links, task.folder, str(output))
         write_whole(output / "diagnosis" / f"{stem}.html", page.encode())
-        relink(output, result.motor_id)
-    undecided = result.verdict == "insufficient"
-    view = ladder_view(result, task.folder, str(output))
+        relink(output, diagnosis.motor_id)
+    undecided = diagnosis.verdict == "insufficient"
+    view = ladder_view(diagnosis, task.folder, str(output))
     next_ = (view.try_start or view.compare).removeprefix("motor-datasheets ")
-    return Judged(ladder_text(result), undecided, document, next_)
+    return Judged(ladder_text(diagnosis), undecided, document, next_)

@@ -55,12 +55,12 @@ def main(settings: InspectSettings) -> Outcome:
     faults = faults_of(seen.refusals)
     record = {"files": [file_record(seen.file, seen.report)]}
     if seen.report.shape is None and not settings.check:
-        result: dict[str, object] = {**record, "asked": {}, "map": None, "motors": None}
-        return Outcome(code, text, refused, result=result, faults=faults)
+        document: dict[str, object] = {**record, "asked": {}, "map": None, "motors": None}
+        return Outcome(code, text, refused, result=document, faults=faults)
     more = inspect_map.finish(settings, str(place.parent), [seen], (seen.file,))
     code = more.exit_code if settings.check else code
-    result = {**record, **more.result}
-    return Outcome(code, text + more.text, refused, result=result, faults=faults)
+    document = {**record, **more.result}
+    return Outcome(code, text + more.text, refused, result=document, faults=faults)
 
 
 def render(report: InspectReport) -> str:

@@ -88,11 +88,11 @@ def folder(settings: InspectSettings) -> Outcome:
     empty = [one.file for one in looked if one not in unmapped and one not in known]
     lines += [f"no table of numbers: {printable(path)}" for path in empty] + unread
     more = finish(settings, settings.file, unmapped, None, known)
-    result = {"files": [file_record(one.file, one.report) for one in looked], **more.result}
+    document = {"files": [file_record(one.file, one.report) for one in looked], **more.result}
     text = "\n".join(lines) + "\n" + more.text
     ready = known and not unmapped and not settings.map and not more.exit_code
     next_ = f"run input={shlex.quote(settings.file)}" if ready else ""
-    return Outcome(more.exit_code, text, more.errors, result=result, next=next_)
+    return Outcome(more.exit_code, text, more.errors, result=document, next=next_)
 
 
 def _known_lines(known: Sequence[Looked]) -> list[str]:
@@ -164,13 +164,13 @@ def finish(
         lines.append(f"written: {settings.map}; `run input={root} source={settings.map}`")
     elif text and only is None:
         lines += ["the source map (map=PATH writes it):", "", text.rstrip("\n")]
-    result = {"asked": asked, "map": text or None, "motors": None}
+    answer = {"asked": asked, "map": text or None, "motors": None}
     if not settings.check:
-        return Outcome(0, "\n".join(lines) + "\n" if lines else "", result=result)
+        return Outcome(0, "\n".join(lines) + "\n" if lines else "", result=answer)
     checked = _check(settings, root, text, only)
     text = "\n".join([*lines, checked.text]) + "\n"
-    result |= checked.result
-    return Outcome(checked.exit_code, text, checked.errors, result=result)
+    answer |= checked.result
+    return Outcome(checked.exit_code, text, checked.errors, result=answer)
 
 
 def _drafted(
@@ -261,12 +261,12 @@ def _questions(
         if any(seen.per_pole_pair for seen in shape.fields):
             questions["pole_pairs"] = "electrical speed is divided by them"
     questions |= {"motor_id": "the serial number", "test": "which test of the contract it is"}
-    given = set(settings.answers) | names.keys
+    answered = set(settings.answers) | names.keys
     if any(stream.parts for shape, _ in groups for stream in shape.streams):
         questions["captures"] = "whether the files are cut into the parts above: captures=proposed"
     if "captures" in settings.answers:
-        given |= {"test"}
-    return {key: text for key, text in questions.items() if key not in given}
+        answered |= {"test"}
+    return {key: text for key, text in questions.items() if key not in answered}
 
 
 def preview_of(task: PreviewTask) -> list[str]:

@@ -103,9 +103,9 @@ def motor_lines(motor: Mapping[str, Any]) -> list[str]:
     """
     lines = [f"motor {printable(motor['motor_id'])}"]
     for capture in motor["captures"]:
-        given = ", ".join(capture["constants"]) or "no constant by itself"
+        constants = ", ".join(capture["constants"]) or "no constant by itself"
         head = f"{printable(capture['path'])}: {capture['test']}, {capture['rows']} rows"
-        lines.append(f"  {head}: {given}")
+        lines.append(f"  {head}: {constants}")
     if motor["not_determined"]:
         lines.append(f"  not determined: {', '.join(motor['not_determined'])}")
     return lines

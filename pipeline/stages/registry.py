@@ -242,10 +242,10 @@ def _needed(settings: RegistrySettings, *names: str) -> tuple[str, ...]:
 
     Raises UsageError that names all of them that are missing or blank.
     """
-    given = {name: getattr(settings, f"{name}_" if name == "from" else name) for name in names}
-    missing = [name for name, value in given.items() if value is None or not value.strip()]
+    stated = {name: getattr(settings, f"{name}_" if name == "from" else name) for name in names}
+    missing = [name for name, text in stated.items() if text is None or not text.strip()]
     if missing:
         keys, verb = ", ".join(f"{name}=" for name in missing), "is" if missing[1:] == [] else "are"
         add = " ".join(f"{name}=..." for name in missing)
         raise UsageError(f"registry {settings.action}: {keys} {verb} missing", f"add {add}")
-    return tuple(str(value) for value in given.values())
+    return tuple(str(text) for text in stated.values())

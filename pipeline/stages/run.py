@@ -189,32 +189,32 @@ def _computed(
     revoked = _revocations(registry)
     jobs = _with_revoked(plain, revoked)
     with watch.stage("motors"):
-        results, died = _process(settings, jobs, workers, cache, begun=begun)
+        motors, died = _process(settings, jobs, workers, cache, begun=begun)
     others = other_motors(output, [job.motor_id for job in jobs], prune=settings.prune)
     with watch.stage("registry"):
-        registered = _register(registry, output, results)
+        registered = _register(registry, output, motors)
         # before the statuses are read: a later decision is not in them
         batch = _batch_key(settings, plain, survey, registry)
         histories = histories_of(registry)
-        results, statuses = with_current_statuses(output, results, histories)
+        motors, statuses = with_current_statuses(output, motors, histories)
     with watch.stage("fleet"):
-        fleet = fleet_of(output, results, others)
+        fleet = fleet_of(output, motors, others)
         datasheets = fleet.datasheets
         of_others = {one.motor_id: status_now(output, one, histories) for one in fleet.others}
         findings = sorted(
-            {f for r in results for f in r.finished.findings}.union(survey.findings),
+            {f for r in motors for f in r.finished.findings}.union(survey.findings),
             key=Finding.order,
         )
         files, removed = publish(
-            settings, results, fleet, tuple(findings), {**of_others, **statuses}, others
+            settings, motors, fleet, tuple(findings), {**of_others, **statuses}, others
         )
         outcome = outcome_of(datasheets, findings, survey, statuses, report=settings.report)
-    lasting = not died and all(result.lasting for result in results)
+    lasting = not died and all(motor.lasting for motor in motors)
     if lasting and registered.code == 0 and _revocations(registry) == revoked:
-        cache.keep_outcome(batch, Batch(outcome, _contents(datasheets, results)), files)
+        cache.keep_outcome(batch, Batch(outcome, _contents(datasheets, motors)), files)
     cache.forget_others([*others, *(job.motor_id for job in jobs)])
     outcome = with_folder_names(outcome, settings)
-    for name, seconds in (item for result in results for item in result.seconds.items()):
+    for name, seconds in (spent for motor in motors for spent in motor.seconds.items()):
         watch.seconds[f"  {name}"] = watch.seconds.get(f"  {name}", 0.0) + seconds
     notes = (*removed_note(removed, settings.output), *others_note(others, settings.output))
     return _final(outcome, registered, notes, died, watch)
@@ -241,8 +241,8 @@ def _contents(
     datasheets: Sequence[Datasheet], results: Sequence[MotorResult]
 ) -> tuple[tuple[tuple[str, str], str], ...]:
     """Motor and version of each datasheet, and the digest of its file."""
-    made = (file for result in results for file in result.finished.files)
-    digests = [sha256 for name, sha256 in made if name.startswith("datasheets/")]
+    written = (file for motor in results for file in motor.finished.files)
+    digests = [sha256 for name, sha256 in written if name.startswith("datasheets/")]
     return tuple(
         ((sheet.motor_id, sheet.version), sha256)
         for sheet, sha256 in zip(datasheets, digests, strict=True)

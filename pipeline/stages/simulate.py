@@ -56,7 +56,7 @@ def main(settings: SimulateSettings) -> Outcome:
         raise UsageError(f"simulate: {error}", "correct it") from error
     output_folder(settings.output)
     _ours(output, [folder for folder, *_ in jobs])
-    lines, made = [], []
+    lines, folders = [], []
     for folder, motor, bench, seed, plan in jobs:
         with watch.stage("simulate"):
             recordings, true = simulated(motor, bench, seed, plan)
@@ -67,11 +67,11 @@ def main(settings: SimulateSettings) -> Outcome:
                 stale.unlink()
         count = counted(len(written), "capture")
         lines.append(f"{motor.motor_id}: {count} in {output / folder}")
-        made.append({"motor_id": motor.motor_id, "folder": output / folder, "captures": written})
+        folders.append({"motor_id": motor.motor_id, "folder": output / folder, "captures": written})
     return Outcome(
         text="\n".join(lines),
         timings=watch.table(),
-        result=made,
+        result=folders,
         wrote=str(output),
         next=f"run input={shlex.quote(str(output))}",
     )

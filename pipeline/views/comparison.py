@@ -122,8 +122,8 @@ def headline(result: Comparison) -> str:
     """
     if not result.errors:
         return "; ".join(result.notes)
-    out = any(error.split == "held_out" for error in result.errors)
-    what = "held-out error" if out else "error of the fit, none held out,"
+    held_out = any(error.split == "held_out" for error in result.errors)
+    what = "held-out error" if held_out else "error of the fit, none held out,"
     if result.bare is not None:
         falls = "falls" if result.held_out < result.bare else "goes"
         names = result.added or result.effects

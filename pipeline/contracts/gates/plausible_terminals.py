@@ -34,8 +34,8 @@ def _resistance(capture: Capture, options: Mapping[str, float]) -> list[Finding]
             names = (f"v{pair}_v", f"i{phase}_a")
             if not capture.has(*names):
                 continue
-            data = capture.arrays(*names)
-            voltage, current = np.abs(data[names[0]]), np.abs(data[names[1]])
+            columns = capture.arrays(*names)
+            voltage, current = np.abs(columns[names[0]]), np.abs(columns[names[1]])
             reach = float(np.nanpercentile(current, 95.0))
             if reach <= 10.0 * noise_of(current):
                 continue

@@ -26,12 +26,12 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     line = next((phase for phase in pair if capture.has(f"i{phase}_a")), pair[0])
     terminals = (f"v{pair}_v", f"i{line}_a")
     if capture.has(*terminals):
-        data = capture.arrays(*terminals)
+        columns = capture.arrays(*terminals)
         sense = 1.0 if line == pair[0] else -1.0
-        power = sense * data[terminals[0]] * data[terminals[1]]
+        power = sense * columns[terminals[0]] * columns[terminals[1]]
     elif capture.has(*FRAME):
-        data = capture.arrays(*FRAME)
-        power = data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"]
+        columns = capture.arrays(*FRAME)
+        power = columns["vd_v"] * columns["id_a"] + columns["vq_v"] * columns["iq_a"]
     else:
         return Passed()
     power = power[np.isfinite(power)]

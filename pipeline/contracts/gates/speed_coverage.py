@@ -59,9 +59,9 @@ def _speeds_of_tenths(capture: Capture) -> NDArray[np.float64]:
     Fewer than ten rows have a tenth each.
     """
     column = "omega_mech_rad_s" if capture.has("omega_mech_rad_s") else "theta_mech_rad"
-    data = capture.arrays("t_s", column)
-    fine = np.isfinite(data["t_s"]) & np.isfinite(data[column])
-    t_s, values = data["t_s"][fine], data[column][fine]
+    columns = capture.arrays("t_s", column)
+    fine = np.isfinite(columns["t_s"]) & np.isfinite(columns[column])
+    t_s, values = columns["t_s"][fine], columns[column][fine]
     if column == "theta_mech_rad":
         ends = np.linspace(0, max(t_s.size - 1, 0), min(11, t_s.size)).round().astype(int)
         travel, took = np.diff(values[ends]), np.diff(t_s[ends])

@@ -52,11 +52,11 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 def _steps(capture: Capture, name: str) -> NDArray[np.float64]:
     """Steps [n-1, rad] between neighbouring rows; 0 over a gap in time or a missing value."""
     names = (name, "t_s") if capture.has("t_s") else (name,)
-    data = capture.arrays(*names, masked=False)
-    steps: NDArray[np.float64] = np.diff(data[name])
+    columns = capture.arrays(*names, masked=False)
+    steps: NDArray[np.float64] = np.diff(columns[name])
     usable = np.isfinite(steps)
-    if "t_s" in data and steps.size:
-        taken_s = np.diff(data["t_s"])
+    if "t_s" in columns and steps.size:
+        taken_s = np.diff(columns["t_s"])
         usable &= taken_s < GAP * np.median(taken_s)
     return np.where(usable, steps, 0.0)
 

@@ -20,10 +20,10 @@ _EDGES, _MOMENTS = 1.0, 2.0
 def _drop(x: Operating, q: Values) -> Complex:
     if not x.inverter:
         return np.zeros(x.omega_rad_s.shape, dtype=complex)
-    given = _given(x, q) if q["given_v"] else 0.0
+    given_v = _given(x, q) if q["given_v"] else 0.0
     whole_v = q["loss_v"] + q["given_v"]
     if q["given_v"] and x.supply.volts_v is not None:
-        x = x.fed(volts_v=x.supply.volts_v + given)
+        x = x.fed(volts_v=x.supply.volts_v + given_v)
     turn, phases, eps = _phases(x, q["lag_s"])
     if q["ripple"] == _EDGES:
         shares = lost_shares(x, eps, phases, whole_v, q["width_a"])
@@ -31,7 +31,7 @@ def _drop(x: Operating, q: Values) -> Complex:
         shares = swept_shares(x, eps, phases, q["width_a"])
     else:
         shares = np.tanh(phases / q["width_a"])
-    rotor: Complex = whole_v * vector_of(shares) * np.conj(turn) - given
+    rotor: Complex = whole_v * vector_of(shares) * np.conj(turn) - given_v
     return rotor + q["on_v"] / x.machine.scales["current_a"] * x.i_a if q["on_v"] else rotor
 
 
@@ -41,8 +41,8 @@ def _given(x: Operating, q: Values) -> Complex:
     """
     _, phases, _ = _phases(x, q["given_lag_s"])
     turn = x.once(x.eps_rad, "turning", lambda: turning(x.eps_rad))
-    given: Complex = q["given_v"] * vector_of(np.tanh(phases / q["ramp_a"])) * np.conj(turn)
-    return given
+    given_v: Complex = q["given_v"] * vector_of(np.tanh(phases / q["ramp_a"])) * np.conj(turn)
+    return given_v
 
 
 def _phases(x: Operating, lag_s: float) -> tuple[Complex, Array, Array]:

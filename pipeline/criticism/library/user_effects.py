@@ -70,22 +70,22 @@ class Hook:
         return value
 
     def _look(self, value: Any, inputs: list[NDArray[Any]]) -> None:
-        shape, result = inputs[0].shape, np.asarray(value)
+        shape, answer = inputs[0].shape, np.asarray(value)
         where = f"{Path(self.file).name}{_at(getattr(self.call, '__code__', None))}: {self.what}"
-        if result.dtype.kind not in "bifc":
+        if answer.dtype.kind not in "bifc":
             message = f"{where} gives {type(value).__name__} and no numbers"
             raise UsageError(message, "return an array of one number a sample")
         try:
-            fits = np.broadcast_shapes(result.shape, shape) == shape
+            fits = np.broadcast_shapes(answer.shape, shape) == shape
         except ValueError:
             fits = False
         if not fits:
-            message = f"{where} gives an array of shape {result.shape} for samples of shape {shape}"
+            message = f"{where} gives an array of shape {answer.shape} for samples of shape {shape}"
             raise UsageError(message, "return one number a sample")
-        if np.isfinite(result).all():
+        if np.isfinite(answer).all():
             return
         known = np.logical_and.reduce([np.isfinite(one) for one in inputs if one.shape == shape])
-        gaps = np.broadcast_to(~np.isfinite(result), shape) & known
+        gaps = np.broadcast_to(~np.isfinite(answer), shape) & known
         if gaps.any():
             message = f"{where} gives no finite number at {np.count_nonzero(gaps)} of {gaps.size}"
             raise UsageError(f"{message} samples", "give one for every current, speed and angle")
@@ -209,8 +209,8 @@ def _try(effect: Effect, path: Path) -> None:
         q = _Named({p.name: p.scan[0] if p.scan else 0.0 for p in parameters})
     except UsageError:
         return
-    for name, given in calls.items():
-        _ask(getattr(effect, name), (*given, q), q, path)
+    for name, arguments in calls.items():
+        _ask(getattr(effect, name), (*arguments, q), q, path)
     _ask(effect.speed, (line, q, x.ts_s), q, path)
     _ask(effect.voltage, (line + 0j, x, q, "drive"), q, path)
     _ask(effect.clock, (RECORDERS[0], q), q, path)

@@ -61,8 +61,8 @@ def with_log_start(
             continue
         candidate = by_name[shown.discrimination.name]
         effect = settled(candidate.effect, shown.discrimination)
-        given = {name: value for name, (value, _) in shown.discrimination.values.items()}
-        begun = _fit_at(wide.fit, effect, {**given, **shown.start}, shown.base)
+        shown_values = {name: value for name, (value, _) in shown.discrimination.values.items()}
+        begun = _fit_at(wide.fit, effect, {**shown_values, **shown.start}, shown.base)
         started = scored(wide, candidate, begun)
         alike = [s for s in ranked if s.candidate.effect.shown is hook]
         best = max((s.fall for s in alike), default=0.0)

@@ -125,10 +125,10 @@ def _spare(system: LinearSystem, effect: Effect, penalty: float) -> tuple[int, .
 def _loss(system: LinearSystem, known: NormalEquations, names: Sequence[str]) -> float:
     """Rise of deviance, to first order, when these parameters go to zero and the rest refits."""
     model_columns = system.model_columns
-    out = np.array([n for n in model_columns if system.columns[n].name in names], dtype=int)
-    move = np.array([-system.fit.values[system.columns[n].name] for n in out])
+    left_out = np.array([n for n in model_columns if system.columns[n].name in names], dtype=int)
+    move = np.array([-system.fit.values[system.columns[n].name] for n in left_out])
     return (
-        known.moved(out, move).only(np.setdiff1d(model_columns, out)).best().deviance
+        known.moved(left_out, move).only(np.setdiff1d(model_columns, left_out)).best().deviance
         - known.deviance()
     )
 

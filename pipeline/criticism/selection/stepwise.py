@@ -564,10 +564,10 @@ def loss_without(
     """
     stems = tuple(f"{name}." for name in names)
     fit, model_columns = system.fit, system.model_columns
-    out = np.array(
+    left_out = np.array(
         [n for n in model_columns if system.columns[n].name.startswith(stems)], dtype=int
     )
-    stay = np.setdiff1d(model_columns, out)
+    stay = np.setdiff1d(model_columns, left_out)
     if instead is not None:
         stay = np.concatenate([stay, instead])
     machine = fit.machine
@@ -576,8 +576,8 @@ def loss_without(
         for e in fit.model.effects
         for p in e.parameters_of(machine)
     }
-    names_out = [system.columns[n].name for n in out]
+    names_out = [system.columns[n].name for n in left_out]
     move = np.array([-fit.values[n] if amplitude[n] else 0.0 for n in names_out])
     equations = system.normal_equations() if normal_equations is None else normal_equations
-    end = equations.moved(out, move).only(stay).best(*fit.policy.selection.thorough)
+    end = equations.moved(left_out, move).only(stay).best(*fit.policy.selection.thorough)
     return end.deviance - equations.deviance()

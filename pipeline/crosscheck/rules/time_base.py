@@ -104,8 +104,8 @@ def pace(capture: Capture, turns: float) -> Pace | None:
     """
     if not capture.has(*COLUMNS):
         return None
-    data = capture.arrays(*COLUMNS)
-    rows = np.column_stack([data[name] for name in COLUMNS])
+    columns = capture.arrays(*COLUMNS)
+    rows = np.column_stack([columns[name] for name in COLUMNS])
     rows = rows[np.isfinite(rows).all(axis=1)]
     if rows.shape[0] < BLOCKS * LEAST_ROWS:
         return None

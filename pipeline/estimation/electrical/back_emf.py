@@ -163,14 +163,14 @@ def read_spin(capture: Capture, temp_column: str | None) -> Spin:
     others = [n for n in ("theta_mech_rad", "omega_mech_rad_s") if capture.has(n)]
     if temp_column is not None:
         others.append(temp_column)
-    data = capture.finite("t_s", *chosen, *others, needed=("t_s", *chosen))
-    channels = tuple(Channel(n, data[n], *chosen[n]) for n in chosen)
+    columns = capture.finite("t_s", *chosen, *others, needed=("t_s", *chosen))
+    channels = tuple(Channel(n, columns[n], *chosen[n]) for n in chosen)
     return Spin(
-        data["t_s"],
+        columns["t_s"],
         channels,
-        data.get("theta_mech_rad"),
-        data.get("omega_mech_rad_s"),
-        None if temp_column is None else bridged(data["t_s"], data[temp_column]),
+        columns.get("theta_mech_rad"),
+        columns.get("omega_mech_rad_s"),
+        None if temp_column is None else bridged(columns["t_s"], columns[temp_column]),
     )
 
 

@@ -172,14 +172,14 @@ def captures_of(campaign: Campaign, points: Sequence[Point]) -> tuple[Capture, .
 
 def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> list[Point]:
     column = first_temperature(capture, "winding")
-    data = pair_signals(capture, pair, *((column,) if column else ()))
-    temps = np.full(data["t_s"].size, temp_degc)
-    logged = column is not None and bool(np.isfinite(data[column]).any())
+    columns = pair_signals(capture, pair, *((column,) if column else ()))
+    temps = np.full(columns["t_s"].size, temp_degc)
+    logged = column is not None and bool(np.isfinite(columns[column]).any())
     if column is not None and logged:
-        temps = bridged(data["t_s"], data[column])
+        temps = bridged(columns["t_s"], columns[column])
     points = []
-    for plateau in find_plateaus(data["i_a"]):
-        v, i = data["v_v"][plateau.rows], data["i_a"][plateau.rows]
+    for plateau in find_plateaus(columns["i_a"]):
+        v, i = columns["v_v"][plateau.rows], columns["i_a"][plateau.rows]
         temp = float(temps[plateau.rows].mean())
         errors = (_standard_error(v), _standard_error(i))
         means = (float(v.mean()), float(i.mean()))

@@ -182,15 +182,17 @@ def operating_points(
     points: list[Point] = []
     total = 0
     for capture in captures:
-        data = _columns(capture)
-        n = data["iq_a"].size
+        columns = _columns(capture)
+        n = columns["iq_a"].size
         total += n
         if n < policy().evidence.rows:
             continue
-        for rows in _stretches(data):
-            whole = _whole_cycles(rows, data, pole_pairs)
-            point = _point(capture, data, whole)
-            ripple, u = (0.0, 0.0) if point.standing else ripple_of(capture, data, whole, winding)
+        for rows in _stretches(columns):
+            whole = _whole_cycles(rows, columns, pole_pairs)
+            point = _point(capture, columns, whole)
+            ripple, u = (
+                (0.0, 0.0) if point.standing else ripple_of(capture, columns, whole, winding)
+            )
             points.append(replace(point, ripple_nm=ripple, u_ripple_nm=u))
     numbered = _numbered(points)
     return PointTable(tuple(numbered), sum(p.rows for p in numbered), total)
@@ -247,15 +249,15 @@ def pole_pairs_of(known: Constants, nameplate: object) -> int | None:
 def _columns(capture: Capture) -> dict[str, Array]:
     wanted = (*MEANS, "t_s", "theta_mech_rad", "omega_mech_rad_s", "temp_winding_degc")
     present = [n for n in wanted if capture.has(n)]
-    data = capture.arrays(*present)
-    blank = np.full(data["t_s"].size, np.nan)
+    columns = capture.arrays(*present)
+    blank = np.full(columns["t_s"].size, np.nan)
     for name in (*MEANS, "theta_mech_rad", "omega_mech_rad_s"):
-        data.setdefault(name, blank)
+        columns.setdefault(name, blank)
     if not capture.has("id_a"):
-        data["id_a"] = np.zeros(blank.size)
-    data["temp_magnet_degc"] = bridged(data["t_s"], data["temp_magnet_degc"])
-    ok = np.isfinite(data["iq_a"]) & np.isfinite(data["id_a"])
-    return {name: column[ok] for name, column in data.items()}
+        columns["id_a"] = np.zeros(blank.size)
+    columns["temp_magnet_degc"] = bridged(columns["t_s"], columns["temp_magnet_degc"])
+    ok = np.isfinite(columns["iq_a"]) & np.isfinite(columns["id_a"])
+    return {name: column[ok] for name, column in columns.items()}
 
 
 def _stretches(data: Mapping[str, Array]) -> list[slice]:

@@ -158,16 +158,18 @@ def ripple_by_speed(capture: Capture, winding: Winding | None) -> tuple[Array, A
     if winding is None or not capture.has(*NEEDED):
         return blank, blank, blank
     extra = [WARMTH] if capture.has(WARMTH) else []
-    data = capture.finite(*NEEDED, *extra, needed=NEEDED)
-    windows = _windows(winding.pole_pairs * data["theta_mech_rad"])
-    each = [r for r in (_ripple(capture, data, rows, winding) for rows in windows) if r is not None]
+    columns = capture.finite(*NEEDED, *extra, needed=NEEDED)
+    windows = _windows(winding.pole_pairs * columns["theta_mech_rad"])
+    each = [
+        r for r in (_ripple(capture, columns, rows, winding) for rows in windows) if r is not None
+    ]
     each.sort(key=lambda ripple: ripple.omega_mech_rad_s)
     back = [ripple for ripple in each if ripple.omega_mech_rad_s < 0.0]
     middles = _beyond_noise(_middles(back) + _middles(each[len(back) :]))
     if not middles:
         return blank, blank, blank
     speeds = np.array([ripple.omega_mech_rad_s for ripple in middles])
-    warmth, drop_v = _winding_temperature(data), _drop_v(capture, data)
+    warmth, drop_v = _winding_temperature(columns), _drop_v(capture, columns)
     both = np.array([_torque(ripple, winding, warmth, drop_v) for ripple in middles])
     return speeds, both[:, 0] / speeds, both[:, 1] / speeds
 

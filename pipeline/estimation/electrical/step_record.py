@@ -112,9 +112,9 @@ def read_step(capture: Capture) -> StepRecord | None:
     pair, angle = pair_of(capture), rotor_angle_rad(capture)
     if pair is None or angle is None:
         raise KeyError(f"{capture.path}: pair or theta_elec_deg is not stated")
-    data = pair_signals(capture, pair)
-    whole = ~(_spikes(data["v_v"]) | _spikes(data["i_a"]))
-    t, v, i = (data[name][whole] for name in ("t_s", "v_v", "i_a"))
+    columns = pair_signals(capture, pair)
+    whole = ~(_spikes(columns["v_v"]) | _spikes(columns["i_a"]))
+    t, v, i = (columns[name][whole] for name in ("t_s", "v_v", "i_a"))
     t, noise = t - t[:1], noise_of(i)
     if t.size < 50 or float(np.ptp(i)) < 10.0 * noise.sigma:
         return None

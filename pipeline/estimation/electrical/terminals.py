@@ -95,12 +95,12 @@ def pair_signals(capture: Capture, pair: str, *further: str) -> dict[str, Array]
     if not volts or not amps or not capture.has("t_s"):
         raise KeyError(f"{capture.path} holds no voltage and current of pair {pair}")
     extra = tuple(name for name in further if capture.has(name))
-    data = capture.arrays("t_s", *volts, *amps, *extra)
-    v = data[volts[0]] if len(volts) == 1 else data[volts[0]] - data[volts[1]]
+    columns = capture.arrays("t_s", *volts, *amps, *extra)
+    v = columns[volts[0]] if len(volts) == 1 else columns[volts[0]] - columns[volts[1]]
     signs = [1.0 if name == f"i{pair[0]}_a" else -1.0 for name in amps]
-    i = np.mean([sign * data[name] for sign, name in zip(signs, amps, strict=True)], axis=0)
-    keep = np.isfinite(data["t_s"]) & np.isfinite(v) & np.isfinite(i)
-    signals = {"t_s": data["t_s"], "v_v": v, "i_a": i} | {name: data[name] for name in extra}
+    i = np.mean([sign * columns[name] for sign, name in zip(signs, amps, strict=True)], axis=0)
+    keep = np.isfinite(columns["t_s"]) & np.isfinite(v) & np.isfinite(i)
+    signals = {"t_s": columns["t_s"], "v_v": v, "i_a": i} | {name: columns[name] for name in extra}
     return {name: values[keep] for name, values in signals.items()}
 
 

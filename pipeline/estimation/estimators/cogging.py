@@ -65,9 +65,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     captures = [c for c in campaign.of("cogging") if c.has("theta_mech_rad", "torque_shaft_nm")]
     turns: list[Turn] = []
     for capture in captures:
-        data = capture.arrays("theta_mech_rad", "torque_shaft_nm")
-        finite = np.isfinite(data["theta_mech_rad"])
-        turns += whole_turns(data["theta_mech_rad"][finite], data["torque_shaft_nm"][finite])
+        columns = capture.arrays("theta_mech_rad", "torque_shaft_nm")
+        finite = np.isfinite(columns["theta_mech_rad"])
+        turns += whole_turns(columns["theta_mech_rad"][finite], columns["torque_shaft_nm"][finite])
     if len(turns) < 2:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
@@ -313,9 +313,9 @@ def _speed(captures: Sequence[Capture]) -> float | None:
     for capture in captures:
         if not capture.has("t_s", "theta_mech_rad"):
             continue
-        data = capture.arrays("t_s", "theta_mech_rad")
-        finite = np.isfinite(data["t_s"]) & np.isfinite(data["theta_mech_rad"])
-        t, theta = data["t_s"][finite], data["theta_mech_rad"][finite]
+        columns = capture.arrays("t_s", "theta_mech_rad")
+        finite = np.isfinite(columns["t_s"]) & np.isfinite(columns["theta_mech_rad"])
+        t, theta = columns["t_s"][finite], columns["theta_mech_rad"][finite]
         every = max(1, t.size // 500)
         t, theta = t[::every], theta[::every]
         if t.size > 1:

@@ -166,15 +166,15 @@ def _blocks(capture: Capture, number: int) -> Blocks | None:
     """Means over blocks of a second, ten rows at the least; None of a log with fewer than one."""
     motion = _motion(capture)
     warm = first_temperature(capture, "winding")
-    data = capture.finite(*COLUMNS, motion, *([warm] if warm else []))
-    t_s = data["t_s"]
+    columns = capture.finite(*COLUMNS, motion, *([warm] if warm else []))
+    t_s = columns["t_s"]
     if t_s.size < 20:
         return None
     size = max(10, round(1.0 / float(np.median(np.diff(t_s)))))
-    omega = np.gradient(data[motion], t_s) if motion == "theta_mech_rad" else data[motion]
-    torque = data["torque_shaft_nm"]
-    degc = data[warm] if warm else np.full(t_s.size, REFERENCE_DEGC)
-    power = data["vdc_v"] * data["idc_a"]
+    omega = np.gradient(columns[motion], t_s) if motion == "theta_mech_rad" else columns[motion]
+    torque = columns["torque_shaft_nm"]
+    degc = columns[warm] if warm else np.full(t_s.size, REFERENCE_DEGC)
+    power = columns["vdc_v"] * columns["idc_a"]
     count = t_s.size // size
     if count < 1:
         return None

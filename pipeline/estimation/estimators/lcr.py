@@ -117,8 +117,10 @@ def fit_lcr(campaign: Campaign, known: Constants, options: Mapping[str, float]) 
         "r_lcr_ohm": "no rab_ohm in the lcr table",
         "lcr_angle_offset_deg": "needs the table over known rotor angles and a salient rotor",
     }
-    results = tuple(estimates.get(n) or METHOD.missing(n, absent.get(n, EXPERIMENT)) for n in GIVES)
-    return Fit(results, _evidence(table, axes))
+    reported = tuple(
+        estimates.get(n) or METHOD.missing(n, absent.get(n, EXPERIMENT)) for n in GIVES
+    )
+    return Fit(reported, _evidence(table, axes))
 
 
 def _table(captures: Sequence[Capture]) -> Table:

@@ -234,14 +234,14 @@ def _results(columns: Columns, coefficients: Array) -> dict[str, float]:
     r_pairs = coefficients[: len(columns.pairs)]
     by_pair = dict(zip(columns.pairs, (float(r) for r in r_pairs), strict=True))
     r_ll = float(np.mean(r_pairs))
-    results = {"r_phase_ohm": phase_from_line(r_ll), "r_ll_ohm": r_ll}
-    results |= {f"r_{pair}_ohm": r for pair, r in by_pair.items()}
+    constants = {"r_phase_ohm": phase_from_line(r_ll), "r_ll_ohm": r_ll}
+    constants |= {f"r_{pair}_ohm": r for pair, r in by_pair.items()}
     if len(by_pair) == 3:
         phases = phase_resistances_ohm(by_pair["ab"], by_pair["bc"], by_pair["ca"])
-        results |= {f"r_{name}_ohm": r for name, r in phases._asdict().items()}
+        constants |= {f"r_{name}_ohm": r for name, r in phases._asdict().items()}
     if columns.drops:
-        results["voltage_offset_v"] = float(np.mean(coefficients[columns.drop_start :]))
-    return results
+        constants["voltage_offset_v"] = float(np.mean(coefficients[columns.drop_start :]))
+    return constants
 
 
 def fit_resistance(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:

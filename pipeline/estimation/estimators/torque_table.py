@@ -171,17 +171,17 @@ class _Rows:
 
 def _table(capture: Capture) -> dict[str, Array]:
     names = ("iq_a", "torque_shaft_nm", "id_a", "temp_magnet_degc", "theta_mech_rad")
-    data = capture.arrays(*(name for name in names if capture.has(name)))
-    finite = np.isfinite(data["iq_a"]) & np.isfinite(data["torque_shaft_nm"])
+    columns = capture.arrays(*(name for name in names if capture.has(name)))
+    finite = np.isfinite(columns["iq_a"]) & np.isfinite(columns["torque_shaft_nm"])
     warm = assumed_temperature(capture, REFERENCE_DEGC)
     usual = {"id_a": 0.0, "temp_magnet_degc": warm, "theta_mech_rad": np.nan}
-    data = {n: data.get(n, np.full(finite.size, usual.get(n, np.nan)))[finite] for n in names}
+    columns = {n: columns.get(n, np.full(finite.size, usual.get(n, np.nan)))[finite] for n in names}
     return {
-        "iq_a": data["iq_a"],
-        "id_a": np.nan_to_num(data["id_a"]),
-        "torque_nm": data["torque_shaft_nm"],
-        "excess_k": np.nan_to_num(data["temp_magnet_degc"] - REFERENCE_DEGC),
-        "theta_rad": data["theta_mech_rad"],
+        "iq_a": columns["iq_a"],
+        "id_a": np.nan_to_num(columns["id_a"]),
+        "torque_nm": columns["torque_shaft_nm"],
+        "excess_k": np.nan_to_num(columns["temp_magnet_degc"] - REFERENCE_DEGC),
+        "theta_rad": columns["theta_mech_rad"],
     }
 
 

@@ -185,14 +185,14 @@ def _part(capture: Capture, winding: Winding | None) -> _Part | None:
         return None
     required = ["t_s", angle]
     optional = ["iq_a", "id_a", "torque_shaft_nm", "temp_magnet_degc"] if kind == DRIVE else []
-    data = capture.arrays(*required, *(name for name in optional if capture.has(name)))
-    zero = np.zeros(data["t_s"].size)
-    data = {name: data.get(name, zero) for name in (*required, *optional)}
+    columns = capture.arrays(*required, *(name for name in optional if capture.has(name)))
+    zero = np.zeros(columns["t_s"].size)
+    columns = {name: columns.get(name, zero) for name in (*required, *optional)}
     if kind == DRIVE and not capture.has("temp_magnet_degc"):
-        data["temp_magnet_degc"] = zero + assumed_temperature(capture)
-    finite = np.all([np.isfinite(column) for column in data.values()], axis=0)
-    data = {name: column[finite] for name, column in data.items()}
-    t, theta = data["t_s"], data[angle]
+        columns["temp_magnet_degc"] = zero + assumed_temperature(capture)
+    finite = np.all([np.isfinite(column) for column in columns.values()], axis=0)
+    columns = {name: column[finite] for name, column in columns.items()}
+    t, theta = columns["t_s"], columns[angle]
     if t.size < LEAST_SAMPLES:
         return None
     if angle == SPEED:
@@ -202,11 +202,11 @@ def _part(capture: Capture, winding: Winding | None) -> _Part | None:
         speed = smooth_speed(t, theta, max(0.005, 10.0 * float(np.median(np.diff(t)))))
     except ValueError:
         return None
-    current = data.get("iq_a", np.zeros(t.size))
+    current = columns.get("iq_a", np.zeros(t.size))
     return _Part(
-        capture, kind, weak, theta, speed, current, data.get("id_a", current * 0.0),
-        data.get("temp_magnet_degc", current * 0.0 + 25.0) - 25.0,
-        data.get("torque_shaft_nm", current * 0.0),
+        capture, kind, weak, theta, speed, current, columns.get("id_a", current * 0.0),
+        columns.get("temp_magnet_degc", current * 0.0 + 25.0) - 25.0,
+        columns.get("torque_shaft_nm", current * 0.0),
         _ripple(capture, winding, weak.integral(theta, 1)),
     )  # fmt: skip
 

@@ -118,15 +118,15 @@ def _phase_shares(capture: Capture, known: Constants) -> tuple[float, float, flo
     offset = known.best("angle_offset_elec_rad")
     zero = 0.0 if offset is None else offset.number
     if capture.has("theta_elec_rad"):
-        data = capture.arrays("id_a", "iq_a", "theta_elec_rad")
-        theta = data["theta_elec_rad"]
+        columns = capture.arrays("id_a", "iq_a", "theta_elec_rad")
+        theta = columns["theta_elec_rad"]
     elif capture.has("theta_mech_rad") and (pairs := known.best("pole_pairs")) is not None:
-        data = capture.arrays("id_a", "iq_a", "theta_mech_rad")
-        theta = pairs.number * data["theta_mech_rad"] + zero
+        columns = capture.arrays("id_a", "iq_a", "theta_mech_rad")
+        theta = pairs.number * columns["theta_mech_rad"] + zero
     else:
         return None
-    angle = theta + np.arctan2(data["iq_a"], data["id_a"])
-    weight = data["id_a"] ** 2 + data["iq_a"] ** 2
+    angle = theta + np.arctan2(columns["iq_a"], columns["id_a"])
+    weight = columns["id_a"] ** 2 + columns["iq_a"] ** 2
     finite = np.isfinite(angle) & (weight > 0.0)
     if not finite.any():
         return None
@@ -169,15 +169,15 @@ def _rotor_frame(
 ) -> tuple[dict[str, Array], bool]:
     speed = [n for n in ("omega_mech_rad_s",) if capture.has(n)]
     magnet = [n for n in ("temp_magnet_degc",) if capture.has(n) and n not in columns]
-    data = capture.arrays("t_s", *DQ, *columns, *speed, *magnet)
-    along = data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"]
+    frame = capture.arrays("t_s", *DQ, *columns, *speed, *magnet)
+    along = frame["vd_v"] * frame["id_a"] + frame["vq_v"] * frame["iq_a"]
     turning = False
-    if speed and np.nanmax(np.abs(data[speed[0]])) > 0.0:
-        power, turning = _motional(capture, data, known)
+    if speed and np.nanmax(np.abs(frame[speed[0]])) > 0.0:
+        power, turning = _motional(capture, frame, known)
         along = along - power
-    data["square_a2"] = data["id_a"] ** 2 + data["iq_a"] ** 2
-    data["along_va"] = along
-    return data, turning
+    frame["square_a2"] = frame["id_a"] ** 2 + frame["iq_a"] ** 2
+    frame["along_va"] = along
+    return frame, turning
 
 
 def _motional(capture: Capture, data: dict[str, Array], known: Constants) -> tuple[Array, bool]:
@@ -212,10 +212,10 @@ def _terminal_frame(capture: Capture, columns: list[str]) -> dict[str, Array]:
     pair = pair_of(capture)
     if pair is None:
         raise KeyError(f"{capture.path}: neither dq nor one pair's voltage and current")
-    data = pair_signals(capture, pair, *columns)
-    data["square_a2"] = data["i_a"] ** 2 * (4.0 / 3.0)
-    data["along_va"] = phase_from_line(1.0) * data["v_v"] * data["i_a"] * (4.0 / 3.0)
-    return data
+    frame = pair_signals(capture, pair, *columns)
+    frame["square_a2"] = frame["i_a"] ** 2 * (4.0 / 3.0)
+    frame["along_va"] = phase_from_line(1.0) * frame["v_v"] * frame["i_a"] * (4.0 / 3.0)
+    return frame
 
 
 def _blocks(

@@ -79,10 +79,12 @@ class FitMemory:
 
 
 def _checksummed(fits: Mapping[str, tuple[str, bytes, bytes]]) -> bytes:
-    head = [[name, key, len(text), len(data)] for name, (key, text, data) in sorted(fits.items())]
+    head = [
+        [name, key, len(text), len(arrays)] for name, (key, text, arrays) in sorted(fits.items())
+    ]
     parts = [json.dumps(head).encode() + b"\n"]
-    for _, (_, text, data) in sorted(fits.items()):
-        parts += [text, data]
+    for _, (_, text, arrays) in sorted(fits.items()):
+        parts += [text, arrays]
     body = b"".join(parts)
     return hashlib.sha256(body).hexdigest().encode() + b"\n" + body
 
@@ -98,9 +100,9 @@ def _load(path: Path) -> dict[str, tuple[str, bytes, bytes]]:
         return {}
     head, _, rest = body.partition(b"\n")
     fits, at = {}, 0
-    for name, key, text, data in json.loads(head):
-        fits[name] = (key, rest[at : at + text], rest[at + text : at + text + data])
-        at += text + data
+    for name, key, text, arrays in json.loads(head):
+        fits[name] = (key, rest[at : at + text], rest[at + text : at + text + arrays])
+        at += text + arrays
     return fits
 
 

@@ -47,8 +47,8 @@ class ModelMemory:
 
         """
         code, libraries, known = closure_digest(TEST), libraries_version(TEST), start.estimates
-        given = self._campaign, model, known, self._revoked, self._search
-        return key_of(ModelParts(code, libraries, *given))
+        parts = self._campaign, model, known, self._revoked, self._search
+        return key_of(ModelParts(code, libraries, *parts))
 
     def recall(self, key: str) -> ModelVerdict | None:
         """The cached verdict of this key, else None.

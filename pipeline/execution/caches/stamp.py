@@ -29,9 +29,9 @@ def stamp_of(job: MotorJob, campaign: Campaign) -> Stamp:
     """
     readings = tuple(content_digest(capture) for capture in campaign.captures)
     code, libraries = datasheet_code(), datasheet_libraries()
-    given = campaign_key(campaign, readings)
-    version = key_of(VersionParts(code, libraries, given, job.config_sha256))
-    return Stamp(version, readings, job.config_sha256, code, libraries, given)
+    of_campaign = campaign_key(campaign, readings)
+    version = key_of(VersionParts(code, libraries, of_campaign, job.config_sha256))
+    return Stamp(version, readings, job.config_sha256, code, libraries, of_campaign)
 
 
 def configuration_digest(

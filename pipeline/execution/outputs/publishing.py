@@ -97,7 +97,7 @@ def fleet_of(output: Path, results: Sequence[MotorResult], others: Others) -> Fl
     """
     from pipeline.views.tables import constants_frame, fleet_files
 
-    own = [name for result in results for name, _ in result.finished.files]
+    own = [name for motor in results for name, _ in motor.finished.files]
     sheets: dict[bool, list[Datasheet]] = {True: [], False: []}
     frames = {}
     for mine, names in ((True, own), (False, [name for f in others.values() for name in f])):
@@ -154,7 +154,7 @@ def publish(
 
     document = {"schema": "findings/1", "findings": [f.document() for f in findings]}
     write("findings.json", canonical_json(document))
-    files += [file for result in results for file in result.finished.files]
+    files += [file for motor in results for file in motor.finished.files]
     for name, content in fleet.tables.items():
         write(name, content)
     if settings.report:
@@ -164,8 +164,8 @@ def publish(
         page = render_fleet(fleet.every, tuple(findings), statuses, links)
         write(INDEX, page.encode())
     motors = dict(others)
-    for result in results:
-        motors[result.motor_id] = tuple(sorted(name for name, _ in result.finished.files))
+    for motor in results:
+        motors[motor.motor_id] = tuple(sorted(name for name, _ in motor.finished.files))
     kept = (name for names in others.values() for name in names)
     names = sorted({*(name for name, _ in files), *kept})
     removed = _sweep(output, names)

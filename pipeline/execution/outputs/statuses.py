@@ -86,16 +86,16 @@ def with_current_statuses(
 
     """
     updated, statuses = [], {}
-    for result in results:
-        files = dict(result.finished.files)
+    for motor in results:
+        files = dict(motor.finished.files)
         for name in [name for name in files if name.startswith("datasheets/")]:
             sheet = read_datasheet(output / name)
             current = current_status(sheet, versions.get(sheet.motor_id, ()), files[name])
             statuses[sheet.motor_id] = current
             files |= _rewritten(output, sheet, current)
             relink(output, sheet.motor_id, but=(MOTOR,))
-        finished = replace(result.finished, files=tuple(files.items()))
-        updated.append(replace(result, finished=finished))
+        finished = replace(motor.finished, files=tuple(files.items()))
+        updated.append(replace(motor, finished=finished))
     return updated, statuses
 
 

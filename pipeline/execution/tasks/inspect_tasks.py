@@ -59,11 +59,11 @@ def in_workers(work: Callable[[Any], Any], tasks: Sequence[Any]) -> list[Any]:
         TemporaryDirectory() as progress,
         WorkerPool(pool, count, Path(progress) / "work") as workers,
     ):
-        results = list(workers.map_tasks(work, tasks))
-    for result in results:
-        if isinstance(result, MachineError):
-            raise result
-    return results
+        reports = list(workers.map_tasks(work, tasks))
+    for report in reports:
+        if isinstance(report, MachineError):
+            raise report
+    return reports
 
 
 def look_into(task: InspectTask) -> Looked:

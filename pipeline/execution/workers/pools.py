@@ -148,9 +148,9 @@ def _check(cluster: Cluster) -> None:
         if cluster != Cluster():
             raise UsageError("TLS files without a scheduler", "add scheduler=tls://HOST:PORT")
         return
-    given = [name for name in NEEDED if getattr(cluster, name)]
+    stated = [name for name in NEEDED if getattr(cluster, name)]
     if cluster.address.startswith("tls://"):
-        missing = [name for name in NEEDED if name not in given]
+        missing = [name for name in NEEDED if name not in stated]
         if missing:
             raise UsageError(f"{cluster.address} needs {', '.join(missing)}", "name the files")
         return

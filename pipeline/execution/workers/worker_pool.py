@@ -104,13 +104,13 @@ class WorkerPool:
             No worker begins a task.
 
         """
-        results: list[Any] = [None] * len(tasks)
+        answers: list[Any] = [None] * len(tasks)
         pending = list(range(len(tasks)))
         retries: list[tuple[int, CrashReport | None]] = []
         idle_rounds = 0
 
         def finish(index: int, value: Any) -> None:
-            results[index] = value
+            answers[index] = value
             if done is not None:
                 done(index, value)
 
@@ -122,7 +122,7 @@ class WorkerPool:
             pending = not_begun
         for index, crash in sorted(retries, key=lambda retry: retry[0]):
             finish(index, self._retry_isolated(function, tasks[index], crash, index))
-        return results
+        return answers
 
     def begin_tasks(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> None:
         """Begins tasks that nothing waits for: what they do is kept elsewhere, or is done again.

@@ -56,19 +56,19 @@ def read_capture(folder: Path, entry: Entry) -> Capture:
 
 
 def _read_capture(folder: Path, entry: Entry) -> Capture:
-    data = read_whole(folder / entry.path)
-    if hashlib.sha256(data).hexdigest() != entry.sha256:
+    content = read_whole(folder / entry.path)
+    if hashlib.sha256(content).hexdigest() != entry.sha256:
         raise CaptureError("changed", "the file changed while it was read", "run again")
     meta = capture_meta(entry.stated)
     if entry.part is not None and entry.part.fields and entry.source is not None:
         fields = (*entry.source.fields, *entry.part.fields)
         entry = replace(entry, source=replace(entry.source, fields=fields))
     if entry.form == "mcap":
-        raw, source, verified = _read_mcap(data, entry)
+        raw, source, verified = _read_mcap(content, entry)
     elif entry.form == "foreign":
-        raw, source, verified = _read_foreign(data, entry)
+        raw, source, verified = _read_foreign(content, entry)
     else:
-        raw, source, verified = _read_csv(data, entry)
+        raw, source, verified = _read_csv(content, entry)
     frames = [frame for table in raw if (frame := _frame(table, source, meta)) is not None]
     if source is not None:
         frames = _with_columns(frames, source.columns_from_name(entry.path))

@@ -298,9 +298,9 @@ def look(
                 beside = sidecar(read_whole(folder / question.sidecar, MAX_SIDECAR_BYTES))
             file = _File(question.path, beside, dict(question.listed))
             if _may_be_capture(folder, file, sources):
-                data = read_whole(folder / question.path)
-                digest = hashlib.sha256(data).hexdigest()
-                entry = _entry(file, data, digest, sources, findings, recover=recover)
+                content = read_whole(folder / question.path)
+                digest = hashlib.sha256(content).hexdigest()
+                entry = _entry(file, content, digest, sources, findings, recover=recover)
     except CaptureError as fault:
         findings.append(Finding.refusal(question.path, fault))
         entry = None
@@ -364,9 +364,9 @@ def _manifests(
         if PurePosixPath(path).name == MANIFEST:
             try:
                 home = PurePosixPath(path).parent.as_posix()
-                data = read_whole(folder / path, MAX_MANIFEST_BYTES + 1)
+                content = read_whole(folder / path, MAX_MANIFEST_BYTES + 1)
                 with refusing():
-                    rows = manifest(data, "" if home == "." else home)
+                    rows = manifest(content, "" if home == "." else home)
             except CaptureError as fault:
                 findings.append(Finding.refusal(path, fault))
                 continue

@@ -85,8 +85,8 @@ class _Look:
         if needs:
             answered = frozenset(field.column for field in shape.fields if field.column)
             names = name_patterns([self.name], frozenset(self.answers), answered)
-            given = {key: value for key, value in self.answers.items() if "." not in key}
-            starter = map_text([shape], names, given, by_name=foreign)
+            metadata = {key: value for key, value in self.answers.items() if "." not in key}
+            starter = map_text([shape], names, metadata, by_name=foreign)
         return InspectReport(
             self.name,
             self.form,
@@ -131,12 +131,12 @@ def describe(
         An answer cannot be meant.
 
     """
-    data = read_whole(path)
-    look_at = _Look(path.name, data, sources, answers or {})
-    reader = _reader_of(path, data, sources)
+    content = read_whole(path)
+    look_at = _Look(path.name, content, sources, answers or {})
+    reader = _reader_of(path, content, sources)
     if reader is not None:
         report = _foreign(look_at, reader)
-    elif data.startswith(MAGIC):
+    elif content.startswith(MAGIC):
         report = _mcap(look_at)
     else:
         report = _text(look_at)
@@ -228,38 +228,38 @@ def _tables(layout: Layout, joint: str | None, faults: list[str]) -> list[RawTab
 
 
 def _text(look_at: _Look) -> InspectReport:
-    data, faults = look_at.data, look_at.faults
+    content, faults = look_at.data, look_at.faults
     shape = Shape(())
     head = ""
     try:
-        check_text(data)
-        look_at.metadata, begin = split_comments(data)
-        head = _head(data)
-        start = data[begin : begin + MAX_HEAD_BYTES]
+        check_text(content)
+        look_at.metadata, begin = split_comments(content)
+        head = _head(content)
+        start = content[begin : begin + MAX_HEAD_BYTES]
         encoding = encoding_of(start)
         form = sniff(start.decode(encoding, "replace"))
         if form is None:
             faults.append("no table of numbers is found in it")
         else:
             dialect, header = replace(form[0], encoding=encoding), form[1]
-            parsed = read_csv(data, dialect, numeric_columns(data[begin:], dialect))
+            parsed = read_csv(content, dialect, numeric_columns(content[begin:], dialect))
             stated = "sha256_rows covers the rows, and holds"
             look_at.checksums = stated if parsed.verified else "none"
             stream = _stream(parsed.table, "text", look_at.answers)
             columns = _in_si_units(parsed.table, stream.fields)
             streams = (replace(stream, parts=parts_of(look_at.name, columns)),)
             suffix = PurePosixPath(look_at.name).suffix
-            marked = data.startswith(b"\xef\xbb\xbf")
+            marked = content.startswith(b"\xef\xbb\xbf")
             shape = Shape(streams, dialect, header, suffixes=(suffix,), marked=marked)
     except CaptureError as fault:
         faults.append(str(fault))
     metadata = look_at.metadata
     contract = "contract" in metadata and "source" not in metadata
-    foreign = not faults and contract and _contract_faults(data, metadata, faults)
+    foreign = not faults and contract and _contract_faults(content, metadata, faults)
     if contract:
         faults += _metadata_faults(metadata)
     look_at.source = _matched(look_at.name, head, [], look_at.sources)
-    lacks = "contract" not in metadata and not _but_for_the_key(data, metadata, shape.streams)
+    lacks = "contract" not in metadata and not _but_for_the_key(content, metadata, shape.streams)
     look_at.form = "text" if head else "unknown"
     return look_at.report(shape, lacks=lacks, foreign=foreign)
 
@@ -329,12 +329,12 @@ def _stream(table: RawTable, encoding: str, answers: Mapping[str, str]) -> Strea
 def _in_si_units(table: RawTable, fields: Sequence[FieldSeen]) -> dict[str, NDArray[np.float64]]:
     """The columns [n] of a table whose unit is known."""
     columns = {}
-    for item in fields:
-        if item.column is None or item.question is not None or item.wraps or item.times:
+    for seen in fields:
+        if seen.column is None or seen.question is not None or seen.wraps or seen.times:
             continue
-        scale = FOREIGN_UNITS[COLUMNS[item.column].unit].get(item.unit or "", Scale(1.0))
-        values = table.fields[item.name].astype(np.float64)
-        columns[item.column] = values * (item.scale or scale.factor) + scale.shift
+        scale = FOREIGN_UNITS[COLUMNS[seen.column].unit].get(seen.unit or "", Scale(1.0))
+        values = table.fields[seen.name].astype(np.float64)
+        columns[seen.column] = values * (seen.scale or scale.factor) + scale.shift
     time = _time_s(table, fields)
     return columns if time is None else {**columns, "t_s": time}
 

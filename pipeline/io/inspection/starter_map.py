@@ -100,9 +100,9 @@ def map_text(
         What must be asked is a comment.
 
     """
-    given = dict(answers or {})
-    increment = given.pop("increment_s", None)
-    cut = given.pop("captures", None) is not None
+    answered = dict(answers or {})
+    increment = answered.pop("increment_s", None)
+    cut = answered.pop("captures", None) is not None
     lines = ["# A source map. Lines that are comments wait for an answer; docs/source-maps.md."]
     if by_name:
         text = "`# source: NAME` among its first lines"
@@ -110,7 +110,7 @@ def map_text(
         where = text if in_text else "`source: NAME` in its metadata or NAME.meta.yaml"
         lines.append(f"# The file itself must name it: {where}.")
     names = names or NamePatterns()
-    lines += _metadata_lines(given, names)
+    lines += _metadata_lines(answered, names)
     if len(shapes) == 1:
         lines += _shape_lines(shapes[0], increment) + _capture_lines(shapes[0], cut)
     else:

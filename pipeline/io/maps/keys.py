@@ -262,8 +262,8 @@ def _leaf(key: Key) -> dict[str, Any]:
         numbers = [int(word) for word in key.kind if word.lstrip("-").isdigit()]
         return {**schema, "enum": numbers or list(key.kind)}
     if key.kind in ("texts", "patterns"):
-        items = {"type": "array", "items": {"type": "string"}}
-        return {**schema, "anyOf": [{"type": "string"}, items]}
+        texts = {"type": "array", "items": {"type": "string"}}
+        return {**schema, "anyOf": [{"type": "string"}, texts]}
     kinds = {
         "number": "number",
         "whole": "integer",

@@ -109,12 +109,12 @@ class Section:
             It is no list.
 
         """
-        items = self.take(key)
-        items = items or []
-        if not isinstance(items, list):
+        listed = self.take(key)
+        listed = listed or []
+        if not isinstance(listed, list):
             raise self.fault(key, "is no list", "write `- key: value` items")
         where = f"{self.where}.{key}".strip(".")
-        return [Section(self.source, f"{where}[{n}]", item) for n, item in enumerate(items)]
+        return [Section(self.source, f"{where}[{n}]", part) for n, part in enumerate(listed)]
 
     def texts(self, key: str) -> tuple[str, ...]:
         """A list of texts, or one text.

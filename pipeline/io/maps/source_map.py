@@ -352,10 +352,10 @@ def load_source_file(path: Path) -> dict[str, SourceMap]:
 
     """
     try:
-        data = path.read_bytes()
+        content = path.read_bytes()
     except OSError as fault:
         raise UsageError(f"the source map {path} cannot be read: {fault}", "check it") from fault
-    return parse_source_file(data, path.stem)
+    return parse_source_file(content, path.stem)
 
 
 def parse_source_file(data: bytes, name: str) -> dict[str, SourceMap]:

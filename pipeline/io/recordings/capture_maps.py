@@ -143,20 +143,23 @@ def _variables(capture: Capture, t_s: Array) -> Iterator[tuple[str, Array]]:
     names = ("omega_mech_rad_s", "iq_a", "theta_mech_rad", "theta_elec_rad")
     for name in names:
         if capture.has("t_s", name):
-            data = capture.arrays("t_s", name)
-            finite = np.isfinite(data[name]) & np.isfinite(data["t_s"])
+            columns = capture.arrays("t_s", name)
+            finite = np.isfinite(columns[name]) & np.isfinite(columns["t_s"])
             if finite.sum() > 1:
-                known_s, values = data["t_s"][finite], data[name][finite]
+                known_s, values = columns["t_s"][finite], columns[name][finite]
                 yield name, np.interp(t_s, known_s, values, left=np.nan, right=np.nan)
     pole_pairs = capture.meta.pole_pairs
     if pole_pairs and capture.has("t_s", "theta_mech_rad") and not capture.has("theta_elec_rad"):
-        data = capture.arrays("t_s", "theta_mech_rad")
-        yield "theta_elec_rad", pole_pairs * np.interp(t_s, data["t_s"], data["theta_mech_rad"])
+        columns = capture.arrays("t_s", "theta_mech_rad")
+        yield (
+            "theta_elec_rad",
+            pole_pairs * np.interp(t_s, columns["t_s"], columns["theta_mech_rad"]),
+        )
     if capture.has("t_s", "theta_mech_rad") and not capture.has("omega_mech_rad_s"):
-        data = capture.arrays("t_s", "theta_mech_rad")
-        if data["t_s"].size > 2:
-            speed = np.gradient(data["theta_mech_rad"], data["t_s"])
-            yield "omega_mech_rad_s", np.interp(t_s, data["t_s"], speed)
+        columns = capture.arrays("t_s", "theta_mech_rad")
+        if columns["t_s"].size > 2:
+            speed = np.gradient(columns["theta_mech_rad"], columns["t_s"])
+            yield "omega_mech_rad_s", np.interp(t_s, columns["t_s"], speed)
 
 
 def _flat(signal: str, error: Array, at: dict[str, Array]) -> ErrorMap | None:

@@ -350,11 +350,11 @@ def _frame(rows: Sequence[Row]) -> pl.DataFrame:
         "strings": pl.List(pl.String()),
     }
     schema = {name: kinds[kind] for name, (kind, _) in COLUMNS.items()}
-    data = [
+    events = [
         [content if name == "content" else _plain(getattr(event, name)) for name in COLUMNS]
         for event, content in rows
     ]
-    return pl.DataFrame(data, schema=schema, orient="row")
+    return pl.DataFrame(events, schema=schema, orient="row")
 
 
 def _plain(value: Any) -> Any:

@@ -239,7 +239,7 @@ class Code:
     def _walked(self) -> tuple[Mapping[str, Path], Mapping[Path, list[Path]]]:
         """The modules with their files, and the folders without modules by the folder above."""
         modules: dict[str, Path] = {}
-        data: dict[Path, list[Path]] = {}
+        data_folders: dict[Path, list[Path]] = {}
         for folder, folders, files in os.walk(self.root):
             place = Path(folder)
             folders[:] = sorted(name for name in folders if name != "__pycache__")
@@ -248,9 +248,9 @@ class Code:
             for file in sources:
                 modules[home if file.stem == "__init__" else f"{home}.{file.stem}"] = file
             if not sources:
-                data.setdefault(place.parent, []).append(place)
+                data_folders.setdefault(place.parent, []).append(place)
                 folders.clear()
-        return modules, data
+        return modules, data_folders
 
 
 def _kept(notes: Path | None) -> dict[str, Any]:

@@ -77,10 +77,10 @@ def release_conditions(path: Path) -> tuple[tuple[str, ...], bool]:
 
     """
     document = _document(path)
-    given = str(document.get("model_gates", "yes")).lower()
-    if given not in WORDS:
-        raise UsageError(f"{path.name}: model_gates is {given!r}", "write yes or no")
-    return _required(document, path), WORDS[given]
+    word = str(document.get("model_gates", "yes")).lower()
+    if word not in WORDS:
+        raise UsageError(f"{path.name}: model_gates is {word!r}", "write yes or no")
+    return _required(document, path), WORDS[word]
 
 
 def _required(document: Mapping[str, Any], path: Path) -> tuple[str, ...]:

@@ -43,8 +43,8 @@ def lot_chart(constant: ConstantResult) -> str:
 
 
 def _range(constant: ConstantResult) -> Axis:
-    values = [motor.value for motor in constant.motors]
-    low, high = min(values), max(values)
+    of_motors = [motor.value for motor in constant.motors]
+    low, high = min(of_motors), max(of_motors)
     bounds = constant.bounds
     centre = bounds.nominal if bounds is not None else None
     if bounds is not None and bounds.margin is not None and centre is not None:

@@ -76,16 +76,16 @@ def residual_scale(series: Iterable[Series]) -> ResidualScale | None:
         Measured and fitted samples, each in order of x.
 
     """
-    values, steps = [], []
+    residuals, steps = [], []
     for one in series:
         residual = residual_of(one)
         if residual.size == 0:
             continue
         in_order = residual[np.argsort(one.x, kind="stable")]
         in_order = in_order[np.isfinite(in_order)]
-        values.append(in_order)
+        residuals.append(in_order)
         steps.append(np.diff(in_order))
-    everything = np.concatenate(values) if values else np.empty(0)
+    everything = np.concatenate(residuals) if residuals else np.empty(0)
     if everything.size == 0:
         return None
     differences = np.concatenate(steps)

@@ -76,15 +76,15 @@ def campaigns(
             tasks = _tasks(folder, of_files, motor, bounds)
             read = workers.map_tasks(usable_captures, tasks)
     findings = list(of_files.findings)
-    made = []
+    motors = []
     for task, end in zip(tasks, read, strict=True):
         if isinstance(end, MachineError):
             raise end
         captures, doubts = end
         findings += doubts
         if captures:
-            made.append(Campaign(task.motor_id, captures))
-    return Gathered(tuple(made), tuple(findings), of_files.note)
+            motors.append(Campaign(task.motor_id, captures))
+    return Gathered(tuple(motors), tuple(findings), of_files.note)
 
 
 def _of_files(survey: Survey, only: Collection[str] | None) -> Survey:

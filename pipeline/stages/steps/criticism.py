@@ -91,22 +91,22 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str)
             aside.join()
         effects = tuple(settings.model.effects)
         spec = ModelSpec(settings.model.name, effects, settings.effects_path, changes)
-        results = []
+        judged = []
         stated = [replace(one, stated=settings.constants) for one in read.campaigns]
         for number, campaign in enumerate(stated, 1):
             line.say(f"{printable(campaign.motor_id)}, motor {number} of {len(stated)}")
             with worker.campaign():
                 start = start_constants(campaign)
                 task = Task(campaign, spec, start, settings.input, output, watch)
-                results.append(judge(task))
-    undecided = not results or any(result.undecided for result in results)
+                judged.append(judge(task))
+    undecided = not judged or any(motor.undecided for motor in judged)
     outcome = outcome_of(
-        settings.input, read, [result.text for result in results], undecided=undecided
+        settings.input, read, [motor.text for motor in judged], undecided=undecided
     )
     return replace(
         outcome,
         timings=watch.table(),
-        result=[result.document for result in results],
-        wrote=f"{output}/{folder}" if results else "",
-        next=next((result.next for result in results if result.next), ""),
+        result=[motor.document for motor in judged],
+        wrote=f"{output}/{folder}" if judged else "",
+        next=next((motor.next for motor in judged if motor.next), ""),
     )

@@ -115,7 +115,7 @@ def _torque(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, ...
     omega = np.interp(t_s, cut.middle_s, speed)
     rising = np.interp(t_s, cut.middle_s, np.gradient(speed, cut.middle_s))
     warm = np.interp(t_s, cut.middle_s, _warm(record, cut, "magnet"))
-    made = air_gap_torque(
+    torque_nm = air_gap_torque(
         record.get("id_a", nothing),
         record.get("iq_a", nothing),
         kt_nm_a * (1.0 + known.get("temp_coeff_magnet_1_k", 0.0) * warm),
@@ -124,7 +124,7 @@ def _torque(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, ...
     )
     drag = known.get("torque_coulomb_nm", 0.0) * np.sign(omega)
     drag += known.get("b_visc_nm_s_rad", 0.0) * omega
-    fitted = made - drag - known.get("j_rotor_kgm2", 0.0) * rising
+    fitted = torque_nm - drag - known.get("j_rotor_kgm2", 0.0) * rising
     fitted[_jumps(cut, speed, known.get("j_rotor_kgm2", 0.0), record)] = np.nan
     series = Series("", t_s, record["torque_shaft_nm"], fitted)
     return (_evidence(capture, "torque_shaft_nm", series, "every sample"),)
@@ -152,8 +152,8 @@ def _record(capture: Capture, needed: tuple[str, ...]) -> dict[str, Array] | Non
         return None
     optional = ("id_a", "temp_winding_degc", "temp_magnet_degc")
     names = dict.fromkeys(("t_s", angle, *needed, *(n for n in optional if capture.has(n))))
-    data = capture.finite(*names)
-    return data if data["t_s"].size else None
+    columns = capture.finite(*names)
+    return columns if columns["t_s"].size else None
 
 
 def _windows(t_s: Array) -> _Windows | None:
