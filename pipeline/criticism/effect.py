@@ -97,6 +97,22 @@ class Parameter:
         return not self.scan
 
 
+def choice(name: str, values: tuple[float, ...], words: str = "") -> Parameter:
+    """A parameter that takes one of a few values and is never fitted.
+
+    Parameters
+    ----------
+    name
+        Name within the effect.
+    values
+        The values, in the order in which they are tried.
+    words
+        What each value means.
+
+    """
+    return Parameter(name, "1", 1.0, 0.0, words=words, scan=values, choice=True)
+
+
 UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
 """Nuisance that stands for a temperature where a test that warms the machine did not record it."""
 

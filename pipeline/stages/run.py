@@ -201,10 +201,8 @@ def _computed(
         fleet = fleet_of(output, motors, others)
         datasheets = fleet.datasheets
         of_others = {one.motor_id: status_now(output, one, histories) for one in fleet.others}
-        findings = sorted(
-            {f for r in motors for f in r.finished.findings}.union(survey.findings),
-            key=Finding.order,
-        )
+        of_motors = {finding for motor in motors for finding in motor.finished.findings}
+        findings = sorted(of_motors.union(survey.findings), key=Finding.order)
         files, removed = publish(
             settings, motors, fleet, tuple(findings), {**of_others, **statuses}, others
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values, choice
 from pipeline.criticism.machine.two_masses import (
     discriminator,
     far_drag,
@@ -40,7 +40,7 @@ EFFECT = Effect(
         Parameter("twist_rad", "rad", 0.005, 0.0, low=1e-5, high=3.0, scan=(0.003,)),
         Parameter("damping_s", "s", 1.0, 0.0, "period_s", 0.0, 5.0, scan=(0.0,), optional=1),
         Parameter("torque_nm", "N·m", 0.03, 0.0, "torque_nm", scan=(0.01,), choice=True),
-        Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0, -1.0), choice=True),
+        choice("between", (0.0, 1.0, -1.0)),
     ),
     signals=("torque_shaft_nm",),
     alternatives={

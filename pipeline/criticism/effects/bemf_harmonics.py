@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values, choice
 
 
 def _coenergy(x: Operating, q: Values) -> Any:
@@ -48,7 +48,7 @@ EFFECT = Effect(
             for axis in "dq"
             for wave in ("cos", "sin")
         ),
-        Parameter("ripple_share", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
+        choice("ripple_share", (1.0, 0.0)),
     ),
     alternatives={"cogging": "a slow turn without current"},
     coenergy=_coenergy,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.effect import RECORDERS, Effect, Parameter, Values
+from pipeline.criticism.effect import RECORDERS, Effect, Parameter, Values, choice
 
 _LOG, _OPEN, _SHAFT, _STEP = (2**n for n in range(len(RECORDERS)))
 _TURNING = _LOG + _OPEN + _SHAFT
@@ -25,14 +25,10 @@ EFFECT = Effect(
     "crystal's rate",
     parameters=(
         Parameter("gain", "1", 0.02, 0.002, low=-0.5, high=0.5),
-        Parameter(
+        choice(
             "of",
-            "1",
-            1.0,
-            0.0,
-            scan=(_TURNING, _LOG, _OPEN, _SHAFT, _STEP, _OPEN + _SHAFT, _TURNING + _STEP),
-            choice=True,
-            words="whose clock, a sum: 1 logs under load, 2 open windings, 4 a shaft alone, "
+            (_TURNING, _LOG, _OPEN, _SHAFT, _STEP, _OPEN + _SHAFT, _TURNING + _STEP),
+            "whose clock, a sum: 1 logs under load, 2 open windings, 4 a shaft alone, "
             "8 steps of a locked rotor",
         ),
     ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values, choice
 from pipeline.criticism.machine.two_masses import (
     LINEAR_COUPLING,
     discriminator,
@@ -35,7 +35,7 @@ EFFECT = Effect(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),
         Parameter("twist_rad", "rad", 0.01, 0.0005, low=1e-5, high=3.0, scan=(0.002, 0.01, 0.1)),
         Parameter("damping_s", "s", 1.0, 0.0, "period_s", 0.0, 5.0, scan=(0.0,), optional=1),
-        Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0, -1.0), choice=True),
+        choice("between", (0.0, 1.0, -1.0)),
     ),
     signals=("torque_shaft_nm",),
     alternatives={

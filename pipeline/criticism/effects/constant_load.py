@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values, choice
 
 
 def _torque(x: Operating, q: Values) -> Array:
@@ -23,14 +23,8 @@ EFFECT = Effect(
     reference="Armstrong-Hélouvry, Control of Machines with Friction (1991), ch. 2",
     parameters=(
         Parameter("torque_nm", "N·m", 0.01, 0.0005, "torque_nm", low=-1.0, high=1.0),
-        Parameter(
-            "inside",
-            "1",
-            1.0,
-            0.0,
-            scan=(0.0, 1.0),
-            choice=True,
-            words="1: it acts on the motor's side of the transducer, 0: beyond it",
+        choice(
+            "inside", (0.0, 1.0), "1: it acts on the motor's side of the transducer, 0: beyond it"
         ),
     ),
     alternatives={

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values
+from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values, choice
 
 _LATE = tuple(2.0**k for k in range(1, 8))
 _EARLY = tuple(-late for late in _LATE)
@@ -32,14 +32,10 @@ EFFECT = Effect(
         Parameter(
             "delay_s", "s", 0.5, 0.02, "period_s", low=-200.0, high=200.0, starts=(*_EARLY, *_LATE)
         ),
-        Parameter(
+        choice(
             "of_phases",
-            "1",
-            1.0,
-            0.0,
-            scan=(1.0, 0.0),
-            choice=True,
-            words="1: the phase currents are late, 0: those of the rotor frame are",
+            (1.0, 0.0),
+            "1: the phase currents are late, 0: those of the rotor frame are",
         ),
     ),
     signals=("id_a", "iq_a"),

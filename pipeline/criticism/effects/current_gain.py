@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values
+from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values, choice
 
 
 def _current(r: Recorded, q: Values) -> Complex:
@@ -49,8 +49,8 @@ EFFECT = Effect(
         Parameter("cosine", "1", 0.01, 0.001, low=-0.3, high=0.3),
         Parameter("sine", "1", 0.01, 0.001, low=-0.3, high=0.3),
         Parameter("mean", "1", 0.01, 0.004, low=-0.3, high=0.3),
-        Parameter("shunts", "1", 1.0, 0.0, scan=(0.0, 1.0, 2.0, 3.0), choice=True),
-        Parameter("bench", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
+        choice("shunts", (0.0, 1.0, 2.0, 3.0)),
+        choice("bench", (0.0, 1.0)),
     ),
     signals=("id_a", "iq_a"),
     alternatives={"phase_imbalance": "resistance through all three terminal pairs"},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values
+from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values, choice
 
 
 def _current(r: Recorded, q: Values) -> Complex:
@@ -19,8 +19,8 @@ EFFECT = Effect(
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
     parameters=(
         Parameter("gain", "1", 0.02, 0.006, low=-0.5, high=0.5),
-        Parameter("of_drive", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
-        Parameter("of_bench", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
+        choice("of_drive", (1.0, 0.0)),
+        choice("of_bench", (1.0, 0.0)),
     ),
     alternatives={
         "voltage_scale": "resistance known to 0.2 % from a four-wire meter",

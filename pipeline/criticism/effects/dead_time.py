@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values, choice
 from pipeline.criticism.machine.inverter import (
     lost_shares,
     phases_of,
@@ -107,14 +107,10 @@ EFFECT = Effect(
         ),
         # of itself it would be any resistance: it makes no effect large enough to be named
         Parameter("on_v", "V", 0.005, 0.0, "voltage_v", low=0.0, high=0.1, optional=1),
-        Parameter(
+        choice(
             "ripple",
-            "1",
-            1.0,
-            0.0,
-            scan=(0.0, 1.0, 2.0),
-            choice=True,
-            words="as pwm_hz, vdc_v and L switch it, 1: by the current at the edges, as a dead "
+            (0.0, 1.0, 2.0),
+            "as pwm_hz, vdc_v and L switch it, 1: by the current at the edges, as a dead "
             "time acts, 2: by that of each moment, as thresholds of switches do; 0: by the mean",
         ),
         Parameter(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values, choice
 
 
 def _stored(x: Operating) -> dict[str, Any]:
@@ -54,7 +54,7 @@ EFFECT = Effect(
             for name in ("q6", "d6", "cross6")
             for wave in ("cos", "sin")
         ),
-        Parameter("ripple_share", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
+        choice("ripple_share", (1.0, 0.0)),
     ),
     signals=("id_a", "iq_a"),
     alternatives={"bemf_harmonics": "an open-circuit spin", "dead_time": "two speeds"},

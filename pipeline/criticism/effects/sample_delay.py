@@ -6,7 +6,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values, between
+from pipeline.criticism.effect import (
+    Array,
+    Complex,
+    Effect,
+    Operating,
+    Parameter,
+    Values,
+    between,
+    choice,
+)
 
 
 def _voltage(v_v: Complex, x: Operating, q: Values, _: str) -> Complex:
@@ -36,14 +45,10 @@ EFFECT = Effect(
     reference="Bae & Sul, IEEE Trans. Ind. Appl. 39 (2003), time delay of digital control",
     parameters=(
         Parameter("delay_s", "s", 0.5, 0.02, "period_s", low=-5.0, high=5.0),
-        Parameter(
+        choice(
             "of_speed",
-            "1",
-            1.0,
-            0.0,
-            scan=(0.0, 1.0),
-            choice=True,
-            words="1: the drive's own speed is late behind the angle, 0: the voltages are off",
+            (0.0, 1.0),
+            "1: the drive's own speed is late behind the angle, 0: the voltages are off",
         ),
     ),
     signals=("vd_v", "vq_v"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Effect, Parameter, Recorded, Values
+from pipeline.criticism.effect import Array, Effect, Parameter, Recorded, Values, choice
 
 _STARTS = tuple(2.0**k for k in range(1, 8))
 """Delays [sample periods] that a late stamp is looked for at."""
@@ -45,15 +45,7 @@ EFFECT = Effect(
             scan=(0.0,),
             words="τ l/(τ + l) of the two delays, in sample periods",
         ),
-        Parameter(
-            "stamped",
-            "1",
-            1.0,
-            0.0,
-            scan=(0.0, 1.0),
-            choice=True,
-            words="1: all of the delay is a late stamp, 0: a first-order lag",
-        ),
+        choice("stamped", (0.0, 1.0), "1: all of the delay is a late stamp, 0: a first-order lag"),
     ),
     signals=("torque_shaft_nm", "iq_a"),
     load=_load,

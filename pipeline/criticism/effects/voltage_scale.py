@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Values, choice
 
 
 def _voltage(v_v: Complex, _: Operating, q: Values, instrument: str) -> Complex:
@@ -19,8 +19,8 @@ EFFECT = Effect(
     reference="JCGM 100:2008, 4.3 (a gain is common to all samples)",
     parameters=(
         Parameter("gain", "1", 0.02, 0.006, low=-0.5, high=0.5),
-        Parameter("of_drive", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
-        Parameter("of_bench", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
+        choice("of_drive", (1.0, 0.0)),
+        choice("of_bench", (1.0, 0.0)),
     ),
     alternatives={
         "current_scale": "resistance known to 0.2 % from a four-wire meter",

@@ -4,17 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Complex, Operating, Parameter
+from pipeline.criticism.effect import Array, Complex, Operating, choice
 
-PARALLEL = Parameter(
-    "parallel",
-    "1",
-    1.0,
-    0.0,
-    scan=(1.0, 0.0),
-    choice=True,
-    words="1: the winding feeds the loss, 0: the shaft alone does",
-)
+PARALLEL = choice("parallel", (1.0, 0.0), "1: the winding feeds the loss, 0: the shaft alone does")
 """Parameter of an iron loss by which `loss_current` counts."""
 
 
