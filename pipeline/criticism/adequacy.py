@@ -14,10 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.diagnosis import base_fit, searched
-from pipeline.criticism.effect import Effect, Machine
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.friction_parts import friction_parts
 from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.regression.goodness import leave_out, remainder
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal

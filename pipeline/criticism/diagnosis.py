@@ -13,12 +13,13 @@ from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.discovery.changed_constants import Change
-from pipeline.criticism.effect import UNLOGGED, Effect, Machine
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.ladder import parameters_of, step_record
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, over_floor

@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.records.capture import Capture
 
 Cut = Callable[[Capture, Machine], Segment | None]

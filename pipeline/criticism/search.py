@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 from pipeline.criticism.discovery.changed_constants import Change, changed_constant
 from pipeline.criticism.discovery.changed_within import ChangeWithin, changed_within
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
-from pipeline.criticism.effect import Effect, Machine
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder

@@ -14,9 +14,9 @@ from pipeline.contracts import gates as gates_package
 from pipeline.contracts.registry import gates
 from pipeline.contracts.validate import validate
 from pipeline.criticism import equations as equations_package
-from pipeline.criticism.effect import SCALES, Machine
 from pipeline.criticism.library.equations import equations
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.parameter import SCALES, Machine
 from pipeline.criticism.regression.gauss_newton import start_values
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import segments

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.captures import Cutting
 
 _REACH = 2

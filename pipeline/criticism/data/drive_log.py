@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Sensors
 from pipeline.criticism.data.traces import SMOOTHED, even_clock, prepared, shaft_angle
-from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.operating import Array
+from pipeline.criticism.parameter import Machine
 from pipeline.records.capture import Capture
 
 _BLOCKS = 12

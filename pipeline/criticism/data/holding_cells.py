@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.sensor_noise import sensor_noise
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.policy.policy import Policy
 from pipeline.numerics.orders import passes

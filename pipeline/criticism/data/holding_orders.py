@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.holding_cells import holding_cells
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.policy import Policy
 from pipeline.records.capture import Capture
 

@@ -13,7 +13,8 @@ from pipeline.criticism.data.instruments import stated_u
 from pipeline.criticism.data.sensor_noise import rounding_step
 from pipeline.criticism.data.settling import settling_of
 from pipeline.criticism.data.traces import LINES_V, with_values
-from pipeline.criticism.effect import UNLOGGED, Array, Machine
+from pipeline.criticism.operating import Array
+from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.policy.policy import DEFAULT, Policy
 from pipeline.physics.conventions import COUPLINGS, coupling_from
 from pipeline.physics.frames import vector_of_lines

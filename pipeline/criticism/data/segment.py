@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import Array, Machine, Made
+from pipeline.criticism.operating import Array, Made
+from pipeline.criticism.parameter import Machine
 from pipeline.numerics.projection import Projection
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.capture import Capture

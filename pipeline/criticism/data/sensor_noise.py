@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy.signal import savgol_filter
 
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.sensors import SensorNoise
 
 _LOOKED_AT = 2000

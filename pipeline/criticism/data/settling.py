@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from pipeline.criticism.data.traces import with_values
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.policy import Policy
 from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.shaft_log import shaft_log

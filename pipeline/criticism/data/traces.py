@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.clocks import counted, sampled_unevenly
 from pipeline.criticism.data.segment import UNSMOOTHED, Sensors
 from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
-from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.operating import Array
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.sensors import SensorNoise

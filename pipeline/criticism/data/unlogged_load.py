@@ -6,7 +6,8 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import DriveLog
 from pipeline.criticism.data.segment import slow_orders
-from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.operating import Array
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.numerics.weak_rows import WeakRows, smooth_speed, weak_rows
 

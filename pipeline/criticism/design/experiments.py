@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, chndtr
 
 from pipeline.criticism.design.planned_tests import PLANNED, planned, planned_words
-from pipeline.criticism.effect import Array, Effect
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.linearise import linearise

@@ -15,7 +15,7 @@ from pipeline.criticism.data.segment import (
     electrical_orders,
     slow_orders,
 )
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.residuals.residual import residual

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Machine, Operating
+from pipeline.criticism.operating import Array, Operating
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.discovery import Discovery
 from pipeline.physics.units import TURN_RAD
 

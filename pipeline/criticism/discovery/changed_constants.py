@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.criticism.effect import Array
 from pipeline.criticism.machine.model import BASE, PHYSICAL
+from pipeline.criticism.operating import Array
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import NormalEquations, Prior, pseudo_inverse

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import clock
 from pipeline.criticism.discovery.changed_constants import End, by_words, may_change, unit_of
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem

@@ -11,7 +11,7 @@ from pipeline.criticism.discovery.dictionary import POWER
 from pipeline.criticism.discovery.effect_source import effect_source
 from pipeline.criticism.discovery.matching_pursuit import Expression, Pursuit, curve_about
 from pipeline.criticism.discovery.residual_inputs import Port
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.discovery import Discovery
 from pipeline.records.diagnosis import (
     AlternativeVariables,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.criticism.discovery.bases import Variable
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 
 WAVES = ("sin", "cos")
 POWER = "power"

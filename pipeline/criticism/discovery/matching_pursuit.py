@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.discovery.bases import Variable
 from pipeline.criticism.discovery.dictionary import CENTRED, POWER, SHAPES, WAVES, Term
 from pipeline.criticism.discovery.residual_inputs import Port
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.discovery import Discovery
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import unit_diagonal

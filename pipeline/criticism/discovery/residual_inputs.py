@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from pipeline.criticism.discovery.bases import PAST, Basis, Variable, coarse, fine, variables
-from pipeline.criticism.effect import Effect, Machine, Operating, Parameter, Values
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.operating import Operating, Values
+from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.discovery import Discovery
 
 _WIDE = 1e6

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.discovery.description import describe
 from pipeline.criticism.discovery.matching_pursuit import Pursuit, expression
 from pipeline.criticism.discovery.residual_inputs import Port, ports, refined
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import significant_groups

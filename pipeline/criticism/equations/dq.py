@@ -21,9 +21,10 @@ from pipeline.criticism.data.traces import (
     window_of,
     with_angle,
 )
-from pipeline.criticism.effect import Array, Complex, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
+from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.shaft import (
     net_torque,
     sensed_torque,

@@ -11,7 +11,6 @@ from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.settling import unexplained_voltage
 from pipeline.criticism.data.traces import smoothed, window_of
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values, between
 from pipeline.criticism.equation import Channel, Equation, NamedCombination, Observes, Sensing, Use
 from pipeline.criticism.machine.model import (
     ELECTRICAL,
@@ -21,6 +20,8 @@ from pipeline.criticism.machine.model import (
     Pieces,
     evaluate,
 )
+from pipeline.criticism.operating import Array, Operating, Signals, Values, between
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
 from pipeline.criticism.signals.voltage import recorded_voltage
 from pipeline.numerics.projection import projection, window_starts

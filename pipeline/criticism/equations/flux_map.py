@@ -6,9 +6,10 @@ import numpy as np
 
 from pipeline.criticism.data.levels import levels_of
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.signals.true_state import at_rest, operating, table_current
 from pipeline.criticism.signals.voltage import recorded_voltage

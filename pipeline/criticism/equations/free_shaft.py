@@ -20,9 +20,10 @@ from pipeline.criticism.data.traces import (
     with_angle,
     with_travel,
 )
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import COAST_SHARES, Model, Pieces, clock_gain
+from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.shaft import (
     net_torque,
     sensed_torque,

@@ -9,9 +9,10 @@ import numpy as np
 
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
 from pipeline.criticism.data.sensor_noise import resolution
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes
 from pipeline.criticism.machine.model import Model, Pieces, evaluate
+from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.true_state import Motion, operating
 from pipeline.records.capture import Capture
 

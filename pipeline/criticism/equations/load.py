@@ -16,9 +16,10 @@ from pipeline.criticism.data.traces import (
     window_of,
     with_angle,
 )
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
+from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.shaft import net_torque, sensed_torque, true_load
 from pipeline.criticism.signals.true_state import at_true_angle, drive_current, motion_of, operating
 from pipeline.numerics.projection import projection

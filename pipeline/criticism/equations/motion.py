@@ -10,10 +10,11 @@ from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
 from pipeline.criticism.data.traces import thinned, window_of
 from pipeline.criticism.data.unlogged_load import runs_free
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
 from pipeline.criticism.machine.two_masses import reach
+from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.shaft import (
     net_torque,
     torque_between,

@@ -21,9 +21,10 @@ from pipeline.criticism.data.traces import (
     window_of,
     with_angle,
 )
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import OPEN_FLUX, Model, Pieces
+from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
 from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage

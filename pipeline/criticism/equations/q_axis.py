@@ -9,9 +9,10 @@ import numpy as np
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.traces import window_of
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, UNSAMPLED, Model, Pieces, values_of
+from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.true_state import at_true_angle, drive_current, motion_of, operating
 from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage, unresolved
 from pipeline.numerics.projection import projection, window_starts

@@ -8,9 +8,10 @@ import numpy as np
 
 from pipeline.criticism.data.levels import set_levels
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.true_state import Motion, operating, table_current
 from pipeline.criticism.signals.voltage import recorded_voltage
 from pipeline.records.capture import Capture

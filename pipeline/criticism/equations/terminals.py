@@ -9,9 +9,10 @@ import numpy as np
 
 from pipeline.criticism.data.segment import PAIR_RAD, Segment, segment_of
 from pipeline.criticism.data.traces import even_clock, prepared, window_of
-from pipeline.criticism.effect import Array, Machine, Operating, Recorded, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.operating import Array, Operating, Recorded, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.true_state import at_rest, operating, true_current
 from pipeline.criticism.signals.voltage import central, recorded_voltage
 from pipeline.numerics.projection import Projection, projection, window_starts

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.levels import levels_of
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
-from pipeline.criticism.effect import Array, Machine, Operating, Signals, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.signals.shaft import as_sensed, net_torque
 from pipeline.criticism.signals.true_state import Motion, operating, table_current

@@ -13,17 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.effect import (
-    Array,
-    Effect,
-    Machine,
-    Operating,
-    ShaftState,
-    TorqueHook,
-    Values,
-)
+from pipeline.criticism.effect import Effect, TorqueHook
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import air_gap_torque, base_flux, effect_flux
+from pipeline.criticism.operating import Array, Operating, ShaftState, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.records.effect_table import EffectTable, EffectTables
 from pipeline.records.model_verdict import ModelVerdict
 

@@ -10,8 +10,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Effect, Machine, Operating, ShaftState, Values
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import base_flux
+from pipeline.criticism.operating import Array, Operating, ShaftState, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.model_verdict import Parameters
 

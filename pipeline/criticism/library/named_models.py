@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pipeline.criticism.effect import Machine
 from pipeline.criticism.library.registry import chosen
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.errors import UsageError

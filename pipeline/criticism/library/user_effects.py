@@ -16,17 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import (
-    RECORDERS,
-    SCALES,
-    Effect,
-    Machine,
-    Operating,
-    Parameter,
-    Recorded,
-    Samples,
-    ShaftState,
-)
+from pipeline.criticism.effect import RECORDERS, Effect
+from pipeline.criticism.operating import Operating, Recorded, Samples, ShaftState
+from pipeline.criticism.parameter import SCALES, Machine, Parameter
 from pipeline.records.errors import PipelineError, UsageError
 
 _HOOKS = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Complex, Operating
+from pipeline.criticism.operating import Array, Complex, Operating
 
 _OTHERS = ((1, 2), (2, 0), (0, 1))
 _ROUNDS = 3

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Complex, Operating, choice
+from pipeline.criticism.operating import Array, Complex, Operating
+from pipeline.criticism.parameter import choice
 
 PARALLEL = choice("parallel", (1.0, 0.0), "1: the winding feeds the loss, 0: the shaft alone does")
 """Parameter of an iron loss by which `loss_current` counts."""

@@ -19,17 +19,9 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.criticism.effect import (
-    Array,
-    CoenergyHook,
-    Complex,
-    Effect,
-    Hooks,
-    Machine,
-    Operating,
-    Parameter,
-    Values,
-)
+from pipeline.criticism.effect import CoenergyHook, Effect, Hooks
+from pipeline.criticism.operating import Array, Complex, Operating, Values
+from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.captures import Priors
 from pipeline.criticism.policy.policy import Policy
 

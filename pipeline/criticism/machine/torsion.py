@@ -31,7 +31,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.machine import Torsion
 
 

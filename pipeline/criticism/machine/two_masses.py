@@ -21,19 +21,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pipeline.criticism.effect import (
-    Array,
-    Discrimination,
-    Effect,
-    FullLog,
-    LinearForm,
-    Machine,
-    Operating,
-    Parameter,
-    Shown,
-    Values,
-)
+from pipeline.criticism.effect import Discrimination, Effect, FullLog, LinearForm, Shown
 from pipeline.criticism.machine.torsion import Law, Shaft, law_of_twist
+from pipeline.criticism.operating import Array, Operating, Values
+from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.machine import Torsion
 
 

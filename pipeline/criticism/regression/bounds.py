@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.machine_scale import base_scales
-from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.regression.linearise import Column
 
 _AT = 1e-9

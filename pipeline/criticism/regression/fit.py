@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Effect, Machine, Parameter, Values
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.linearise import Column

@@ -13,8 +13,9 @@ import numpy as np
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment, row_index
-from pipeline.criticism.effect import Array, Machine, Values
 from pipeline.criticism.machine.model import PHYSICAL, Model, base_of, zero
+from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.regression.bounds import Best, bounded_step
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system

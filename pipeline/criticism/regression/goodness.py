@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, ndtr
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.regression import Goodness
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem

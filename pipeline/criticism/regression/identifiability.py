@@ -10,9 +10,9 @@ import numpy as np
 from scipy.special import gammainc, gammaincinv
 
 from pipeline.criticism.data.machine_scale import base_scales
-from pipeline.criticism.effect import Array
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import BASE, PHYSICAL, Model, base_of
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.regression import GaussNewton
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.fit import Fit

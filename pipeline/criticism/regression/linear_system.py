@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.machine.model import CURVED, Model
+from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.fit import Fit

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, projected, row_index
-from pipeline.criticism.effect import Array, Complex, Effect, Machine, Operating, Values
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import (
     CURVED,
@@ -29,6 +29,8 @@ from pipeline.criticism.machine.model import (
     values_of,
     zero,
 )
+from pipeline.criticism.operating import Array, Complex, Operating, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.noise_floors import Floor, offsets, reading_error, window_gain
 from pipeline.criticism.residuals.channels import of_acceleration, reported_unit

@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, clock, with_lines
-from pipeline.criticism.effect import Array, Machine, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.regression import MainsHum
 from pipeline.criticism.residuals.residual import disturbed, residual
 

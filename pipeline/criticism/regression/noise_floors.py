@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.segment import UNSMOOTHED, Segment, projected, row_index
 from pipeline.criticism.data.sensor_noise import rounding_error, smoothed, unrounded
 from pipeline.criticism.data.traces import parabolas
-from pipeline.criticism.effect import Array, Complex, Effect, Operating, Values
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
+from pipeline.criticism.operating import Array, Complex, Operating, Values
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.criticism.residuals.channels import (

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.regression import GaussNewton
 
 _TIE = 1e-11

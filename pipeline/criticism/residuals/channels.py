@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Machine, Values
 from pipeline.criticism.equation import Channel
 from pipeline.criticism.library.equations import equation_of
+from pipeline.criticism.operating import Values
+from pipeline.criticism.parameter import Machine
 
 
 def channel_of(segment: Segment, name: str) -> Channel:

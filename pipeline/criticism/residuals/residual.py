@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Operating, Signals, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, Pieces, evaluate
+from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.residuals.observability import hooks_in
 from pipeline.criticism.signals.true_state import on_true_clock
 from pipeline.numerics.projection import Projection

@@ -11,10 +11,10 @@ from pipeline.criticism.data.instruments import gains_of
 from pipeline.criticism.data.segment import UNSMOOTHED, Cache, Segment, with_lines
 from pipeline.criticism.data.sensor_noise import is_rounded, rounding_step
 from pipeline.criticism.data.traces import PAD, with_values
-from pipeline.criticism.effect import UNLOGGED, Machine
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equation_of, equations
 from pipeline.criticism.machine.model import COAST_SHARES, LATE_SPEED, OPEN_FLUX, UNLOGGED_AT_REST
+from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.numerics.coast_setups import Limits, Setup, coast_setups
 from pipeline.records.capture import Campaign, Capture
 

@@ -9,8 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Discrimination, Effect, FullLog, Parameter, Values
+from pipeline.criticism.effect import Discrimination, Effect, FullLog
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
+from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem

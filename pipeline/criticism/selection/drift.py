@@ -17,8 +17,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment, clock, with_lines
-from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder

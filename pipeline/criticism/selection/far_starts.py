@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Effect, Machine, Parameter, Values
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.linearise import trial_residuals
 from pipeline.criticism.regression.normal_equations import Descent

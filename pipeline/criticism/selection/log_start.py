@@ -15,8 +15,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import Effect, Values
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import zero
+from pipeline.criticism.operating import Values
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.discrimination import full_logs, settled

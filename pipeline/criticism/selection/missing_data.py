@@ -11,8 +11,9 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.data.settling import unexplained_voltage
 from pipeline.criticism.data.traces import with_values
 from pipeline.criticism.data.unlogged_load import unexplained_share
-from pipeline.criticism.effect import UNLOGGED, Effect, Evidence, Machine
+from pipeline.criticism.effect import Effect, Evidence
 from pipeline.criticism.library.equations import equation_of, equations
+from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.residuals.segments import known_tests, mixed_setups
 from pipeline.criticism.selection.alternatives import detectable

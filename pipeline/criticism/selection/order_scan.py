@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Complex
 from pipeline.criticism.library.equations import equation_of
+from pipeline.criticism.operating import Array, Complex
 from pipeline.criticism.policy.selection import OrderScan
 from pipeline.criticism.regression.goodness import material_size
 from pipeline.criticism.regression.linear_system import LinearSystem

@@ -15,8 +15,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import Array, Effect, Machine, Parameter
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.operating import Array
+from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.selection import Selection
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system, model_columns

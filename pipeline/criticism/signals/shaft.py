@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Complex, Operating, Recorded, Signals, Values
 from pipeline.criticism.machine.model import Model, Pieces, air_gap_torque, ripple, values_of
+from pipeline.criticism.operating import Array, Complex, Operating, Recorded, Signals, Values
 from pipeline.criticism.signals.true_state import ahead_in
 from pipeline.criticism.signals.voltage import central
 

@@ -11,11 +11,16 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, slow_orders
 from pipeline.criticism.data.traces import smoothed
-from pipeline.criticism.effect import (
-    UNLOGGED,
+from pipeline.criticism.machine.model import (
+    LATE_SPEED,
+    UNLOGGED_AT_REST,
+    Model,
+    clock_gain,
+    values_of,
+)
+from pipeline.criticism.operating import (
     Array,
     Complex,
-    Machine,
     Operating,
     Recorded,
     ShaftState,
@@ -24,13 +29,7 @@ from pipeline.criticism.effect import (
     Values,
     between,
 )
-from pipeline.criticism.machine.model import (
-    LATE_SPEED,
-    UNLOGGED_AT_REST,
-    Model,
-    clock_gain,
-    values_of,
-)
+from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.policy.captures import Cutting
 
 

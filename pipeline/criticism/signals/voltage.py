@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Complex, Operating, Values
 from pipeline.criticism.machine.model import Model, Pieces, values_of
+from pipeline.criticism.operating import Array, Complex, Operating, Values
 from pipeline.criticism.signals.true_state import angle_error, zero_angle
 
 RIPPLES = ("ripple_edge", "ripple_shift", "frame_lag_s")

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, slow_orders
-from pipeline.criticism.effect import Array
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.validation import Validation
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem

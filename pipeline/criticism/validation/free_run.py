@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Complex, Signals, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.operating import Array, Complex, Signals, Values
 from pipeline.criticism.validation.trajectories import (
     Batch,
     Jacobian,

@@ -11,8 +11,8 @@ import numpy as np
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.data.traces import smoothed
-from pipeline.criticism.effect import Array
 from pipeline.criticism.library.equations import equation_of
+from pipeline.criticism.operating import Array
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import LinearSystem

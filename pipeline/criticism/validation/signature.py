@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array
+from pipeline.criticism.operating import Array
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.validation.error_maps import Errors, angle_maps, window_errors
 from pipeline.physics.glossary import unit_of

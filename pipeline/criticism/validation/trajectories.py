@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Complex, Operating, Signals, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, air_gap_torque, evaluate
+from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
 from pipeline.criticism.regression.noise_floors import reading_error
 from pipeline.criticism.residuals.residual import measured, operate, predicted
 from pipeline.criticism.validation.error_maps import disjoint

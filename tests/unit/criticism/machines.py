@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Instrument, Segment, Sensors
-from pipeline.criticism.effect import Machine, Operating
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import BASE, STATE, Model
+from pipeline.criticism.operating import Operating
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.numerics.projection import projection

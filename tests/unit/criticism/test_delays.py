@@ -10,8 +10,8 @@ import pytest
 
 from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.diagnosis import diagnose
-from pipeline.criticism.effect import Recorded, between
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.operating import Recorded, between
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.signals.true_state import ahead_in
 from pipeline.records.capture import Campaign, Capture

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.segment import slow_orders
-from pipeline.criticism.effect import Recorded, ShaftState
 from pipeline.criticism.effects import cogging
 from pipeline.criticism.library.registry import chosen, effects
 from pipeline.criticism.machine.model import Model, base_flux, effect_flux, evaluate, values_of
+from pipeline.criticism.operating import Recorded, ShaftState
 from pipeline.physics.glossary import COLUMNS, TESTS
 from pipeline.records.errors import UsageError
 from tests.unit.criticism.machines import BASE, machine, operating

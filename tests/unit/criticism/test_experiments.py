@@ -12,9 +12,9 @@ from pipeline.criticism.data.segment import row_index
 from pipeline.criticism.design import experiments
 from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.design.planned_tests import PLANNED, planned
-from pipeline.criticism.effect import Parameter
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.noise_floors import noise_floor

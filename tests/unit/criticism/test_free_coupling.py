@@ -10,10 +10,10 @@ import pytest
 
 import pipeline
 from pipeline.criticism.diagnosis import base_fit
-from pipeline.criticism.effect import ShaftState
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import zero
 from pipeline.criticism.machine.two_masses import far_drag, linear_far_drag, passed_on, reach
+from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.discrimination import discriminate

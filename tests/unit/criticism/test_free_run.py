@@ -10,9 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipeline.criticism.data.segment import Instrument, Segment, Sensors
-from pipeline.criticism.effect import Array
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.operating import Array
 from pipeline.criticism.validation.held_out import Run, free_run
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, machine

@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 
 from pipeline.criticism.adequacy import _in_friction
-from pipeline.criticism.effect import Machine
 from pipeline.criticism.library.friction_parts import friction_parts
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.parameter import Machine
 from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.estimate import Estimate
 from pipeline.records.friction import combined, separated

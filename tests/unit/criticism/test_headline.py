@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.effect import SCALES as SCALED
-from pipeline.criticism.effect import Machine
 from pipeline.criticism.effects.angle_eccentricity import EFFECT as ECCENTRIC
 from pipeline.criticism.effects.cogging import EFFECT as COGGING
 from pipeline.criticism.effects.phase_imbalance import EFFECT as IMBALANCE
@@ -20,6 +18,8 @@ from pipeline.criticism.library.headline import (
     largest_difference,
 )
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.parameter import SCALES as SCALED
+from pipeline.criticism.parameter import Machine
 from pipeline.records.diagnosis import ReportedParameter
 
 SCALES = dict.fromkeys(SCALED, 2.0)

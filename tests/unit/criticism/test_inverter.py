@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.effect import Supply
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.inverter import lost_shares, swept_shares
 from pipeline.criticism.machine.model import Model, evaluate
+from pipeline.criticism.operating import Supply
 from pipeline.criticism.regression.noise_floors import steep_drops
 from tests.unit.criticism.machines import BASE, machine, operating
 

@@ -9,9 +9,9 @@ import pytest
 
 from pipeline.criticism.data.segment import Sensors, projected, row_index, slow_orders
 from pipeline.criticism.data.sensor_noise import sensor_noise
-from pipeline.criticism.effect import ShaftState
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, mean_current, ripple, zero
+from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linearise import effect_columns, linearise
 from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error

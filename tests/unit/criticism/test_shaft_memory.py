@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.traces import PAD, even_angle, reversals, travel
-from pipeline.criticism.effect import ShaftState
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine import two_masses
+from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.policy.policy import DEFAULT
 from tests.unit.criticism.machines import BASE, operating
 

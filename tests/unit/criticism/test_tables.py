@@ -12,10 +12,10 @@ from pipeline.criticism.data.holding_orders import holding_orders
 from pipeline.criticism.data.levels import levels_of, set_levels
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.diagnosis import diagnose
-from pipeline.criticism.effect import Machine
 from pipeline.criticism.library.equations import equations
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, values_of
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.bounds import bounded_step, limits_of
 from pipeline.criticism.regression.linearise import Column

@@ -10,9 +10,11 @@ import pytest
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Instrument, Segment, Sensors, Unthinned
-from pipeline.criticism.effect import Discrimination, Operating, Parameter, Values
+from pipeline.criticism.effect import Discrimination
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, evaluate, zero
+from pipeline.criticism.operating import Operating, Values
+from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import base_columns

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.criticism.effect import Recorded
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.operating import Recorded
 
 A = np.exp(2j * np.pi / 3.0)
 N = 400

@@ -13,8 +13,9 @@ from pipeline.criticism.discovery.bases import coarse, fine, variables
 from pipeline.criticism.discovery.dictionary import CENTRED, SHAPES, Term
 from pipeline.criticism.discovery.residual_inputs import ports, refined
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
-from pipeline.criticism.effect import Effect, Parameter
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton

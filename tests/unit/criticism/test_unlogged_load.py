@@ -13,7 +13,7 @@ from pipeline.criticism.data.drive_log import DriveLog, drive_log
 from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.data.segment import Sensors
 from pipeline.criticism.data.unlogged_load import unexplained_share
-from pipeline.criticism.effect import Machine
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec

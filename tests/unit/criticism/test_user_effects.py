@@ -10,16 +10,17 @@ import pytest
 
 from pipeline.__main__ import main
 from pipeline.criticism.data.machine_scale import machine_of
-from pipeline.criticism.effect import SCALES
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.library.user_effects import Hook
+from pipeline.criticism.parameter import SCALES
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.errors import UsageError
 from tests.unit.criticism.machines import operating
 
 BRAKE = """import numpy as np
-from pipeline.criticism.effect import Effect, Parameter
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.parameter import Parameter
 def torque(x, q):
     drag = q["torque_nm"] * x.omega_rad_s / q["speed_rad_s"]
     return drag
