@@ -10,11 +10,15 @@ Student, Biometrika 6 (1908).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betainc
+
+from pipeline.physics.glossary import unit_of
+from pipeline.records.error_map import Bins, ErrorMap
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -126,3 +130,47 @@ def cell_means(error: Array, sigma: Array, cell: Indices, visit: Indices, cells:
     if cells_seen > 1:
         p_all = float(betainc(dof / 2.0, (cells_seen - 1) / 2.0, dof / (dof + between / within)))
     return CellMeans(mean, count, p_value, explained, p_all)
+
+
+def mean_map(
+    signal: str,
+    errors: tuple[Array, Array],
+    cell: Indices,
+    visit: Indices,
+    x: Bins,
+    y: Bins | None,
+) -> ErrorMap:
+    """Weighted means of a signal's error over cells of one variable, or of two.
+
+    Parameters
+    ----------
+    signal
+        Glossary name.
+    errors
+        Residuals and their noise [n, unit of the signal].
+    cell
+        Cell of each row [n], counted along `x` first.
+    visit
+        Visit of each row [n].
+    x, y
+        Cells of the variables.
+
+    Returns
+    -------
+    ErrorMap
+        See `cell_means`.
+
+    """
+    shape = (x.count,) if y is None else (y.count, x.count)
+    cells = cell_means(*errors, cell, visit, math.prod(shape))
+    return ErrorMap(
+        signal,
+        unit_of(signal),
+        x,
+        y,
+        cells.count.reshape(shape),
+        cells.mean.reshape(shape),
+        cells.p_value.reshape(shape),
+        cells.explained,
+        cells.p_all,
+    )

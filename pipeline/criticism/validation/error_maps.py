@@ -18,8 +18,7 @@ from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.residual import residual
-from pipeline.numerics.cell_means import cell_means, visits_of
-from pipeline.physics.glossary import unit_of
+from pipeline.numerics.cell_means import mean_map, visits_of
 from pipeline.records.error_map import Bins, ErrorMap, Histogram
 
 CURVES = (
@@ -233,30 +232,7 @@ def _window_map(
 ) -> ErrorMap:
     visit = visits_of(cell, errors.segment[inside])
     error, sigma = errors.error[inside], errors.sigma[inside]
-    return _map(errors.signal, (error, sigma), cell, visit, x, y)
-
-
-def _map(
-    signal: str,
-    errors: tuple[Array, Array],
-    cell: NDArray[np.int64],
-    visit: NDArray[np.int64],
-    x: Bins,
-    y: Bins | None,
-) -> ErrorMap:
-    shape = (x.count,) if y is None else (y.count, x.count)
-    cells = cell_means(*errors, cell, visit, math.prod(shape))
-    return ErrorMap(
-        signal,
-        unit_of(signal),
-        x,
-        y,
-        cells.count.reshape(shape),
-        cells.mean.reshape(shape),
-        cells.p_value.reshape(shape),
-        cells.explained,
-        cells.p_all,
-    )
+    return mean_map(errors.signal, (error, sigma), cell, visit, x, y)
 
 
 def _even(value: Array, cells: int) -> tuple[float, ...]:
@@ -308,7 +284,7 @@ def angle_maps(fit: Fit) -> tuple[ErrorMap, ...]:
         x = Bins(variable, tuple(np.linspace(0.0, 2 * math.pi, cells[variable] + 1).tolist()))
         cell = cell.astype(np.int64)
         visit = window.astype(np.int64) * x.count + cell
-        maps.append(_map(signal, (error, sigma), cell, visit, x, None))
+        maps.append(mean_map(signal, (error, sigma), cell, visit, x, None))
     return tuple(maps)
 
 

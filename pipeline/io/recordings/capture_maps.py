@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.cell_means import cell_means, visits_of
+from pipeline.numerics.cell_means import mean_map, visits_of
 from pipeline.physics.glossary import unit_of
 from pipeline.records.capture import Array, Capture
 from pipeline.records.error_map import Bins, ErrorMap
@@ -189,21 +189,9 @@ def _turn(signal: str, error: Array, at: dict[str, Array], angle: str) -> ErrorM
 
 
 def _map(signal: str, error: Array, cell: NDArray[np.int64], x: Bins, y: Bins | None) -> ErrorMap:
-    shape = (x.count,) if y is None else (y.count, x.count)
     visit = visits_of(cell, np.zeros(cell.size, dtype=np.int64))
-    cells = cell_means(error, np.ones(error.size), cell, visit, int(np.prod(shape)))
-    means = np.where(cells.count < FEWEST_SAMPLES, np.nan, cells.mean)
-    return ErrorMap(
-        signal,
-        unit_of(signal),
-        x,
-        y,
-        cells.count.reshape(shape),
-        means.reshape(shape),
-        cells.p_value.reshape(shape),
-        cells.explained,
-        cells.p_all,
-    )
+    means = mean_map(signal, (error, np.ones(error.size)), cell, visit, x, y)
+    return replace(means, mean=np.where(means.count < FEWEST_SAMPLES, np.nan, means.mean))
 
 
 def _even(value: Array, cells: int) -> tuple[float, ...]:
