@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.contracts.protocol import warning
 from pipeline.contracts.requirements import LINE_CURRENTS
 from pipeline.contracts.rotation import shaft_angle
 from pipeline.contracts.waveform import samples_per_time_constant
@@ -40,58 +42,45 @@ def agree(campaign: Campaign) -> tuple[Finding, ...]:
 
     """
     findings = [finding for key in NAMEPLATE for finding in _contradictions(campaign, key)]
-    findings += _statements(campaign)
-    findings += _one_test_only(campaign)
-    findings += _cogging_directions(campaign)
-    findings += _torque_signs(campaign)
-    findings += _step_clocks(campaign)
+    for look in (_statements, _one_test_only, _cogging_directions, _torque_signs, _step_clocks):
+        findings += look(campaign)
     return tuple(findings)
 
 
-def _contradictions(campaign: Campaign, key: str) -> list[Finding]:
-    stated = [(c.path, getattr(c.meta, key)) for c in campaign.captures]
-    stated = [(path, value) for path, value in stated if value is not None]
+def _contradictions(campaign: Campaign, key: str) -> Iterator[Finding]:
+    stated = [(c, getattr(c.meta, key)) for c in campaign.captures]
+    stated = [(capture, value) for capture, value in stated if value is not None]
     counts = Counter(value for _, value in stated)
-    if len(counts) < 2:
-        return []
-    first: dict[object, str] = {}
-    for path, value in stated:
-        first.setdefault(value, path)
+    first: dict[object, Capture] = {}
+    for capture, value in stated:
+        first.setdefault(value, capture)
     usual = campaign.nameplate(key)
     consequence = CONSEQUENCE.get(key, "the most frequent one counts")
-    return [
-        Finding(
-            first[value],
-            "warning",
-            f"{key}_contradiction",
-            f"{key} is {value} {_here(counts[value])} of {campaign.motor_id}, but {usual} in "
-            f"{first[usual]}{_beside(counts[usual])}",
-            f"correct the metadata of one of them; {consequence}",
-        )
-        for value in first
-        if value != usual
-    ]
+    for value, capture in first.items():
+        if value != usual:
+            yield warning(
+                capture,
+                f"{key}_contradiction",
+                f"{key} is {value} {_here(counts[value])} of {campaign.motor_id}, but {usual} in "
+                f"{first[usual].path}{_beside(counts[usual])}",
+                f"correct the metadata of one of them; {consequence}",
+            )
 
 
-def _statements(campaign: Campaign) -> list[Finding]:
+def _statements(campaign: Campaign) -> Iterator[Finding]:
     """Captures that state one constant differently; what `records.stated` takes is named."""
-    findings = []
     for used in stated_constants(campaign):
         for capture in campaign.captures:
             stated = capture.meta.extra.get(used.name)
             if stated is None or capture.path in used.captures or used.name in campaign.stated:
                 continue
-            findings.append(
-                Finding(
-                    capture.path,
-                    "warning",
-                    "statement_contradiction",
-                    f"{used.name} is stated as {stated}, but as {used.number:g} ± {used.u:.2g} in "
-                    f"{used.captures[0]}{_beside(len(used.captures))}, which counts",
-                    f"correct {used.name} or u_{used.name} of one of them",
-                )
+            yield warning(
+                capture,
+                "statement_contradiction",
+                f"{used.name} is stated as {stated}, but as {used.number:g} ± {used.u:.2g} in "
+                f"{used.captures[0]}{_beside(len(used.captures))}, which counts",
+                f"correct {used.name} or u_{used.name} of one of them",
             )
-    return findings
 
 
 def _here(count: int) -> str:
@@ -104,37 +93,28 @@ def _beside(count: int) -> str:
     return "" if count == 1 else f" and {count - 1} more"
 
 
-def _one_test_only(campaign: Campaign) -> list[Finding]:
+def _one_test_only(campaign: Campaign) -> Iterator[Finding]:
     tests = {c.meta.test for c in campaign.captures}
-    if len(tests) != 1:
-        return []
-    test = next(iter(tests))
-    return [
-        Finding(
-            campaign.captures[0].path,
-            "warning",
+    if len(tests) == 1:
+        yield warning(
+            campaign.captures[0],
             "one_test_only",
-            f"{campaign.motor_id} has captures of {test} only: no two constants can be "
+            f"{campaign.motor_id} has captures of {tests.pop()} only: no two constants can be "
             "held against each other",
             "see what to record next with `plan`",
         )
-    ]
 
 
-def _cogging_directions(campaign: Campaign) -> list[Finding]:
+def _cogging_directions(campaign: Campaign) -> Iterator[Finding]:
     captures = campaign.of("cogging")
     turned = [_net_turn(c) for c in captures]
-    if not captures or (min(turned) < 0.0 < max(turned)) or any(_reverses(c) for c in captures):
-        return []
-    return [
-        Finding(
-            captures[0].path,
-            "warning",
+    if captures and not min(turned) < 0.0 < max(turned) and not any(map(_reverses, captures)):
+        yield warning(
+            captures[0],
             "direction_coverage",
             "the slow turn goes one way only: friction cannot be separated from cogging",
             "record the same turn the other way",
         )
-    ]
 
 
 def _angle(capture: Capture) -> np.ndarray:
@@ -155,24 +135,20 @@ def _reverses(capture: Capture) -> bool:
     return min(reached) > np.pi or min(back) > np.pi
 
 
-def _torque_signs(campaign: Campaign) -> list[Finding]:
+def _torque_signs(campaign: Campaign) -> Iterator[Finding]:
     captures = campaign.of("torque_map")
     if not captures:
-        return []
+        return
     reach = [_extremes(c) for c in captures]
     low, high = min(r[0] for r in reach), max(r[1] for r in reach)
-    if low < -0.2 * high and high > -0.2 * low:
-        return []
-    return [
-        Finding(
-            captures[0].path,
-            "warning",
+    if not (low < -0.2 * high and high > -0.2 * low):
+        yield warning(
+            captures[0],
             "current_coverage",
             f"q current runs from {low:.3g} to {high:.3g} A: only one sign of torque, so friction "
             "and inverter errors do not cancel",
             "record steps of q current of the other sign as well",
         )
-    ]
 
 
 def _extremes(capture: Capture) -> tuple[float, float]:
@@ -180,25 +156,22 @@ def _extremes(capture: Capture) -> tuple[float, float]:
     return float(np.nanpercentile(current, 2.0)), float(np.nanpercentile(current, 98.0))
 
 
-def _step_clocks(campaign: Campaign) -> list[Finding]:
+def _step_clocks(campaign: Campaign) -> Iterator[Finding]:
     settling = [(c, _settling_s(c)) for c in campaign.of("current_step")]
     times = [seconds for _, seconds in settling if 0.0 < seconds < math.inf]
     if not times or max(times) < SETTLING_RATIO * min(times):
-        return []
+        return
     usual = float(np.exp(np.median(np.log(times))))
     least = math.sqrt(SETTLING_RATIO)
-    return [
-        Finding(
-            c.path,
-            "warning",
-            "clock_contradiction",
-            f"its current settles in {seconds:.3g} s, where {usual:.3g} s is usual in the steps of "
-            f"{campaign.motor_id}: no Ld and Lq from steps while one clock is wrong",
-            "correct t_s, in seconds, or take the capture out",
-        )
-        for c, seconds in settling
-        if 0.0 < seconds < math.inf and not usual / least < seconds < usual * least
-    ]
+    for capture, seconds in settling:
+        if 0.0 < seconds < math.inf and not usual / least < seconds < usual * least:
+            yield warning(
+                capture,
+                "clock_contradiction",
+                f"its current settles in {seconds:.3g} s, where {usual:.3g} s is usual in the "
+                f"steps of {campaign.motor_id}: no Ld and Lq from steps while one clock is wrong",
+                "correct t_s, in seconds, or take the capture out",
+            )
 
 
 def _settling_s(capture: Capture) -> float:
