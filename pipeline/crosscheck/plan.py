@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -340,9 +340,8 @@ def _is_missing(known: Known, name: str) -> bool:
     return estimate is None or not (estimate.known or estimate.settled)
 
 
-def _constants_in_doubt(known: Known, ways: tuple[Way, ...], aims: Aims) -> list[Doubt]:
+def _constants_in_doubt(known: Known, ways: tuple[Way, ...], aims: Aims) -> Iterator[Doubt]:
     names = sorted({name for way in ways for name in way.gives} & set(CONSTANTS) | aims.required)
-    doubts = []
     for name in names:
         doubt = _doubt_of(name, known.constants.get(name), aims)
         if doubt is None:
@@ -354,8 +353,7 @@ def _constants_in_doubt(known: Known, ways: tuple[Way, ...], aims: Aims) -> list
             assumed = _largest_instrument(known.constants[name]).startswith(ASSUMED)
             tests = _untried(name, known, ways) if assumed else frozenset()
         weight = WEIGHTS[kind] * (REQUIRED if name in aims.required else 1.0)
-        doubts.append(Doubt(kind, name, words, tests, weight))
-    return doubts
+        yield Doubt(kind, name, words, tests, weight)
 
 
 def _doubt_of(name: str, estimate: Estimate | None, aims: Aims) -> tuple[DoubtKind, str] | None:
@@ -410,8 +408,7 @@ def _mostly_instrument(estimate: Estimate) -> bool:
 
 def _checks_in_doubt(
     known: Known, ways: tuple[Way, ...], check_tests: Mapping[str, tuple[str, ...]]
-) -> list[Doubt]:
-    doubts = []
+) -> Iterator[Doubt]:
     for check in known.checks:
         if check.status not in ("fail", "not_evaluated"):
             continue
@@ -429,8 +426,7 @@ def _checks_in_doubt(
             tests = tests or frozenset(set(rests_on) - known.tests) or frozenset(rests_on)
             if not tests:
                 continue  # it rests on what a user states, and nothing was stated
-        doubts.append(Doubt(kind, check.name, words, tests, WEIGHTS[kind]))
-    return doubts
+        yield Doubt(kind, check.name, words, tests, WEIGHTS[kind])
 
 
 def _settled_in(meaning: str, known: Known) -> bool:

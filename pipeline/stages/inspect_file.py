@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -101,15 +102,13 @@ def render(report: InspectReport) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _tests(report: InspectReport, pair: str | None) -> list[str]:
+def _tests(report: InspectReport, pair: str | None) -> Iterator[str]:
     """One line a test of the contract: enough, or what is missing."""
     from pipeline.contracts.requirements import requirements
 
     columns = report.columns
     if any(stream.rate_hz is not None for stream in report.streams):
         columns |= {"t_s"}
-    lines = []
     for test in TESTS:
         missing = [need.text() for need in requirements(test, pair) if not need.met_by(columns)]
-        lines.append(f"{test}: " + (f"needs {'; '.join(missing)}" if missing else "enough"))
-    return lines
+        yield f"{test}: " + (f"needs {'; '.join(missing)}" if missing else "enough")

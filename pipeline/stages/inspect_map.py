@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
@@ -95,18 +95,16 @@ def folder(settings: InspectSettings) -> Outcome:
     return Outcome(more.exit_code, text, more.errors, result=document, next=next_)
 
 
-def _known_lines(known: Sequence[Looked]) -> list[str]:
+def _known_lines(known: Sequence[Looked]) -> Iterator[str]:
     """Files that need no new map, by the map that reads them, with what stands in their way."""
     by_map: dict[str | None, list[Looked]] = defaultdict(list)
     for one in known:
         by_map[one.report.source].append(one)
-    lines: list[str] = []
     for source, files in by_map.items():
         many = counted(len(files), "file")
-        lines.append(f"{many} read {f'by the source map {source}' if source else 'as they are'}")
+        yield f"{many} read {f'by the source map {source}' if source else 'as they are'}"
         faults = Counter(fault for one in files for fault in one.report.faults)
-        lines += [f"  {counted(n, 'file')}: {fault}" for fault, n in faults.items()]
-    return lines
+        yield from (f"  {counted(n, 'file')}: {fault}" for fault, n in faults.items())
 
 
 def _look_or_fault(task: InspectTask) -> Looked | str:

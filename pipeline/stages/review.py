@@ -6,7 +6,7 @@ import getpass
 import json
 import shlex
 import socket
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -169,10 +169,9 @@ def _ports(first: int) -> tuple[int, int]:
     return (first, first + 1) if first else (free_port(), free_port())
 
 
-def _decided(output: Path, shown: Sequence[Path]) -> list[str]:
+def _decided(output: Path, shown: Sequence[Path]) -> Iterator[str]:
     """Decisions on the shown motors, made after their recordings."""
     versions = histories_of(Registry((output / "registry").as_posix()))
-    lines = []
     for path in sorted((output / "datasheets").glob("*.json")) if versions else ():
         parts = {path.stem, f"motor-{path.stem}"}
         if not any(parts & {one.stem, one.parent.name} for one in shown):
@@ -181,8 +180,7 @@ def _decided(output: Path, shown: Sequence[Path]) -> list[str]:
         current = status_now(output, sheet, versions)
         statuses = "; ".join(status_lines(current))
         if statuses:
-            lines.append(f"{printable(sheet.motor_id)} is {current.status} now: {statuses}")
-    return lines
+            yield f"{printable(sheet.motor_id)} is {current.status} now: {statuses}"
 
 
 def _text(

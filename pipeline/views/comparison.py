@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pipeline.physics.notation import MINUS, number_text, quantity, reading, significant
@@ -206,11 +206,10 @@ def _capture(error: SignalError) -> CaptureRow:
     )
 
 
-def _places(result: Comparison) -> list[str]:
+def _places(result: Comparison) -> Iterator[str]:
     """Variables that an error depends on, and the cell of speed and current it is in; of
     signals that are over their noise floor in some capture, since below it there is no failure.
     """
-    lines = []
     over = {e.signal for e in result.errors if e.kind == "equation" and ratio_of(e) > 1.0}
     for signal in dict.fromkeys(d.signal for d in result.where if d.signal in over):
         sure = [d for d in result.where if d.signal == signal and _significant(d)]
@@ -218,8 +217,7 @@ def _places(result: Comparison) -> list[str]:
         depends = [f"{d.variable} ({100 * d.explained:.0f} %)" for d in sure[:4]]
         worst = next((_worst(m) for m in result.maps if m.signal == signal and m.y is not None), "")
         if depends or worst:
-            lines.append(f"{signal} depends on {', '.join(depends) or 'nothing known'}{worst}")
-    return lines
+            yield f"{signal} depends on {', '.join(depends) or 'nothing known'}{worst}"
 
 
 def _significant(dependence: Dependence) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pipeline.physics.notation import number_text, quantity
@@ -92,27 +93,24 @@ def _names(model: ModelVerdict) -> tuple[str, ...]:
     return (", ".join(names[:MOST_NAMED]) + more,)
 
 
-def _rows(model: ModelVerdict) -> list[tuple[str, str]]:
+def _rows(model: ModelVerdict) -> Iterator[tuple[str, str]]:
     if model.residual is None or model.held_out is None:
-        return []
-    rows = [
-        ("error, all signals of captures held out", f"{number(model.held_out)} noise floors"),
-    ]
+        return
+    yield ("error, all signals of captures held out", f"{number(model.held_out)} noise floors")
     if model.held_out_with is not None:
-        rows.append(("the same with what was found", f"{number(model.held_out_with)} noise floors"))
-    rows.append(("largest residual of one signal", f"{number(model.residual)} noise floors"))
+        yield ("the same with what was found", f"{number(model.held_out_with)} noise floors")
+    yield ("largest residual of one signal", f"{number(model.residual)} noise floors")
     if model.worst is not None:
         size = quantity(model.worst.size, model.worst.unit, 2)
-        rows.append(("where", f"{in_words(model.worst.description)}, {size} beyond the noise"))
-        rows.append(("places over their floor", str(model.over)))
+        yield ("where", f"{in_words(model.worst.description)}, {size} beyond the noise")
+        yield ("places over their floor", str(model.over))
     for effect, addition in model.missing.items():
         sizes = (f"{name} {number_text(*reading)}" for name, reading in addition.parameters.items())
-        rows.append((effect.replace("_", " "), "; ".join(sizes)))
+        yield (effect.replace("_", " "), "; ".join(sizes))
         if addition.confused_with:
             others = ", ".join(addition.confused_with).replace("_", " ")
-            rows.append(("which could as well be", f"{others}; to tell: {addition.experiment}"))
+            yield ("which could as well be", f"{others}; to tell: {addition.experiment}")
     if model.unknown:
-        rows.append(("not explained", in_words(model.unknown)))
+        yield ("not explained", in_words(model.unknown))
     if model.note:
-        rows.append(("cannot be shown", model.note))
-    return rows
+        yield ("cannot be shown", model.note)

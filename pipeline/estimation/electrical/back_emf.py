@@ -8,7 +8,7 @@ not enter. The angle, where there, only counts pole pairs and gives the offset t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -255,7 +255,7 @@ def _stretches(spin: Spin, change: float) -> tuple[list[Stretch], int]:
     return stretches, int(np.count_nonzero(moving))
 
 
-def _unbroken(t_s: Array, vector: Complex, moving: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _unbroken(t_s: Array, vector: Complex, moving: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     """Runs of moving rows, split where rows are missing for more than half a cycle.
 
     Across such a gap the phase cannot be unwrapped. Half a cycle is seen by nine tenths of the
@@ -263,19 +263,17 @@ def _unbroken(t_s: Array, vector: Complex, moving: NDArray[np.bool_]) -> list[tu
     """
     consecutive = np.flatnonzero(moving[1:] & moving[:-1])
     if not consecutive.size:
-        return []
+        return
     advance = np.abs(np.angle(vector[consecutive + 1] * np.conj(vector[consecutive])))
     usual_s, after_s = float(np.median(np.diff(t_s)[consecutive])), np.diff(t_s)
     missed = float(np.quantile(advance, 0.9)) * after_s > math.pi * usual_s
     gaps = (
         np.flatnonzero(missed & (after_s > 1.5 * usual_s)) + 1 if usual_s > 0.0 else consecutive[:0]
     )
-    pieces: list[tuple[int, int]] = []
     for start, stop in true_runs(moving):
         inner = gaps[(gaps > start) & (gaps < stop)]
         edges = [start, *(int(k) for k in inner), stop]
-        pieces += pairwise(edges)
-    return pieces
+        yield from pairwise(edges)
 
 
 def _one_way(phase: Array) -> list[tuple[int, int]]:

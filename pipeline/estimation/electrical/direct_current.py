@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -124,12 +124,11 @@ def direct_current_points(
     return [p for p in points if abs(p.i_a) > options["zero_crossing"] * largest], notes
 
 
-def _of_ohmmeter(capture: Capture, index: int, temp_degc: float) -> list[Point]:
+def _of_ohmmeter(capture: Capture, index: int, temp_degc: float) -> Iterator[Point]:
     """The readings of an ohmmeter, as voltages at one ampere.
 
     Their noise is what they scatter; the meter's gain is that of a voltage over a current.
     """
-    points = []
     logged = first_temperature(capture, "winding") is not None
     for column in (name for name in OHMMETER if capture.has(name)):
         names = (column, "temp_winding_degc") if logged else (column,)
@@ -139,8 +138,7 @@ def _of_ohmmeter(capture: Capture, index: int, temp_degc: float) -> list[Point]:
         u_ohm = _scatter_ohm(ohms[read], degcs[read])
         for ohm, degc in zip(ohms[read], degcs[read], strict=True):
             means = float(ohm), 1.0, float(degc)
-            points.append(Point(index, column[1:3], *means, u_ohm, 0.0, capture.meta, logged))
-    return points
+            yield Point(index, column[1:3], *means, u_ohm, 0.0, capture.meta, logged)
 
 
 def _scatter_ohm(ohms: Array, degcs: Array) -> float:
@@ -170,21 +168,19 @@ def captures_of(campaign: Campaign, points: Sequence[Point]) -> tuple[Capture, .
     return tuple(captures[k] for k in sorted({p.capture for p in points}))
 
 
-def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> list[Point]:
+def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> Iterator[Point]:
     column = first_temperature(capture, "winding")
     columns = pair_signals(capture, pair, *((column,) if column else ()))
     temps = np.full(columns["t_s"].size, temp_degc)
     logged = column is not None and bool(np.isfinite(columns[column]).any())
     if column is not None and logged:
         temps = bridged(columns["t_s"], columns[column])
-    points = []
     for plateau in find_plateaus(columns["i_a"]):
         v, i = columns["v_v"][plateau.rows], columns["i_a"][plateau.rows]
         temp = float(temps[plateau.rows].mean())
         errors = (_standard_error(v), _standard_error(i))
         means = (float(v.mean()), float(i.mean()))
-        points.append(Point(index, pair, *means, temp, *errors, capture.meta, logged))
-    return points
+        yield Point(index, pair, *means, temp, *errors, capture.meta, logged)
 
 
 def uncertainties_of(points: Sequence[Point], captures: Sequence[Capture]) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -254,17 +254,16 @@ def _chord(record: StepRecord, drive: Drive) -> float:
     return 1.0 / float(fit.coefficients[0]) if fit.coefficients[0] != 0.0 else math.nan
 
 
-def _evidence(solution: Solution, labels: Sequence[str]) -> list[Evidence]:
+def _evidence(solution: Solution, labels: Sequence[str]) -> Iterator[Evidence]:
     model = solution.model
-    plots = [_saturation_plot(solution, labels)]
+    yield _saturation_plot(solution, labels)
     predicted = model.predict([solution.parameters[None, :]] * len(model.records))
     for record, current in zip(model.records, predicted, strict=True):
         rows = decimated(record.t_s.size)
         series = Series("current", record.t_s[rows], record.i_a[rows], current[rows, 0])
         title, axes = f"Step response on {record.pair}", ("t_s", f"i{record.pair[0]}_a")
         caption = "Current of the locked rotor; the fit is one model for all steps."
-        plots.append(METHOD.plot(title, axes, "line", (series,), caption, record.capture.path))
-    return plots
+        yield METHOD.plot(title, axes, "line", (series,), caption, record.capture.path)
 
 
 def _saturation_plot(solution: Solution, axes: Sequence[str]) -> Evidence:

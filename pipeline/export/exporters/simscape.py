@@ -9,7 +9,7 @@ Blocks take phase values and peak currents, as the glossary has them. The script
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -64,11 +64,11 @@ def _vector(name: str, values: Sequence[float]) -> list[str]:
     return [f"motor.{name} = [ ...", *(f"  {row} ..." for row in text), "];"]
 
 
-def _flux(source: Source) -> list[str]:
+def _flux(source: Source) -> Iterator[str]:
     """Flux linkage of magnet, inductances and the effects that bend it, over both currents."""
     tables = source.tables("id_a")
     if not tables:
-        return []
+        return
     grid = np.array(tables[0].axes["id_a"])
     size, p = grid.size, source.value("pole_pairs")
     id_a, iq_a = np.meshgrid(grid, grid, indexing="ij")
@@ -79,29 +79,26 @@ def _flux(source: Source) -> list[str]:
     for table in tables:
         psi[table.quantity] = psi[table.quantity] + np.reshape(table.values, (size, size))
     psi["torque_table_nm"] = 1.5 * p * (psi["psi_d_wb"] * iq_a - psi["psi_q_wb"] * id_a)
-    lines = [f"% with {', '.join(dict.fromkeys(t.effect for t in tables))}; rows i_d, columns i_q"]
+    yield f"% with {', '.join(dict.fromkeys(t.effect for t in tables))}; rows i_d, columns i_q"
     for name in ("id_a", "iq_a"):
-        lines += _vector(name, grid.tolist())
+        yield from _vector(name, grid.tolist())
     for name, values in psi.items():
-        lines += [*_vector(name, values.ravel().tolist())]
-        lines.append(f"motor.{name} = reshape(motor.{name}, {size}, {size})';")
-    return lines
+        yield from _vector(name, values.ravel().tolist())
+        yield f"motor.{name} = reshape(motor.{name}, {size}, {size})';"
 
 
-def _torque(source: Source) -> list[str]:
+def _torque(source: Source) -> Iterator[str]:
     """Drag over speed and over the shaft's angle, beside viscous and Coulomb friction."""
-    lines: list[str] = []
     forms = {"omega_mech_rad_s": "friction", "theta_mech_rad": "cogging"}
     for variable, name in forms.items():
         tables = source.tables(variable)
         if not tables:
             continue
-        lines.append(f"% torque against rotation of {', '.join(t.effect for t in tables)}")
+        yield f"% torque against rotation of {', '.join(t.effect for t in tables)}"
         finest = max(tables, key=lambda table: len(table.values))
         grid = finest.axes[variable]
-        lines += _vector(f"{name}_{variable}", grid)
-        lines += _vector(f"{name}_nm", _summed(tables, variable, np.array(grid)))
-    return lines
+        yield from _vector(f"{name}_{variable}", grid)
+        yield from _vector(f"{name}_nm", _summed(tables, variable, np.array(grid)))
 
 
 def _summed(tables: Sequence[EffectTable], variable: str, grid: np.ndarray) -> list[float]:

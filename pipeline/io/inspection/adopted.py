@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,11 +41,10 @@ def adopted_text(places: Sequence[Path], metadata: Mapping[str, str], proposed: 
     return _HEAD.format(names) + yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
 
 
-def _shapes(data: bytes, answered: Mapping[str, str]) -> list[dict[str, Any]]:
+def _shapes(data: bytes, answered: Mapping[str, str]) -> Iterator[dict[str, Any]]:
     """The variants of a map, or the map alone, each whole and with the answers in it."""
     plain = load_plain(data, "the source map")
     variants = plain.pop("variants", [{}])
-    shapes = []
     for variant in variants:
         shape = laid_over(plain, variant)
         metadata = dict(answered)
@@ -53,5 +52,4 @@ def _shapes(data: bytes, answered: Mapping[str, str]) -> list[dict[str, Any]]:
             shape["time"] = {**(shape.get("time") or {}), "increment_s": increment}
         if metadata:
             shape["metadata"] = {**(shape.get("metadata") or {}), **metadata}
-        shapes.append(shape)
-    return shapes
+        yield shape

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -172,18 +172,16 @@ def _integrals(numbers: Mapping[str, Array], clock: str) -> tuple[Relation, ...]
     return tuple(pairs)
 
 
-def _multiples(numbers: Mapping[str, Array]) -> tuple[Relation, ...]:
+def _multiples(numbers: Mapping[str, Array]) -> Iterator[Relation]:
     """Which field is a multiple of which, through zero."""
     names = [name for name, values in numbers.items() if np.ptp(values)]
-    pairs = []
     for place, name in enumerate(names):
         for other in names[:place]:
             one, two = numbers[name], numbers[other]
             factor = float(one @ two / (two @ two))
             error = one - factor * two
             if np.ptp(one) and float(error @ error) < (1.0 - _SAME) * float(np.var(one)) * one.size:
-                pairs.append(Relation(name, other, factor, integral=False))
-    return tuple(pairs)
+                yield Relation(name, other, factor, integral=False)
 
 
 def _correlation(one: Array, two: Array) -> float:

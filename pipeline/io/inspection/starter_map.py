@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 from pipeline.io.inspection.file_names import NamePatterns
@@ -121,22 +121,22 @@ def map_text(
     return "\n".join(lines) + "\n"
 
 
-def _metadata_lines(given: Mapping[str, str], names: NamePatterns) -> list[str]:
-    lines = ["metadata:"]
-    lines += [f"  {key}: {_quoted(value)}" for key, value in given.items() if "." not in key]
+def _metadata_lines(given: Mapping[str, str], names: NamePatterns) -> Iterator[str]:
+    yield "metadata:"
+    yield from (f"  {key}: {_quoted(value)}" for key, value in given.items() if "." not in key)
     for key, words in _KEY_WORDS.items():
         if key not in given and key not in names.keys:
-            lines.append(f"  # {key}: {words}")
+            yield f"  # {key}: {words}"
     if "station" not in given:
-        lines.append("  station: unknown")
+        yield "  station: unknown"
     if names.patterns:
-        lines += ["file_names:", *(f"  - {_quoted(pattern)}" for pattern in names.patterns)]
+        yield "file_names:"
+        yield from (f"  - {_quoted(pattern)}" for pattern in names.patterns)
     if names.values:
-        lines.append("values:")
+        yield "values:"
         for key, values in names.values.items():
             pairs = ", ".join(f"{_quoted(word)}: {value}" for word, value in values.items())
-            lines.append(f"  {key}: {{{pairs}}}")
-    return lines
+            yield f"  {key}: {{{pairs}}}"
 
 
 def _shape_lines(shape: Shape, increment: str | None) -> list[str]:

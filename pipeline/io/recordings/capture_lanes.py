@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import rerun as rr
@@ -199,8 +199,7 @@ def _finding(finding: Finding) -> str:
     return f"{rows}{finding.message}; {finding.remedy} [{finding.code}]"
 
 
-def _residual(capture: Capture, evidence: Evidence) -> list[Line]:
-    lines: list[Line] = []
+def _residual(capture: Capture, evidence: Evidence) -> Iterator[Line]:
     unit = unit_words(evidence.y_name)
     for series in evidence.series:
         residuals = series.measured - series.fitted if series.fitted.size else np.zeros(0)
@@ -214,8 +213,7 @@ def _residual(capture: Capture, evidence: Evidence) -> list[Line]:
             f"residual rms {quantity(rms, unit, 3)}, "
             f"largest {quantity(float(abs(residuals[worst])), unit, 3)} at {series.x[worst]:.4g} s"
         )
-        lines.append(("INFO", words, _row_at(capture, float(series.x[worst]))))
-    return lines
+        yield ("INFO", words, _row_at(capture, float(series.x[worst])))
 
 
 def _row_at(capture: Capture, t_s: float) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from pipeline.physics.notation import reading
@@ -80,18 +80,18 @@ def checks_markdown(datasheet: Datasheet) -> str:
     return "\n".join([*lines, ""])
 
 
-def _checks(datasheet: Datasheet) -> list[str]:
+def _checks(datasheet: Datasheet) -> Iterator[str]:
     """The failed ones first."""
-    lines = ["| | check | value | limit | meaning |", "| --- | --- | --- | --- | --- |"]
+    yield "| | check | value | limit | meaning |"
+    yield "| --- | --- | --- | --- | --- |"
     for check in ordered_checks(datasheet.checks):
         suspect = f"; suspect: {check.suspect}" if check.suspect else ""
         value = check_number(check.value, check.unit)
         limit = check_number(check.limit, check.unit, 3)
-        lines.append(
+        yield (
             f"| {_MARKS[check.status]} | {plain(check.name)} | {value} | {limit} "
             f"| {plain(check.meaning + suspect)} |"
         )
-    return lines
 
 
 def _table(datasheet: Datasheet, names: Sequence[str]) -> list[str]:

@@ -15,6 +15,7 @@ In the viewer it has one workspace a signal, and one for all.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -174,24 +175,23 @@ def step_markdown(result: Diagnosis, place: int) -> str:
     )
 
 
-def _table(view: LadderView, place: int) -> list[str]:
+def _table(view: LadderView, place: int) -> Iterator[str]:
     """The steps so far, the latest first, of the signals whose noise floor is known."""
     columns = [n for n, cell in enumerate(view.steps[0].errors) if cell is not None and cell.floor]
     names = [cell.signal for cell in view.steps[0].errors if cell is not None and cell.floor]
-    lines = ["| step | model | held out | " + " | ".join(map(plain, names)) + " |"]
-    lines.append("| --- | --- | --- |" + " --- |" * len(names))
+    yield "| step | model | held out | " + " | ".join(map(plain, names)) + " |"
+    yield "| --- | --- | --- |" + " --- |" * len(names)
     floors = [cell.floor if (cell := view.steps[place].errors[n]) else "" for n in columns]
-    lines.append("|  | noise floor | 1 | " + " | ".join(floors) + " |")
+    yield "|  | noise floor | 1 | " + " | ".join(floors) + " |"
     for step in reversed(view.steps[: place + 1]):
         cells = [cell.rmse if (cell := step.errors[n]) else "" for n in columns]
         last = "**" if step.number == place else ""
         change = f" ({step.change})" if step.change else ""
-        lines.append(
+        yield (
             f"| {last}{step.number}{last} | {plain(step.title)} | {step.held_out}{change} | "
             + " | ".join(cells)
             + " |"
         )
-    return lines
 
 
 def ladder_layout(result: Diagnosis) -> Blueprint:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 
 import numpy as np
@@ -59,17 +59,15 @@ def _band(one: Curve, x: Axis, y: Axis, colour: int) -> str:
     )
 
 
-def _changes(one: Curve, regimes: Sequence[str], x: Axis) -> list[str]:
+def _changes(one: Curve, regimes: Sequence[str], x: Axis) -> Iterator[str]:
     """A stroke and a name where another limit takes over."""
-    marks = []
     for k in range(1, len(regimes)):
         if regimes[k] != regimes[k - 1] and regimes[k] != "none":
             place = x.pixel(0.5 * (one.x[k - 1] + one.x[k]))
-            marks.append(
+            yield (
                 f'<path class="noise" d="M{place:.1f} {TOP:g}V{TOP + HEIGHT:g}"/>'
                 + text("tick", place + 4, TOP + 12, regimes[k])
             )
-    return marks
 
 
 def _legend(curves: Sequence[Curve]) -> list[str]:

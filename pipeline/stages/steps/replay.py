@@ -6,7 +6,7 @@ so what no single fit covers.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,13 +70,13 @@ def replay(capture: Capture, datasheet: Datasheet) -> tuple[Evidence, ...]:
     return (*_torque(capture, known), *_voltages(capture, known))
 
 
-def _voltages(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, ...]:
+def _voltages(capture: Capture, known: Mapping[str, float]) -> Iterator[Evidence]:
     record = _record(capture, ("vd_v", "vq_v", "id_a", "iq_a"))
     if record is None or not all(name in known for name in _VOLTAGE):
-        return ()
+        return
     cut = _windows(record["t_s"])
     if cut is None:
-        return ()
+        return
     state = DqMeans(
         cut.mean(record["id_a"]),
         cut.mean(record["iq_a"]),
@@ -88,13 +88,11 @@ def _voltages(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, .
     magnet = 1.0 + known.get("temp_coeff_magnet_1_k", 0.0) * _warm(record, cut, "magnet")
     r_ohm, psi_wb = known["r_phase_ohm"] * copper, known["psi_pm_wb"] * magnet
     model = dq_voltages(state, r_ohm, known["ld_h"], known["lq_h"], psi_wb)
-    evidence = []
     for name, fitted in zip(("vq_v", "vd_v"), model[::-1], strict=True):
         measured = cut.mean(record[name])
         kept = cut.whole
         series = Series("", cut.middle_s[kept], measured[kept], fitted[kept])
-        evidence.append(_evidence(capture, name, series, "window means"))
-    return tuple(evidence)
+        yield _evidence(capture, name, series, "window means")
 
 
 def _torque(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, ...]:
