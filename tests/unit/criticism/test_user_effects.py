@@ -19,8 +19,7 @@ from pipeline.records.errors import UsageError
 from tests.unit.criticism.machines import operating
 
 BRAKE = """import numpy as np
-from pipeline.criticism.effect import Effect
-from pipeline.criticism.parameter import Parameter
+from pipeline.criticism.effect import Effect, Parameter
 def torque(x, q):
     drag = q["torque_nm"] * x.omega_rad_s / q["speed_rad_s"]
     return drag
