@@ -79,12 +79,12 @@ def _fingerprint(capture: Capture) -> dict[str, Array]:
     columns = {}
     for table in capture.tables:
         for name in table.columns:
-            values = table[name].to_numpy()
-            finite = np.isfinite(values)
-            values = values if finite.all() else values[finite]
-            sample = values[:: max(1, values.size // POLICY.sample)]
+            signal = table[name].to_numpy()
+            finite = np.isfinite(signal)
+            signal = signal if finite.all() else signal[finite]
+            sample = signal[:: max(1, signal.size // POLICY.sample)]
             if name != "t_s" and np.unique(sample).size >= POLICY.values:
-                columns[name] = values
+                columns[name] = signal
     return columns
 
 

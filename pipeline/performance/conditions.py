@@ -115,7 +115,7 @@ def _bus_voltage(campaign: Campaign) -> float | None:
     buses = [
         float(np.nanmedian(c.arrays("vdc_v")["vdc_v"])) for c in campaign.captures if c.has("vdc_v")
     ]
-    highest = [value for value in buses if value > 0.0]
+    highest = [volts for volts in buses if volts > 0.0]
     if highest:
         return _rounded(max(highest))
     phase = _highest(campaign.of("drive", "torque_map"), "vd_v", "vq_v")

@@ -74,7 +74,7 @@ def plant_of(motor: Motor) -> Plant:
     """
     on = active(motor)
     none: dict[str, float] = {}
-    values: dict[str, object] = {
+    fields: dict[str, object] = {
         "pole_pairs": float(motor.pole_pairs),
         "omega_rated": motor.speed_rated_rad_s,
         "omega_elec_rated": motor.pole_pairs * motor.speed_rated_rad_s,
@@ -98,7 +98,7 @@ def plant_of(motor: Motor) -> Plant:
         **_extras(motor),
     }
     plant = np.zeros(1, dtype=LAYOUT).view(np.recarray)
-    for name, value in values.items():
+    for name, value in fields.items():
         plant[name][0] = value
     return plant[0]
 

@@ -87,9 +87,9 @@ def _cycles(capture: Capture) -> float:
     names = [n for group in TERMINAL_VOLTAGES.alternatives if len(group) == 1 for n in group]
     most = 0.0
     for name in (n for n in names if capture.has(n)):
-        values = capture.arrays(name)[name]
-        values = values[np.isfinite(values)]
-        clear = values[np.abs(values) > 0.3 * np.percentile(np.abs(values), 95.0)]
+        voltage = capture.arrays(name)[name]
+        voltage = voltage[np.isfinite(voltage)]
+        clear = voltage[np.abs(voltage) > 0.3 * np.percentile(np.abs(voltage), 95.0)]
         changes = int(np.count_nonzero(np.diff(np.sign(clear))))
         most = max(most, 0.5 * (changes - 1))
     return most

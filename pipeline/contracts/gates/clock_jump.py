@@ -76,11 +76,11 @@ def _went_on(
     between them is held against the mean slope times the gap, and times one usual interval.
     """
     window = int(options["window"])
-    t_s, values = table["t_s"].to_numpy(), table[name].to_numpy()
+    t_s, signal = table["t_s"].to_numpy(), table[name].to_numpy()
     before = slice(max(0, gap + 1 - window), gap + 1)
     after = slice(gap + 1, gap + 1 + window)
-    before_gap = _line(t_s[before], values[before], float(t_s[gap]))
-    right = _line(t_s[after], values[after], float(t_s[gap + 1]))
+    before_gap = _line(t_s[before], signal[before], float(t_s[gap]))
+    right = _line(t_s[after], signal[after], float(t_s[gap + 1]))
     if before_gap is None or right is None:
         return False
     skipped = t_s[gap + 1] - t_s[gap]

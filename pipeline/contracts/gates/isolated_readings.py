@@ -34,15 +34,15 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
         if not 0.0 < usual_s <= options["most_interval_s"]:
             continue
         for name in (n for n in COLUMNS if n in table.columns):
-            values = table[name].to_numpy()
-            alone = isolated(values, options["ratio"])
+            signal = table[name].to_numpy()
+            alone = isolated(signal, options["ratio"])
             count = int(np.count_nonzero(alone))
             if not count:
                 continue
             first = int(np.flatnonzero(alone)[0])
             words = (
-                f"{count} single readings of {name} stand alone, the first {values[first]:.4g} "
-                f"between {values[first - 1]:.4g} and {values[first + 1]:.4g}: they are left out"
+                f"{count} single readings of {name} stand alone, the first {signal[first]:.4g} "
+                f"between {signal[first - 1]:.4g} and {signal[first + 1]:.4g}: they are left out"
             )
             masks.append(Mask(NAME, number, ~alone))
             findings.append(warning(capture, NAME, words, REMEDY, span_of(alone)))

@@ -37,15 +37,15 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     names = CURRENTS + OTHERS + (MEASURED_VOLTAGES if measured else ())
     for index, table in enumerate(capture.tables):
         for name in (n for n in names if n in table.columns):
-            values = table[name].to_numpy()
-            clipped = clipped_rows(values, options)
+            signal = table[name].to_numpy()
+            clipped = clipped_rows(signal, options)
             count = int(np.count_nonzero(clipped))
             if count == 0:
                 continue
-            stop = float(values[clipped][np.argmax(np.abs(values[clipped]))])
-            words = f"{name} is cut flat at {stop:.6g} in {count} of {values.size} rows"
+            stop = float(signal[clipped][np.argmax(np.abs(signal[clipped]))])
+            words = f"{name} is cut flat at {stop:.6g} in {count} of {signal.size} rows"
             share = options["refuse_share"] if capture.meta.test != "current_step" else 0.0
-            if count > share * values.size:
+            if count > share * signal.size:
                 raise CaptureError(NAME, words, REMEDY, span_of(clipped))
             masks.append(Mask(NAME, index, ~clipped))
             findings.append(warning(capture, NAME, f"{words}; set aside", REMEDY, span_of(clipped)))

@@ -61,12 +61,12 @@ def _speeds_of_tenths(capture: Capture) -> NDArray[np.float64]:
     column = "omega_mech_rad_s" if capture.has("omega_mech_rad_s") else "theta_mech_rad"
     columns = capture.arrays("t_s", column)
     fine = np.isfinite(columns["t_s"]) & np.isfinite(columns[column])
-    t_s, values = columns["t_s"][fine], columns[column][fine]
+    t_s, motion = columns["t_s"][fine], columns[column][fine]
     if column == "theta_mech_rad":
         ends = np.linspace(0, max(t_s.size - 1, 0), min(11, t_s.size)).round().astype(int)
-        travel, took = np.diff(values[ends]), np.diff(t_s[ends])
+        travel, took = np.diff(motion[ends]), np.diff(t_s[ends])
         return np.abs(travel / took) if ends.size > 1 else np.zeros(1)
-    parts = np.array_split(np.abs(values), min(10, max(values.size, 1)))
+    parts = np.array_split(np.abs(motion), min(10, max(motion.size, 1)))
     return np.array([float(np.median(part)) if part.size else 0.0 for part in parts])
 
 

@@ -53,17 +53,17 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     findings: list[Finding] = []
     for index, table in enumerate(capture.tables):
         for name in table.columns:
-            values = table[name].to_numpy()
+            signal = table[name].to_numpy()
             if name in MUST_MOVE[capture.meta.test]:
-                _refuse_dead(name, values)
+                _refuse_dead(name, signal)
             if name not in NOISY:
                 continue
-            frozen = frozen_rows(values, options)
+            frozen = frozen_rows(signal, options)
             count = int(np.count_nonzero(frozen))
             if count == 0:
                 continue
-            words = f"{name} stands still in {count} of {values.size} rows"
-            if count > options["refuse_share"] * values.size:
+            words = f"{name} stands still in {count} of {signal.size} rows"
+            if count > options["refuse_share"] * signal.size:
                 raise CaptureError(NAME, words, REMEDY, span_of(frozen))
             masks.append(Mask(NAME, index, ~frozen))
             findings.append(warning(capture, NAME, f"{words}; set aside", REMEDY, span_of(frozen)))

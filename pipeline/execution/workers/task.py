@@ -50,16 +50,16 @@ def perform(function: Callable[[Any], Any], task: Any, progress: str | None) -> 
 
     """
     logged: list[tuple[int, str]] = []
-    value: Any = None
+    answer: Any = None
     error: Exception | None = None
     with _collected(logged), progress_file(None if progress is None else Path(progress)):
         try:
-            value = function(task)
+            answer = function(task)
         except PipelineError as fault:
             error = fault
         except Exception as fault:  # noqa: BLE001 (the driver reports it, with the motor's name)
             error = RuntimeError(f"{type(fault).__name__}: {fault}"[:500])
-    return Report(value, error, tuple(logged))
+    return Report(answer, error, tuple(logged))
 
 
 @contextmanager

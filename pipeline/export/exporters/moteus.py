@@ -33,8 +33,8 @@ def read(text: str) -> Values:
     """The constants of such lines."""
     rows = (line.split() for line in text.splitlines() if line.startswith("conf set "))
     settings = {row[2]: float(row[3]) for row in rows}
-    values = {name: settings[field] for field, name, _ in FIELDS}
-    return {**values, "pole_pairs": settings["motor.poles"] / 2.0}
+    fields = {name: settings[field] for field, name, _ in FIELDS}
+    return {**fields, "pole_pairs": settings["motor.poles"] / 2.0}
 
 
 EXPORTER = Exporter("moteus", "cfg", "moteus `conf set` lines", render, read)

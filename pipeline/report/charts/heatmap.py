@@ -112,8 +112,8 @@ def _scale_bar(error_map: ErrorMap, reach: float, right: float) -> str:
         f'width="{BAR:g}" height="{step + 0.3:.1f}"/>'
         for n in range(-STEPS, STEPS + 1)
     ]
-    for value, place in ((reach, TOP + 8), (0.0, TOP + HEIGHT / 2 + 4), (-reach, TOP + HEIGHT)):
-        number = quantity(value, error_map.unit, 2) if value else "0"
+    for error, place in ((reach, TOP + 8), (0.0, TOP + HEIGHT / 2 + 4), (-reach, TOP + HEIGHT)):
+        number = quantity(error, error_map.unit, 2) if error else "0"
         parts.append(text("tick", left + BAR + 4, place, number))
     return "".join(parts)
 

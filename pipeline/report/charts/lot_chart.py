@@ -79,15 +79,15 @@ def _limits(constant: ConstantResult, y: Axis) -> str:
     if constant.bounds is None:
         return ""
     marks = []
-    for css, words, value in (
+    for css, words, limit in (
         ("residual", "lower limit", constant.bounds.lower),
         ("residual", "upper limit", constant.bounds.upper),
         ("noise", "lower acceptance limit", constant.bounds.accept_lower),
         ("noise", "upper acceptance limit", constant.bounds.accept_upper),
     ):
-        if value is not None and y.low <= value <= y.high:
+        if limit is not None and y.low <= limit <= y.high:
             marks.append(
-                f'<path class="{css}" d="M{LEFT:g} {y.pixel(value):.1f}H{WIDTH - RIGHT:g}">'
+                f'<path class="{css}" d="M{LEFT:g} {y.pixel(limit):.1f}H{WIDTH - RIGHT:g}">'
                 f"<title>{words}</title></path>"
             )
     return "".join(marks)
@@ -125,14 +125,14 @@ def _average(constant: ConstantResult, y: Axis, pitch: float) -> str:
     """The moving average with its limits, where it is charted."""
     places = [LEFT + pitch * (k + 0.5) for k in range(len(constant.lots))]
     paths = []
-    for css, values in (
+    for css, averages in (
         ("fitted", [lot.ewma for lot in constant.lots]),
         ("noise", [lot.ewma_low for lot in constant.lots]),
         ("noise", [lot.ewma_high for lot in constant.lots]),
     ):
         points = [
             f"{x:.1f} {y.pixel(min(max(v, y.low), y.high)):.1f}"
-            for x, v in zip(places, values, strict=True)
+            for x, v in zip(places, averages, strict=True)
             if v is not None
         ]
         if points:
@@ -177,8 +177,8 @@ def cogging_chart(bands: Sequence[CoggingBand], orders: Sequence[OrderLevel]) ->
         css = "t-new" if side.side == "candidate" else "t-old"
         px = x.pixels(np.degrees(np.array(side.theta_mech_rad[:n]))).tolist()
         up, down, mean = (
-            y.pixels(np.array(values[:n])).tolist()
-            for values in (side.high_nm, side.low_nm, side.mean_nm)
+            y.pixels(np.array(torque_nm[:n])).tolist()
+            for torque_nm in (side.high_nm, side.low_nm, side.mean_nm)
         )
         body.append(f'<path class="area {css}" d="{band(px, up, down)}"/>')
         body.append(f'<path class="mean {css}" d="{line(px, mean)}"/>')

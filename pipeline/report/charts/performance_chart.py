@@ -162,7 +162,7 @@ def _scale(low: float, high: float, right: float) -> list[str]:
         for n in range(STEPS)
     ]
     ends = ((high, TOP + 9.0), (0.5 * (low + high), TOP + HEIGHT / 2 + 4), (low, TOP + HEIGHT))
-    return bars + [text("tick", left + BAR + 4, y, f"{100 * value:.0f} %") for value, y in ends]
+    return bars + [text("tick", left + BAR + 4, y, f"{100 * share:.0f} %") for share, y in ends]
 
 
 def _titles(x: Axis, y: Axis, right: float = WIDTH - RIGHT) -> str:

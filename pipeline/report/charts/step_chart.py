@@ -30,7 +30,7 @@ def step_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
         Error over noise floor of each signal [steps].
 
     """
-    finite = [max(v, LEAST) for values in over.values() for v in values if math.isfinite(v)]
+    finite = [max(v, LEAST) for errors in over.values() for v in errors if math.isfinite(v)]
     if not finite or not names:
         return '<p class="empty">no errors to draw</p>'
     low = min(math.floor(math.log10(min(finite)) * 2) / 2, -0.5)
@@ -60,8 +60,8 @@ def step_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
     parts += _lines(over, ends, x, y)
     parts += [
         text("tick x", x(n), bottom - 6, f"↓ {value:.1g}")
-        for values in over.values()
-        for n, value in enumerate(values)
+        for errors in over.values()
+        for n, value in enumerate(errors)
         if value < LEAST
     ]
     words = "error over noise floor of every signal, step by step"
