@@ -202,7 +202,8 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
 
     A drive turns its next vector to where the rotor will be, by a speed of its own. That speed lags
     (`frame_lag_s`, of commanded voltages), so as the shaft gathers speed the vector is behind the
-    frame it is logged in.
+    frame it is logged in. A vector acts later than it is commanded (`command_lead`): turned ahead,
+    it is right at steady state, and early by that where it changes.
     """
     period, is_held = segment.ts_s, segment.instrument.timing == "held"
     difference = forward if is_held else central
@@ -220,6 +221,8 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
         mean = mean * np.exp(
             1j * lag * x.once(x.theta_rad, "behind", lambda: _frame_lag(segment, x))
         )
+    if commanded and (lead := values["command_lead"]) and x.supply.hold_s:
+        mean = mean + lead * x.supply.hold_s / segment.ts_s * np.gradient(mean)
     if shift:
         psi = ahead(pieces.psi_wb) if is_held else pieces.psi_wb
         mean = mean - shift * 1j * psi * np.gradient(x.machine.pole_pairs * x.omega_rad_s)
@@ -288,6 +291,7 @@ EQUATION = Equation(
                 "ripple_edge",
                 "ripple_shift",
                 "frame_lag_s",
+                "command_lead",
             ),
             *("ripple_torque", "ripple_held", "psi_wb", "j_kgm2", "b_nm_s_rad"),
         ),

@@ -91,6 +91,9 @@ BASE: tuple[Constant, ...] = (
     Constant("ripple_edge", "1", "(ω_e T_s)² of the voltage, what a mean misses", hook="hold"),
     Constant("ripple_shift", "1", "T_s dω_e/dt ψ, angle against voltage", hook="hold"),
     Constant("frame_lag_s", "s", "lag of the speed that a drive turns its voltage by", hook="hold"),
+    Constant(
+        "command_lead", "1", "PWM periods from a voltage's command to its middle", hook="hold"
+    ),
     Constant("ripple_torque", "1", "T_s di/dt of the current in the torque", hook="hold"),
     Constant("ripple_held", "1", "(ω_e T_s)², ripple in a held shaft's torque", hook="hold"),
     Constant("bench_angle_rad", "rad", "electrical zero of the bench's encoder", hook="bench"),

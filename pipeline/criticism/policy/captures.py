@@ -302,6 +302,10 @@ class Priors:
         5e-3, "s", "lag of the speed by which a drive turns its voltage ahead",
         why="as `priors.late_speed_s`: it is the same observer",
     )  # fmt: skip
+    command_lead: float = derived(
+        1.5, "PWM periods", "from the command of a voltage to the middle of its hold",
+        source="computed in one period and held in the next; firmware logs it at either",
+    )  # fmt: skip
     ripple_torque: float = chosen(
         0.3, "sample periods", "current in the torque", why="a third of a sample"
     )

@@ -11,7 +11,7 @@ from pipeline.criticism.machine.model import Model, Pieces, values_of
 from pipeline.criticism.operating import Array, Complex, Operating, Values
 from pipeline.criticism.signals.true_state import angle_error, zero_angle
 
-RIPPLES = ("ripple_edge", "ripple_shift", "frame_lag_s")
+RIPPLES = ("ripple_edge", "ripple_shift", "frame_lag_s", "command_lead")
 """Nuisances of held vectors and their frame that are in the voltage (`model.BASE`)."""
 
 
