@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from pipeline.criticism.data.drive_log import DriveLog
 from pipeline.criticism.data.segment import slow_orders
@@ -71,7 +73,8 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
     if time[-1] < 2.0 * width or float(np.ptp(theta)) < policy.turning_rad:
         return None
     weak = weak_rows(time, width)
-    complete = weak.integral((~log.keep).astype(float)) == 0.0
+    usable = log.keep & ~_rests(theta, log, policy)
+    complete = weak.integral((~usable).astype(float)) == 0.0
     omega = smooth_speed(time, theta, policy.load_window_s / 8)
     driven, groups = _columns(log, weak, machine, omega)
     most_columns = np.count_nonzero(complete) // policy.load_windows - len(driven)
@@ -100,6 +103,17 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
         power = float(residual @ residual) / (target.size - rank) - noise**2
         shares.append(max(power, 0.0) / max(float(np.mean(explained**2)), 1e-300))
     return min(shares)
+
+
+def _rests(theta: Array, log: DriveLog, policy: Cutting) -> NDArray[np.bool_]:
+    """Samples [n] at which the shaft stays within what bristles bend, for a quarter of a window.
+
+    There dry friction holds any torque below its own, and no acceleration follows the current.
+    """
+    size = max(3, round(policy.load_window_s / 4 / log.period_s))
+    span = maximum_filter1d(theta, size) - minimum_filter1d(theta, size)
+    rests: NDArray[np.bool_] = span < policy.rest_rad
+    return rests
 
 
 def _mounting(theta: Array, omega: Array, weak: WeakRows) -> list[Array]:

@@ -171,6 +171,10 @@ class Cutting:
         by="windows of 20 to 160 ms",
         on="free and loaded drives of three benches: at 20 ms a host's jitter looks like a load",
     )  # fmt: skip
+    rest_rad: float = chosen(
+        2e-3, "rad", "angle within which a shaft rests, for a quarter of that window",
+        why="bristles bend by a milliradian to either side",
+    )  # fmt: skip
     load_samples: int = derived(
         12, "samples", "samples of such a window at the least", source="nine make a window"
     )

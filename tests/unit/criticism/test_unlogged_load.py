@@ -92,6 +92,21 @@ def test_waves_of_the_angle_are_no_load_and_steps_in_time_are():
     assert unexplained_share(turned(load), MACHINE) > 4 * UNEXPLAINED
 
 
+def test_a_shaft_that_dry_friction_holds_is_not_loaded() -> None:
+    """It stands while the current is too small to break it loose, and accelerates by none of it."""
+    log = turned(lambda *_: 0.0)
+    amps = np.repeat(np.random.default_rng(1).uniform(-1.0, 1.0, 40), 100)
+    theta, omega = [0.0], 0.0
+    for i in amps[1:]:
+        driven_by = i - 0.6 * np.sign(omega or i)
+        after = omega + log.period_s * 500.0 * driven_by
+        stands = omega * after < 0.0 or (omega == 0.0 and abs(i) < 0.6)
+        omega = 0.0 if stands else after
+        theta.append(theta[-1] + log.period_s * omega)
+    held = replace(log, columns={"iq_a": amps, "theta_mech_rad": np.array(theta)})
+    assert unexplained_share(held, MACHINE) < UNEXPLAINED / 4
+
+
 def test_an_encoder_off_its_centre_is_no_load():
     """Its error once a turn accelerates by the square of the speed, as no torque's wave does."""
     log = turned(lambda i, *_: 50.0 * i + 20.0)
