@@ -27,6 +27,7 @@ from pipeline.execution.outputs.publishing import (
     removed_note,
     with_folder_names,
 )
+from pipeline.execution.outputs.sheet_memory import SheetMemory
 from pipeline.execution.outputs.statuses import (
     findings_of,
     histories_of,
@@ -110,9 +111,10 @@ def main(settings: RunSettings) -> Outcome:
 
             start = WarmUp(shares=settings.residual_test and workers.count > 1)
             workers.map_tasks(process_motor, [start] * workers.count)
-            perform = partial(_run, settings, registry, workers)
-            return Watch(settings, perform, stack.pop_all()).begin()
-        outcome = _run(settings, registry, workers)
+            memory = SheetMemory()
+            perform = partial(_run, settings, registry, workers, memory)
+            return Watch(settings, perform, stack.pop_all(), memory).begin()
+        outcome = _run(settings, registry, workers, SheetMemory())
     if not settings.json:
         return outcome
     sheets = [sheet.document() for sheet in read_datasheets(output)]
@@ -144,6 +146,7 @@ def _run(
     settings: RunSettings,
     registry: Registry | None,
     workers: WorkerPool,
+    memory: SheetMemory,
     surveyed: Callable[[], object] = lambda: None,
     *,
     ahead: bool = False,
@@ -170,13 +173,14 @@ def _run(
     batch = _batch_key(settings, plain, files, registry)
     if (cached := _cached_outcome(settings, registry, cache, batch)) is not None:
         return replace(cached, timings=watch.table())
-    return _computed(settings, registry, (workers, cache, watch), files, plain, begun=ahead)
+    means = workers, cache, watch, memory
+    return _computed(settings, registry, means, files, plain, begun=ahead)
 
 
 def _computed(
     settings: RunSettings,
     registry: Registry | None,
-    means: tuple[WorkerPool, RunCache, Stopwatch],
+    means: tuple[WorkerPool, RunCache, Stopwatch, SheetMemory],
     survey: Survey,
     plain: Sequence[MotorJob],
     *,
@@ -185,7 +189,7 @@ def _computed(
     """Motors worked on, registered and published; `plain` are the jobs without revocations, `begun`
     is whether the tests beside them have begun.
     """
-    (workers, cache, watch), output = means, Path(settings.output)
+    (workers, cache, watch, memory), output = means, Path(settings.output)
     revoked = _revocations(registry)
     jobs = _with_revoked(plain, revoked)
     with watch.stage("motors"):
@@ -196,9 +200,9 @@ def _computed(
         # before the statuses are read: a later decision is not in them
         batch = _batch_key(settings, plain, survey, registry)
         histories = histories_of(registry)
-        motors, statuses = with_current_statuses(output, motors, histories)
+        motors, statuses = with_current_statuses(output, motors, histories, memory)
     with watch.stage("fleet"):
-        fleet = fleet_of(output, motors, others)
+        fleet = fleet_of(output, motors, others, memory)
         datasheets = fleet.datasheets
         of_others = {one.motor_id: status_now(output, one, histories) for one in fleet.others}
         of_motors = {finding for motor in motors for finding in motor.finished.findings}
@@ -250,11 +254,13 @@ def _contents(
 def _register(
     registry: Registry | None, output: Path, results: Sequence[MotorResult]
 ) -> Registered:
-    """Publishes the datasheets in commits of limited size, so that memory stays bounded.
+    """Publishes the datasheets in commits of limited size, so that memory stays bounded, those that
+    were worked on first.
 
     A registry that fails leaves the outputs complete.
     """
-    names = [n for r in results for n, _ in r.finished.files if n.startswith("datasheets/")]
+    by_work = sorted(results, key=lambda result: not result.seconds)
+    names = [n for r in by_work for n, _ in r.finished.files if n.startswith("datasheets/")]
     if registry is None or not names:
         return Registered()
     added = known = 0

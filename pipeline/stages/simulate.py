@@ -61,7 +61,7 @@ def main(settings: SimulateSettings) -> Outcome:
         with watch.stage("simulate"):
             recordings, true = simulated(motor, bench, seed, plan)
         with watch.stage("write"):
-            written = _write(output / folder, recordings, settings.encoding)
+            written = write(output / folder, recordings, settings.encoding)
             write_whole(output / folder / TRUTH, canonical_json(true))
             for stale in _captures(output / folder) - written:
                 stale.unlink()
@@ -97,11 +97,26 @@ def _ours(output: Path, folders: Iterable[str]) -> None:
             )
 
 
-def _write(folder: Path, recordings: Iterable[Recording], encoding: str) -> set[Path]:
-    """Returns the files written. `mixed` goes through the encodings in turn; long captures stay
-    in compact ones.
+def write(folder: Path, recordings: Iterable[Recording], encoding: str) -> set[Path]:
+    """Writes captures.
 
     Tables without a clock are CSV always, captures of several clocks MCAP always.
+
+    Parameters
+    ----------
+    folder
+        Where they are written.
+    recordings
+        The captures.
+    encoding
+        A key of `FORMATS`; `mixed` goes through the encodings in turn, but long captures stay in
+        compact ones.
+
+    Returns
+    -------
+    set of Path
+        The files.
+
     """
     large, small = cycle(LARGE), cycle(SMALL)
     written = set()

@@ -20,7 +20,7 @@ from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Answer, Entry, Question
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.storage.checksummed import keep_checksummed, read_checksummed
-from pipeline.io.storage.identity import Identities, Identity, identity, notes_folder
+from pipeline.io.storage.identity import Identities, Identity, notes_folder
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
@@ -143,7 +143,7 @@ class RunCache:
         self._survey = key_of(AnswersParts(tools(SURVEY), sources, limits, recover))
         known = {}
         for number, question in enumerate(questions):
-            self._before[question.path] = identity(self._folder / question.path)
+            self._before[question.path] = self._inputs.identity(question.path)
             sha256 = self._inputs.sha256(question.path)
             note = entries.get(question.path)
             if sha256 and note and note["key"] == self._key(question, sha256):
@@ -169,7 +169,7 @@ class RunCache:
             if answer.sha256 is None:
                 continue
             before = self._before[answer.path]
-            if before == identity(self._folder / answer.path):
+            if before == self._inputs.identity(answer.path):
                 self._inputs.note(answer.path, before, answer.sha256)
                 notes[answer.path] = self._valid.get(answer.path) or _answer_note(
                     self._key(question, answer.sha256), answer
@@ -268,7 +268,7 @@ class RunCache:
 
     def _note_outputs(self, files: Files) -> None:
         for name, sha256 in files:
-            self._outputs.note(name, identity(self._notes.parent / name), sha256)
+            self._outputs.note(name, self._outputs.identity(name), sha256)
         self._outputs.save()
 
 

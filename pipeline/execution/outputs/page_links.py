@@ -17,9 +17,9 @@ from pipeline.records.naming import file_stem
 from pipeline.report.pages.link_block import Link, with_links
 
 INDEX, LOTS = "report/index.html", "regression/report.html"
-MOTOR = "report/{}.html"
+MOTOR, DIAGNOSIS = "report/{}.html", "diagnosis/{}.html"
 _DATASHEET = ("Datasheet", MOTOR)
-_DIAGNOSIS = ("Diagnosis", "diagnosis/{}.html")
+_DIAGNOSIS = ("Diagnosis", DIAGNOSIS)
 _COMPARISON = ("Comparison", "comparison/{}.html")
 _LOTS = ("Lots", LOTS)
 _OF_PAGE = {
@@ -29,7 +29,7 @@ _OF_PAGE = {
         _LOTS,
         ("Recording (review)", "recordings/motor-{}.rrd"),
     ),
-    "diagnosis/{}.html": (
+    DIAGNOSIS: (
         ("All motors", INDEX),
         _DATASHEET,
         _COMPARISON,

@@ -14,9 +14,9 @@ from typing import Any
 
 from pipeline.execution.jobs import Files, MotorResult
 from pipeline.execution.outputs.page_links import INDEX, links_of
+from pipeline.execution.outputs.sheet_memory import SheetMemory
 from pipeline.execution.outputs.statuses import Statuses
 from pipeline.io.ingest.survey import Survey
-from pipeline.io.storage.datasheets import read_datasheet
 from pipeline.io.storage.publish import canonical_json, partial_owner, write_whole
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.finding import Finding, lines_of
@@ -25,13 +25,10 @@ from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.text.console import nothing_usable, summary
 from pipeline.report.text.next_command import next_command
 from pipeline.settings import RunSettings
-from pipeline.views.constants import KEY_CONSTANTS, PARTIAL_CONSTANTS
 
 MANIFEST = "outputs.json"
 INPUT, OUTPUT = "\ue000", "\ue001"
 """Placeholders for the names of the folders; no file may have such a name."""
-OF_BATCH = frozenset((*KEY_CONSTANTS, *PARTIAL_CONSTANTS))
-"""Constants that the page and the summary of the batch show."""
 MOST_NAMED = 5
 """Most names of removed files in a note; datasheets come first."""
 FOLDERS = ("datasheets", "report", "recordings", "performance", "sheet", "diagnosis", ".cache")
@@ -80,10 +77,10 @@ def other_motors(output: Path, batch: Collection[str], *, prune: bool) -> Others
     return others
 
 
-def fleet_of(output: Path, results: Sequence[MotorResult], others: Others) -> Fleet:
+def fleet_of(
+    output: Path, results: Sequence[MotorResult], others: Others, memory: SheetMemory
+) -> Fleet:
     """The datasheets of an output, read back from where they were written.
-
-    Only what belongs to the batch is kept of each, or memory would grow with the batch.
 
     Parameters
     ----------
@@ -93,25 +90,29 @@ def fleet_of(output: Path, results: Sequence[MotorResult], others: Others) -> Fl
         What each motor came to.
     others
         Motors of earlier runs that stay in the output.
+    memory
+        Datasheets that were read before.
 
     """
-    from pipeline.views.tables import constants_frame, fleet_files
+    from pipeline.views.tables import fleet_files
 
-    own = [name for motor in results for name, _ in motor.finished.files]
-    sheets: dict[bool, list[Datasheet]] = {True: [], False: []}
-    frames = {}
-    for mine, names in ((True, own), (False, [name for f in others.values() for name in f])):
-        for name in (name for name in names if name.startswith("datasheets/")):
-            sheet = read_datasheet(output / name)
-            frames[sheet.motor_id] = constants_frame(sheet)
-            sheets[mine].append(_kept(sheet))
+    own: dict[str, str | None] = {n: s for motor in results for n, s in motor.finished.files}
+    rest: dict[str, str | None] = dict.fromkeys(name for f in others.values() for name in f)
+    batch, further = (
+        [
+            memory.sheet(output / name, sha256)
+            for name, sha256 in files.items()
+            if name.startswith("datasheets/")
+        ]
+        for files in (own, rest)
+    )
+    frames = {sheet.datasheet.motor_id: sheet.constants for sheet in (*batch, *further)}
     tables = fleet_files([frame for _, frame in sorted(frames.items())]) if frames else {}
-    return Fleet(tuple(sheets[True]), tuple(sheets[False]), tables)
-
-
-def _kept(sheet: Datasheet) -> Datasheet:
-    constants = {name: one for name, one in sheet.constants.items() if name in OF_BATCH}
-    return replace(sheet, constants=constants, alternatives=(), captures=())
+    return Fleet(
+        tuple(sheet.datasheet for sheet in batch),
+        tuple(sheet.datasheet for sheet in further),
+        tables,
+    )
 
 
 def publish(

@@ -14,7 +14,8 @@ from pathlib import Path
 
 from pipeline.execution.caches.run_cache import note_files
 from pipeline.execution.jobs import Files, MotorResult
-from pipeline.execution.outputs.page_links import INDEX, MOTOR, links_of, relink
+from pipeline.execution.outputs.page_links import DIAGNOSIS, INDEX, MOTOR, links_of, relink
+from pipeline.execution.outputs.sheet_memory import SheetMemory
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.datasheets import read_datasheet
 from pipeline.io.storage.publish import write_whole
@@ -66,7 +67,7 @@ def status_now(output: Path, sheet: Datasheet, versions: Histories) -> CurrentSt
 
 
 def with_current_statuses(
-    output: Path, results: Sequence[MotorResult], versions: Histories
+    output: Path, results: Sequence[MotorResult], versions: Histories, memory: SheetMemory
 ) -> tuple[list[MotorResult], Statuses]:
     """Rewrites the pages whose status is out of date.
 
@@ -78,6 +79,8 @@ def with_current_statuses(
         What each motor came to.
     versions
         Versions of each motor, oldest first.
+    memory
+        Datasheets that were read before, and pages that are up to date.
 
     Returns
     -------
@@ -89,14 +92,46 @@ def with_current_statuses(
     for motor in results:
         files = dict(motor.finished.files)
         for name in [name for name in files if name.startswith("datasheets/")]:
-            sheet = read_datasheet(output / name)
+            sheet = memory.sheet(output / name, files[name]).datasheet
             current = current_status(sheet, versions.get(sheet.motor_id, ()), files[name])
             statuses[sheet.motor_id] = current
-            files |= _rewritten(output, sheet, current)
-            relink(output, sheet.motor_id, but=(MOTOR,))
+            files |= _brought_up_to_date(output, sheet, current, files, memory)
         finished = replace(motor.finished, files=tuple(files.items()))
         updated.append(replace(motor, finished=finished))
     return updated, statuses
+
+
+def _brought_up_to_date(
+    output: Path,
+    sheet: Datasheet,
+    current: CurrentStatus,
+    files: Mapping[str, str],
+    memory: SheetMemory,
+) -> dict[str, str]:
+    """Name and digest of the motor's own pages that were rewritten, of those that are no longer
+    what they were made of: the datasheet, its status, and the files that they link to.
+    """
+    stem, changed = file_stem(sheet.motor_id), dict[str, str]()
+    shown = {
+        kind.format(stem): (kind, links_of(output, kind, sheet.motor_id))
+        for kind in (MOTOR, DIAGNOSIS)
+        if kind.format(stem) in files
+    }
+    made_of = (files[f"datasheets/{stem}.json"], current)
+    due = [
+        kind
+        for page, (kind, links) in shown.items()
+        if not memory.shows(page, (files[page], made_of, links))
+    ]
+    if MOTOR in due:
+        changed |= _rewritten(output, sheet, current)
+    # pages of other commands are none of these files: it is not known when they change
+    at_rest = [kind for kind, _ in shown.values() if kind not in due]
+    relinked = relink(output, sheet.motor_id, but={MOTOR, *at_rest})
+    changed |= {page: sha256 for page, sha256 in relinked.items() if page in files}
+    for page, (_, links) in shown.items():
+        memory.note(page, (changed.get(page, files[page]), made_of, links))
+    return changed
 
 
 def _rewritten(output: Path, sheet: Datasheet, current: CurrentStatus) -> dict[str, str]:

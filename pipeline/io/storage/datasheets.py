@@ -55,15 +55,51 @@ def read_datasheet(path: Path) -> Datasheet:
         The file is no datasheet of version 1.
 
     """
+    return datasheet_from(datasheet_bytes(path), path.name)
+
+
+def datasheet_bytes(path: Path) -> bytes:
+    """The bytes of a datasheet's file.
+
+    Parameters
+    ----------
+    path
+        Its JSON file.
+
+    Raises
+    ------
+    UsageError
+        The file is too large.
+
+    """
     if path.stat().st_size > MAX_BYTES:
         raise UsageError(f"{path.name} is too large for a datasheet", "run again")
+    return path.read_bytes()
+
+
+def datasheet_from(data: bytes, name: str) -> Datasheet:
+    """The datasheet of a file's bytes.
+
+    Parameters
+    ----------
+    data
+        The bytes.
+    name
+        Name of the file, for messages.
+
+    Raises
+    ------
+    UsageError
+        They are no datasheet of version 1.
+
+    """
     try:
-        document = json.loads(path.read_bytes())
+        document = json.loads(data)
         if document["schema"] != SCHEMA:
-            raise UsageError(f"{path.name} is {document['schema']}, not {SCHEMA}", "run again")
+            raise UsageError(f"{name} is {document['schema']}, not {SCHEMA}", "run again")
         return datasheet_of(document)
     except (ValueError, LookupError, TypeError, RecursionError) as error:
-        raise UsageError(f"{path.name} is no datasheet: {error}", "run again") from error
+        raise UsageError(f"{name} is no datasheet: {error}", "run again") from error
 
 
 def datasheet_of(document: Mapping[str, Any]) -> Datasheet:

@@ -23,7 +23,7 @@ _COARSE_NS = 2_500_000_000
 _MOST_FOLDERS = 200
 
 
-def identity(path: Path) -> Identity | None:
+def identity(path: Path | str) -> Identity | None:
     """What changes when a file does.
 
     Parameters
@@ -38,7 +38,7 @@ def identity(path: Path) -> Identity | None:
 
     """
     try:
-        s = path.stat()
+        s = os.stat(path)  # noqa: PTH116 - a Path a file would cost most of the time
     except OSError:
         return None
     return s.st_dev, s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns
@@ -68,6 +68,7 @@ class Identities:
 
     def __init__(self, folder: Path, notes: Path | None) -> None:
         self.folder = folder
+        self._prefix = os.path.join(folder, "")  # noqa: PTH118
         self._path: Path | None = None
         self._known: dict[str, tuple[Identity, str]] = {}
         if notes is not None:
@@ -88,7 +89,18 @@ class Identities:
 
         """
         known = self._known.get(file)
-        return known[1] if known is not None and known[0] == identity(self.folder / file) else None
+        return known[1] if known is not None and known[0] == self.identity(file) else None
+
+    def identity(self, file: str) -> Identity | None:
+        """What changes when a file of the folder does; None where it is gone.
+
+        Parameters
+        ----------
+        file
+            Relative path.
+
+        """
+        return identity(self._prefix + file)
 
     def note(self, file: str, identity: Identity | None, sha256: str) -> None:
         """Notes the digest of a file.

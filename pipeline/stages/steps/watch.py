@@ -16,8 +16,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Protocol
 
+from pipeline.execution.outputs.sheet_memory import SheetMemory
 from pipeline.io.ingest.arrivals import Arrivals, Snapshot, snapshot
-from pipeline.io.storage.datasheets import read_datasheets
 from pipeline.records.errors import MachineError
 from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome
@@ -64,6 +64,7 @@ class Watch:
     settings: RunSettings
     perform: Pass
     workers: ExitStack
+    memory: SheetMemory = field(default_factory=SheetMemory)
     arrivals: Arrivals = field(default_factory=Arrivals)
     _ahead: bool = True
     _inside: bool = False
@@ -134,7 +135,10 @@ class Watch:
     def _news(self, outcome: Outcome) -> Outcome:
         """What this pass changed: a line a motor, and the error lines that are new."""
         output = Path(self.settings.output)
-        sheets = read_datasheets(output) if any((output / "datasheets").glob("*.json")) else ()
+        paths = sorted((output / "datasheets").glob("*.json"))
+        read = [self.memory.sheet(path).datasheet for path in paths]
+        sheets = sorted(read, key=lambda sheet: sheet.motor_id)
+        self.memory.forget_others()
         at = datetime.now().astimezone().strftime("%H:%M:%S")
         lines = [
             f"{at} {printable(sheet.motor_id)}: {sheet.status}, version {sheet.version[:12]}"

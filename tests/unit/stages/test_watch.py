@@ -8,6 +8,8 @@ import shutil
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, nullcontext
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,9 +17,14 @@ from typing import Any
 import pytest
 
 from pipeline.execution.jobs import ModelTest, WarmUp
+from pipeline.execution.outputs import sheet_memory
+from pipeline.execution.outputs.sheet_memory import SheetMemory
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.arrivals import Arrivals, snapshot
+from pipeline.io.registry.store import Registry
+from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import MachineError, UsageError
+from pipeline.records.ledger import Selection
 from pipeline.records.outcome import Outcome
 from pipeline.settings import RunSettings
 from pipeline.stages import run
@@ -227,9 +234,85 @@ def test_the_residual_test_begins_while_the_folder_settles(
     keys = RunSettings(input=str(folder), output=str(output), report=False, recordings=False)
     output.mkdir()
     workers = WorkerPool(lambda _: nullcontext(), 2, output / ".work")
-    run._run(keys, None, workers, settled, ahead=True)
+    run._run(keys, None, workers, SheetMemory(), settled, ahead=True)
     assert (output / "datasheets" / "G52-0601.json").is_file()
     assert [name for name in worked if "G52" in name] == ["motor G52-0601"]
+
+
+def resistance(folder: Path, motor_id: str, r_ohm: float) -> None:
+    """A resistance test of one motor, of four levels of current."""
+    levels = (level for level in (-2.0, -1.0, 1.0, 2.0) for _ in range(200))
+    rows = "".join(f"{1e-3 * k:.3f},{r_ohm * i},{i},25.0\n" for k, i in enumerate(levels))
+    head = f"# contract: 1\n# motor_id: {motor_id}\n# test: resistance\n# pair: ab\n"
+    body = f"{head}t_s,vab_v,ia_a,temp_winding_degc\n{rows}"
+    (folder / f"{motor_id}.csv").write_text(body)
+
+
+def written(output: Path) -> dict[str, bytes]:
+    """Every file of an output but those of its registry and cache."""
+    files = (path for path in output.rglob("*") if path.is_file())
+    names = {path.relative_to(output).as_posix(): path for path in files}
+    return {
+        name: path.read_bytes()
+        for name, path in names.items()
+        if not name.startswith(("registry/", ".cache/"))
+    }
+
+
+def test_passes_leave_what_a_run_by_itself_leaves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pass reads nothing again that did not change; each file is as a run that knows nothing of
+    earlier ones makes it, whatever came, changed, went or was decided in between.
+    """
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    folder, output = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    (output / "comparison").mkdir(parents=True)
+    read: list[str] = []
+    whole = sheet_memory.datasheet_from
+
+    def reading(data: bytes, name: str) -> Datasheet:
+        read.append(name)
+        return whole(data, name)
+
+    def here(_: object, work: Callable[[Any], Any], tasks: Sequence[Any], __: Any = None) -> Any:
+        return [work(task) for task in tasks]
+
+    monkeypatch.setattr(sheet_memory, "datasheet_from", reading)
+    monkeypatch.setattr(WorkerPool, "map_tasks", here)
+    keys = RunSettings(input=str(folder), output=str(output), recordings=False, residual_test=False)
+    workers = WorkerPool(lambda _: nullcontext(), 1, output / ".work")
+    registry, memory = Registry(str(output / "registry")), SheetMemory()
+
+    def a_pass(*changed: str) -> None:
+        read.clear()
+        run._run(keys, registry, workers, memory)
+        memory.forget_others()
+        assert read == [f"{motor_id}.json" for motor_id in changed]
+        by_watch = written(output)
+        (output / ".cache" / "run.json").unlink()
+        run._run(keys, registry, workers, SheetMemory())
+        assert by_watch == written(output)
+
+    resistance(folder, "a", 0.6)
+    a_pass("a")
+    resistance(folder, "b", 0.7)
+    a_pass("b")
+    last = Selection("a", revision=1)
+    registry.decide("revoke", last, "A. Smith", "wrong leads", datetime(2026, 1, 1, tzinfo=UTC))
+    resistance(folder, "c", 0.8)
+    a_pass("c")
+    assert "wrong leads" in (output / "report" / "a.html").read_text()
+    (output / "comparison" / "b.html").write_text("")
+    resistance(folder, "c", 0.9)
+    a_pass("c")
+    assert "comparison/b.html" in (output / "report" / "b.html").read_text()
+    (folder / "a.csv").unlink()
+    a_pass()
+    by_watch = written(output)
+    run._run(replace(keys, cache=False), registry, workers, SheetMemory())
+    assert by_watch == written(output)
 
 
 @pytest.mark.parametrize("wrong", [{"settle_s": -1.0}, {"json": True}])

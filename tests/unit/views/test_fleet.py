@@ -8,7 +8,7 @@ from dataclasses import replace
 import polars as pl
 import pytest
 
-from pipeline.execution.outputs.publishing import OF_BATCH
+from pipeline.execution.outputs.sheet_memory import OF_BATCH
 from pipeline.records.datasheet import AWAITS_APPROVAL, Datasheet
 from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.estimate import not_identifiable
