@@ -50,9 +50,20 @@ def _phases(x: Operating, lag_s: float) -> tuple[Complex, Array, Array]:
     before, eps = x.i_a, x.eps_rad
     if lag_s:
         before = before - np.gradient(before) / x.ts_s * lag_s
-        eps = eps - x.machine.pole_pairs * x.omega_rad_s * lag_s
+        eps = _lagging(x, lag_s)
     turn = x.once(eps, "turning", lambda: turning(eps))
     return turn, phases_of(before * turn), eps
+
+
+def _lagging(x: Operating, lag_s: float) -> Array:
+    """Electrical angle [n, rad] a lag before, at the speed of the sample."""
+    omega = x.omega_rad_s
+
+    def angle() -> tuple[Array, Array]:
+        return omega, x.eps_rad - x.machine.pole_pairs * omega * lag_s
+
+    _, before = x.once(x.eps_rad, ("lagging", lag_s, id(omega)), angle)
+    return before
 
 
 def _sampled(x: Operating, q: Values) -> Complex:

@@ -12,12 +12,7 @@ _ROUNDS = 3
 time hold each other up."""
 _SHARP = 1e-9
 """Width [A] below which a current's sign is as good as a step."""
-_FAR = 20.0
-"""Widths beyond which what smooths a step is below the rounding of doubles: e^-40 is 4e-18."""
 _SIN_120 = 0.5 * 3.0**0.5
-_LEGS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0]])
-"""Legs that are high, from the middle of a period's one zero vector to that of the other [4, 3], of
-legs in falling order of voltage."""
 _SHORT = 1e-3
 """Widths below which a mean of tanh is that at the middle: what it lacks is 1e-7."""
 
@@ -181,23 +176,27 @@ def swept_shares(x: Operating, eps_rad: Array, current_a: Array, width_a: float)
         return np.tanh(current_a / width)
     inductance, winding, recorded = known
     volts = winding if recorded is None else recorded
-    order = np.argsort(-volts, axis=0)
-    asked, induced, mean = (
-        np.take_along_axis(one, order, axis=0) for one in (volts, winding, current_a / width)
+    duty = np.clip(
+        0.5 + (volts - 0.5 * (volts.max(axis=0) + volts.min(axis=0))) / x.supply.vdc_v, 0.0, 1.0
     )
-    duty = np.clip(0.5 + (asked - 0.5 * (asked[0] + asked[2])) / x.supply.vdc_v, 0.0, 1.0)
-    lasts = -np.diff(duty, axis=0, prepend=1.0, append=0.0)
+    falling = np.sort(duty, axis=0)[::-1]
+    lasts = -np.diff(falling, axis=0, prepend=1.0, append=0.0)
+    above = np.stack([sum(volts[j] > volts[k] for j in others) for k, others in enumerate(_OTHERS)])
     per_volt = 0.5 * x.supply.pwm_s / inductance / width
-    moved, shares = np.zeros_like(mean), np.zeros_like(mean)
-    for high, share in zip(_LEGS, lasts, strict=True):
-        drive = x.supply.vdc_v * (high - high.mean())[:, None] - induced
-        after = moved + per_volt * share * drive
-        shares += 0.5 * share * (_mean_tanh(mean + moved, mean + after))
-        shares += 0.5 * share * (_mean_tanh(mean - moved, mean - after))
-        moved = after
-    of_legs = np.empty_like(shares)
-    np.put_along_axis(of_legs, order, shares, axis=0)
-    return of_legs
+    moves = [
+        per_volt * share * (x.supply.vdc_v * ((high > above) - high / 3.0) - winding)
+        for high, share in enumerate(lasts)
+    ]
+    mean = current_a / width
+    shares, begun = np.zeros_like(mean), _log_cosh(mean)
+    for way in (1.0, -1.0):
+        at, integral = mean, begun
+        for share, move in zip(lasts, moves, strict=True):
+            after = at + way * move
+            ends = _log_cosh(after)
+            shares += 0.5 * share * _mean_tanh(at, after, ends - integral)
+            at, integral = after, ends
+    return shares
 
 
 def _switching(x: Operating, eps_rad: Array) -> tuple[float, Array, Array | None] | None:
@@ -214,12 +213,13 @@ def _switching(x: Operating, eps_rad: Array) -> tuple[float, Array, Array | None
     return inductance, winding, recorded
 
 
-def _mean_tanh(one: Array, other: Array) -> Array:
-    """Mean of tanh between two arguments."""
+def _mean_tanh(one: Array, other: Array, rise: Array) -> Array:
+    """Mean of tanh between two arguments, of which `rise` is the integral."""
     apart = other - one
     short = np.abs(apart) < _SHORT
-    rise = _log_cosh(other) - _log_cosh(one)
-    mean: Array = np.where(short, np.tanh(0.5 * (one + other)), rise / np.where(short, 1.0, apart))
+    apart[short] = 1.0
+    mean: Array = rise / apart
+    mean[short] = np.tanh(0.5 * (one[short] + other[short]))
     return mean
 
 
@@ -249,9 +249,5 @@ def _beside(volts: Array, loss_v: float, late: Array, side: float) -> tuple[Arra
 
 def _passed(current_a: Array, ramp_a: float, width_a: float) -> Array:
     """A ramp from 0 to 1 of a length [A] about zero, smoothed by sech² of a width [A]."""
-    up, down = (np.abs(current_a + part * ramp_a) / width_a for part in (0.5, -0.5))
-    bent = up - down
-    for sign, apart in ((1.0, up), (-1.0, down)):
-        close = apart < _FAR
-        bent[close] += sign * np.log1p(np.exp(-2.0 * apart[close]))
-    return 0.5 + 0.5 * width_a / ramp_a * bent
+    up, down = (_log_cosh((current_a + part * ramp_a) / width_a) for part in (0.5, -0.5))
+    return 0.5 + 0.5 * width_a / ramp_a * (up - down)

@@ -135,7 +135,8 @@ def linearise(
     """
     group, window, valid, groups = row_index(segment)
     sampler = _sampler(segment, model, values)
-    noise, scale = floor.noise_and_scale(group[valid], sampler.reading_error(floor.near, valid))
+    reading = _reading_error(segment, model, floor.near)[valid]
+    noise, scale = floor.noise_and_scale(group[valid], reading)
     row_weight = 1.0 / scale
     weak_columns = _weak_columns(segment, sampler, columns, valid)
     rows = (
@@ -290,6 +291,18 @@ def _sampler(segment: Segment, model: Model, values: Values) -> _Sampler:
     return sampler
 
 
+def _reading_error(segment: Segment, model: Model, near: Values) -> Array:
+    """Error [C, W, M] that any model is allowed near some values. The last one is kept: all steps
+    of a fit have the same.
+    """
+    known = segment.cache.get("reading")
+    if known is None or known[0] is not segment or known[1:3] != (model, near):
+        error = reading_error(segment, model, near)
+        known = segment.cache["reading"] = segment, model, dict(near), error
+    kept: Array = known[3]
+    return kept
+
+
 class _Sampler:
     """Sampled change of a segment's residual along columns; hooks are linear, sensors are not.
 
@@ -299,7 +312,6 @@ class _Sampler:
     def __init__(self, segment: Segment, model: Model, values: dict[str, float]) -> None:
         self.segment, self.model, self.values = segment, model, values
         self.weak: dict[ColumnKey, tuple[Column, Array]] = {}
-        self.reading: tuple[Values, Array] | None = None
         self.observes = equation_of(segment).observes
         self.recorder = equation_of(segment).recorder
         self.x = operate(segment, segment.recorded, model, values)
@@ -317,13 +329,6 @@ class _Sampler:
     def at(self, segment: Segment, model: Model, values: Values) -> bool:
         """Whether this is the sampler of a segment at a point."""
         return segment is self.segment and values == self.values and model == self.model
-
-    def reading_error(self, values: Values, valid: NDArray[np.bool_]) -> Array:
-        """Error [R] that any model is allowed, with scales and friction of `values`."""
-        if self.reading is None or self.reading[0] != values:
-            error = reading_error(self.segment, self.model, values, self.x)
-            self.reading = dict(values), error[valid]
-        return self.reading[1]
 
     def change(self, column: Column) -> Array | None:
         """d(residual)/d(parameter) [C, n]; None where it is zero throughout."""

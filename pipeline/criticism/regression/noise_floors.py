@@ -253,9 +253,7 @@ def form_tolerance(
     return wrong * np.sqrt(total)
 
 
-def reading_error(
-    segment: Segment, model: Model, values: Values, state: Operating | None = None
-) -> Array:
+def reading_error(segment: Segment, model: Model, values: Values) -> Array:
     """The error that any model of a bench is allowed.
 
     Parameters
@@ -263,9 +261,7 @@ def reading_error(
     segment
         Whose channels they are.
     model, values
-        For scales and friction.
-    state
-        The segment's true state, where it is known already.
+        For scales and friction; an effect without a value is not there.
 
     Returns
     -------
@@ -284,6 +280,8 @@ def reading_error(
     weak, policy = segment.weak, model.policy.noise_floors
     if weak is None:
         return np.zeros((len(segment.channels), segment.size, 1))
+    for effect in model.effects:
+        values = {**zero(effect, model), **values}
     sensing = equation_of(segment).sensing
     sizes = [
         np.abs(segment.recorded.get(channel, np.zeros(segment.size)))
@@ -310,40 +308,30 @@ def reading_error(
         combined[place] = np.hypot(combined[place], late)
     if "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
-        combined[place] = np.hypot(combined[place], _of_torque(segment, model, values, state))
-    for place, channel in enumerate(segment.channels):
-        if channel in VOLTS:
-            combined[place] = np.hypot(
-                combined[place], _of_voltage(segment, channel, model, values, state)
-            )
+        combined[place] = np.hypot(combined[place], _of_torque(segment, model, values))
+    places = [n for n, channel in enumerate(segment.channels) if channel in VOLTS]
+    if places and "voltage_jumps" in sensing.errors:
+        combined[places] = np.hypot(combined[places], _of_voltages(segment, model, values))
     return combined
 
 
-def _of_voltage(
-    segment: Segment, channel: str, model: Model, values: Values, state: Operating | None
-) -> Array | float:
-    """What a drive's log may be off by in a voltage [W, M], as weak samples of its channel."""
-    weak, policy = segment.weak, model.policy.noise_floors
+def _of_voltages(segment: Segment, model: Model, values: Values) -> Array:
+    """What a drive's log may be off by in its voltages [V, W, M], as weak samples of each."""
     errors = equation_of(segment).sensing.errors
-    if weak is None or "voltage_jumps" not in errors:
-        return 0.0
-    total: Array = np.zeros((weak.starts.size, weak.orders.size))
-    total = np.hypot(total, _jumps(segment, *VOLTS, policy)[:, None])
+    total = _jumps(segment, *VOLTS, model.policy.noise_floors)[None, :, None]
     if "unsampled" in errors:
         current = segment.recorded["iq_a"]
         change = values["lq_h"] * unresolved(current) * central(current, segment.ts_s)
-        total = np.hypot(total, np.abs(weak.project(change[None])[0]))
+        total = np.hypot(total, np.abs(projected(segment, change[None])))
     if any(effect.drop is not None for effect in model.effects):
-        x = operate(segment, segment.recorded, model, values) if state is None else state
-        steep = steep_drops(model, values, x)
-        axis = steep.real if channel == "vd_v" else steep.imag
-        total = np.hypot(total, np.abs(weak.project(axis[None])[0]))
+        steep = steep_drops(model, values, operate(segment, segment.recorded, model, values))
+        by_axis = {"vd_v": steep.real, "vq_v": steep.imag}
+        axes = np.stack([by_axis[channel] for channel in segment.channels if channel in VOLTS])
+        total = np.hypot(total, np.abs(projected(segment, axes)))
     return total
 
 
-def _of_torque(
-    segment: Segment, model: Model, values: Values, state: Operating | None
-) -> Array | float:
+def _of_torque(segment: Segment, model: Model, values: Values) -> Array | float:
     """What a drive's log may be off by in its torque [W, M], as weak samples of its channel."""
     weak, policy = segment.weak, model.policy.noise_floors
     errors = equation_of(segment).sensing.errors
@@ -353,7 +341,7 @@ def _of_torque(
     if "encoder_lines" in errors:
         total = _encoder_lines(segment, values, policy)
     if "standstill" in errors:
-        x = operate(segment, segment.recorded, model, values) if state is None else state
+        x = operate(segment, segment.recorded, model, values)
         total[:, 0] = np.hypot(total[:, 0], _at_rest(segment, model, values, x))
     if "current_jumps" in errors:
         kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
@@ -386,16 +374,13 @@ def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
     to the current is a resistance, which a fit determines.
 
     """
-    known = dict(values)
-    for effect in model.effects:
-        known = {**zero(effect, model), **known}
-    evaluate(model, x, known, frozenset({"flux"}))
+    evaluate(model, x, values, frozenset({"flux"}))
     factor = 1.0 + model.policy.selection.form_error
     moved = replace(x, id_a=x.id_a * factor, iq_a=x.iq_a * factor, cache={})
     change = np.zeros(x.omega_rad_s.shape, dtype=complex)
     for effect in model.effects:
         if effect.drop is not None:
-            q = values_of(effect, model.machine, known)
+            q = values_of(effect, model.machine, values)
             before = effect.drop(x, q)
             step = effect.drop(moved, q) - before
             steeper = np.abs(step) - (factor - 1.0) * np.abs(before)
@@ -439,13 +424,10 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
     creeping = np.flatnonzero(_lasting(pace < slow, round(policy.rest_s / x.ts_s)))
     if creeping.size < 2:
         return np.zeros(weak.starts.size)
-    known = dict(values)
-    for effect in model.effects:
-        known = {**zero(effect, model), **known}
     resting = x.at(finer * creeping)
     drag = frozenset({"torque"})
     onward, back = (
-        evaluate(model, replace(resting, omega_rad_s=pace), known, drag).drag_nm
+        evaluate(model, replace(resting, omega_rad_s=pace), values, drag).drag_nm
         for pace in (np.full(creeping.size, speed) for speed in (slow, -slow))
     )
     grip = np.zeros(segment.size)

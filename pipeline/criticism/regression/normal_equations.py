@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,7 +148,7 @@ class NormalEquations:
         counts = np.bincount(group, minlength=count)
         edges = np.concatenate([[0], np.cumsum(counts)])
         size = sorted_rows.shape[1]
-        upper = np.triu_indices(size)
+        upper = _upper(size)
         normal = np.empty((count, upper[0].size))
         for number in range(count):
             in_group = sorted_rows[edges[number] : edges[number + 1]]
@@ -167,7 +168,7 @@ class NormalEquations:
         return self._only(places, self.prior.only(places))
 
     def _only(self, places: NDArray[np.int64], prior: Prior) -> NormalEquations:
-        rows, columns = np.triu_indices(places.size)
+        rows, columns = _upper(places.size)
         normal = np.take(self.normal, self._products(places[rows], places[columns]), axis=1)
         return replace(self, slope=self.slope[:, places], normal=normal, prior=prior)
 
@@ -235,7 +236,7 @@ class NormalEquations:
         return replace(end, step=step)
 
     def _descended(self, reduced_chi2: Array, rounds: int) -> Descent:
-        upper = np.triu_indices(self.slope.shape[1])
+        upper = _upper(self.slope.shape[1])
         twice = np.where(upper[0] == upper[1], 1.0, 2.0)
         normal = np.diag(self.prior.precision)
         step, now, before = np.zeros(self.prior.precision.size), np.inf, np.inf
@@ -256,6 +257,14 @@ class NormalEquations:
 
     def _reduced_chi2(self, power: Array) -> Array:
         return np.where(self.counts > 0, power / np.maximum(self.counts, 1.0), 1.0)
+
+
+@cache
+def _upper(size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows and columns of the upper triangle of a square, by rows; making them costs as much as a
+    fit that uses them.
+    """
+    return np.triu_indices(size)
 
 
 def deviance_of(counts: Array, reduced_chi2: Array) -> float:

@@ -41,7 +41,7 @@ def reconsidered(system: LinearSystem) -> LinearSystem:
             continue
         for other in _choices(effect, system.fit):
             fit = system.fit
-            tried = gauss_newton(replace(fit, values={**fit.values, **other}))
+            tried = gauss_newton(replace(fit, values={**fit.values, **other}), before=system)
             if tried.deviance < system.deviance - fit.policy.selection.tie:
                 system = tried
     return system

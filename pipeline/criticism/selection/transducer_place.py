@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
@@ -42,7 +44,9 @@ def at_better_place(system: LinearSystem) -> LinearSystem:
     if not significant[torques].any():
         return system
     segments = tuple(_at_other_place(s) if _reads_torque(s) else s for s in system.segments)
-    other = gauss_newton(replace(system.fit, segments=segments))
+    # only the inertia's column is another there
+    kept = np.flatnonzero([column.name != "j_kgm2" for column in system.columns])
+    other = gauss_newton(replace(system.fit, segments=segments), before=system.only(kept))
     return other if other.deviance < system.deviance - system.policy.selection.tie else system
 
 

@@ -95,7 +95,7 @@ def signature(
     Component-plus-residual plots: F. S. Wood, Technometrics 15 (1973) 677-695.
 
     """
-    without = linear_system(full.fit.without(*added))
+    without = linear_system(full.fit.without(*added), before=full, chord=True)
     curves = [*_window_curves(without, full), *_turn_curves(angle_maps(without.fit), maps)]
     if not curves:
         return None

@@ -15,7 +15,6 @@ from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error
 from pipeline.criticism.regression.normal_equations import Prior
-from pipeline.criticism.residuals.residual import operate
 from tests.unit.criticism.machines import BASE, log, machine
 
 WINDAGE = effects()["windage"]
@@ -60,9 +59,8 @@ def test_what_is_always_in_the_fit_keeps_the_fit_s_error() -> None:
 def test_a_tolerance_of_form_joins_the_scale_and_not_the_noise() -> None:
     segment, plain = log(), Model(machine(), ())
     sigma = noise_floor(segment, plain, BASE, 1)
-    x = operate(segment, segment.recorded, plain, BASE)
     group, _, valid, _ = row_index(segment)
-    rows = group[valid], reading_error(segment, plain, BASE, x)[valid]
+    rows = group[valid], reading_error(segment, plain, BASE)[valid]
     noise, same = Floor(sigma, BASE).noise_and_scale(*rows)
     wrong = Floor(sigma, BASE, np.full(sigma.size, 0.25))
     still, scale = wrong.noise_and_scale(*rows)

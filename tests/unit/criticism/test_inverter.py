@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.inverter import lost_shares, swept_shares
-from pipeline.criticism.machine.model import Model, evaluate
+from pipeline.criticism.machine.model import Model, evaluate, zero
 from pipeline.criticism.operating import Supply
 from pipeline.criticism.regression.noise_floors import steep_drops
 from tests.unit.criticism.machines import BASE, machine, operating
@@ -151,16 +151,14 @@ def test_without_switching_the_current_alone_decides():
 
 def test_where_a_drop_jumps_with_the_current_its_floor_is_that_jump():
     """A twentieth of the current decides of much of the loss there, and of nothing elsewhere."""
-    model = Model(machine(), (effects()["dead_time"],))
+    effect = effects()["dead_time"]
+    model = Model(machine(), (effect,))
     of = {
         "loss_v": LOSS_V,
         "width_a": 1e-3,
-        "on_v": 0.0,
         "ripple": 1.0,
-        "lag_s": 0.0,
-        "given_v": 0.0,
     }
-    values = {**BASE, "ld_h": L_H, "lq_h": L_H}
+    values = {**BASE, "ld_h": L_H, "lq_h": L_H, **zero(effect, model)}
     values |= {f"dead_time.{name}": value for name, value in of.items()}
 
     def jump(i_q, speed):
