@@ -108,8 +108,9 @@ class NormalEquations:
     slope
         Columns times the residual [G, k].
     normal
-        Columns times each other [G, k (k + 1) / 2], each the upper triangle by rows: so a sum over
-        groups is half as long, and one product of a matrix and a vector.
+        Columns times each other [k (k + 1) / 2, G], of each group the upper triangle by rows: so a
+        sum over groups is half as long, and one product of a matrix and a vector; and what some of
+        the columns need lies together.
     prior
         What is known of the parameters beforehand.
     policy
@@ -149,12 +150,11 @@ class NormalEquations:
         edges = np.concatenate([[0], np.cumsum(counts)])
         size = sorted_rows.shape[1]
         upper = _upper(size)
-        normal = np.empty((count, upper[0].size))
+        normal = np.empty((upper[0].size, count))
         for number in range(count):
             in_group = sorted_rows[edges[number] : edges[number + 1]]
-            normal[number] = (in_group.T @ in_group)[upper]
-        power, slope = normal[:, 0].copy(), normal[:, 1:size].copy()
-        return cls(counts.astype(float), power, slope, normal[:, size:].copy(), prior, policy)
+            normal[:, number] = (in_group.T @ in_group)[upper]
+        return cls(counts.astype(float), normal[0], normal[1:size].T, normal[size:], prior, policy)
 
     def only(self, places: NDArray[np.int64]) -> NormalEquations:
         """The normal equations of some of the columns.
@@ -169,7 +169,7 @@ class NormalEquations:
 
     def _only(self, places: NDArray[np.int64], prior: Prior) -> NormalEquations:
         rows, columns = _upper(places.size)
-        normal = np.take(self.normal, self._products(places[rows], places[columns]), axis=1)
+        normal = self.normal[self._products(places[rows], places[columns])]
         return replace(self, slope=self.slope[:, places], normal=normal, prior=prior)
 
     def _products(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -190,8 +190,8 @@ class NormalEquations:
 
         """
         all_columns = np.arange(self.slope.shape[1])
-        rows = self.normal[:, self._products(places[:, None], all_columns)]
-        slope = self.slope + step @ rows
+        rows = self.normal[self._products(places[:, None], all_columns)]
+        slope = self.slope + np.tensordot(step, rows, 1).T
         power = _rounded(self.power + (self.slope + slope)[:, places] @ step)
         return replace(self, power=power, slope=slope)
 
@@ -222,9 +222,7 @@ class NormalEquations:
 
         """
         all_columns, prior = np.arange(self.slope.shape[1]), self.prior
-        nonzero = np.flatnonzero(
-            self.normal[:, self._products(all_columns, all_columns)].any(axis=0)
-        )
+        nonzero = np.flatnonzero(self.normal[self._products(all_columns, all_columns)].any(axis=1))
         observed = Prior(prior.precision[nonzero], prior.gradient[nonzero], prior.elsewhere)
         known = self._only(nonzero, observed)
         now = np.maximum(self._reduced_chi2(self.power), 1.0)
@@ -242,10 +240,10 @@ class NormalEquations:
         step, now, before = np.zeros(self.prior.precision.size), np.inf, np.inf
         for _ in range(rounds):
             weight = 1.0 / np.maximum(reduced_chi2, 1.0)
-            normal[upper] = weight @ self.normal
+            normal[upper] = self.normal @ weight
             normal[np.diag_indices_from(normal)] += self.prior.precision
             step = -_solved(normal, weight @ self.slope + self.prior.gradient)
-            bent = self.normal @ (twice * step[upper[0]] * step[upper[1]])
+            bent = (twice * step[upper[0]] * step[upper[1]]) @ self.normal
             power = _rounded(self.power + 2.0 * (self.slope @ step) + bent)
             reduced_chi2 = self._reduced_chi2(power)
             now = deviance_of(self.counts, reduced_chi2) + self.prior.cost(step)
