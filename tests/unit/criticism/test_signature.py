@@ -53,7 +53,7 @@ def shown_by(
     made = iter([after, before])
     made_of: list[tuple[str, ...]] = []
     monkeypatch.setattr(
-        module, "linear_system", lambda fit: made_of.append(fit) or system_of(*captures)
+        module, "linear_system", lambda fit, **_: made_of.append(fit) or system_of(*captures)
     )
     monkeypatch.setattr(module, "window_errors", lambda *_: next(made))
     monkeypatch.setattr(module, "angle_maps", lambda _: maps[0])
