@@ -138,6 +138,16 @@ def test_the_floor_holds_what_coarse_rounding_really_does():
     assert (by_white < 0.8 * np.array(errors)).all()
 
 
+def test_smoothing_keeps_a_parabola_to_both_ends_and_takes_the_steps_of_its_rounding():
+    t = np.linspace(-1.0, 2.0, 1500)
+    bent, step = 3.0 * t**2 - t, 0.01
+    policy = DEFAULT.sensor_noise
+    assert smoothed(bent, step, policy) == pytest.approx(bent, abs=1e-9)
+    rounded = step * np.round(bent / step)
+    left = smoothed(rounded, step, policy) - bent
+    assert np.abs(left[200:-200]).max() < 0.2 * np.abs(rounded - bent).max()
+
+
 def test_noise_of_a_current_counts_by_the_constants_that_it_goes_through():
     """Halved R and L halve what a current's noise does to a voltage: that is no better fit."""
     noise = {**log().sensors.noise, "vd_v": 1e-6, "vq_v": 1e-6, "id_a": 0.2, "iq_a": 0.2}
