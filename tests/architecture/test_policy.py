@@ -32,8 +32,6 @@ ARITHMETIC = {
     "discovery/residual_inputs.py": {"_WIDE"},  # no bound
     "machine/iron.py": {"PARALLEL"},  # a choice of an effect
     "machine/inverter.py": {
-        "_FAR",
-        "_LEGS",
         "_OTHERS",
         "_ROUNDS",
         "_SHARP",
