@@ -39,6 +39,8 @@ class Sensors:
     angle_step_rad
         Resolution of an angle whose noise is its rounding, before it was smoothed; None where it
         was not determined.
+    readings
+        Rounded readings that each sample of such an angle is the mean of.
     parabola
         Samples of the parabola that the angle was smoothed by; 1 for none.
     speed_noise_rad_s
@@ -51,6 +53,7 @@ class Sensors:
     steps: Mapping[str, float] = field(default_factory=dict)
     runs_rad: Array | None = None
     angle_step_rad: float | None = None
+    readings: int = 1
     parabola: int = 1
     speed_noise_rad_s: float | None = None
 

@@ -123,8 +123,12 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
             noisy[name] += rounding_error(even[name], step, shifts[name][replicate])
         if sensors.angle_step_rad:
             theta = segment.recorded["theta_mech_rad"]
-            step, shift = sensors.angle_step_rad, generator.uniform(-0.5, 0.5)
-            error = rounding_error(even["theta_mech_rad"], step, shift)
+            error = _readings_error(
+                even["theta_mech_rad"],
+                sensors.angle_step_rad,
+                sensors.readings,
+                generator.uniform(-0.5, 0.5),
+            )
             noisy["theta_mech_rad"] = theta + parabolas(error, sensors.parabola)
         change = projected(segment, residual(segment, model, values, noisy)) - unperturbed
         np.add.at(total, group[valid], change[valid] ** 2)
@@ -136,6 +140,17 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
         power = np.bincount(group[valid], change[valid] ** 2, len(groups))
         variance += power / np.maximum(np.bincount(group[valid], minlength=len(groups)), 1)
     return np.sqrt(variance) + 1e-300
+
+
+def _readings_error(even_rad: Array, step_rad: float, readings: int, shift: float) -> Array:
+    """Error [n, rad] of samples that are means of readings in steps of `readings` times their own,
+    taken evenly over the sample as the shaft turns.
+    """
+    turned, coarse = np.gradient(even_rad), readings * step_rad
+    places = (np.arange(readings) + 0.5) / readings - 0.5
+    errors = [rounding_error(even_rad + place * turned, coarse, shift) for place in places]
+    mean: Array = np.mean(errors, axis=0)
+    return mean
 
 
 def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:

@@ -149,7 +149,7 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
 
     A shaft that turns by nearly whole steps a sample does not show the step itself, and its
     rounding is then periodic in the angle, as an electrical order is. A drive that logs means of
-    several readings has its angle in fractions of the step.
+    n readings has its angle in fractions q of the step, with a noise of q √(n/12).
     """
     theta, step = segment.recorded.get("theta_mech_rad"), machine.encoder_rad
     theta = segment.recorded.get(UNSMOOTHED, theta)
@@ -163,7 +163,12 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
     else:
         known = segment.sensors.angle_step_rad
         step = rounding_step(theta, policy) if known is None else known
-    return replace(segment, sensors=replace(segment.sensors, angle_step_rad=step))
+    readings = 1.0
+    if step > 0.0:
+        readings = 12.0 * (segment.sensors.noise.get("theta_mech_rad", 0.0) / step) ** 2
+    count = min(max(round(readings), 1), policy.most_readings)
+    sensors = replace(segment.sensors, angle_step_rad=step, readings=count)
+    return replace(segment, sensors=sensors)
 
 
 def sparse(segment: Segment, windows: int) -> Segment:

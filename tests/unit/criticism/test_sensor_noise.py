@@ -21,7 +21,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.criticism.regression.noise_floors import noise_floor
+from pipeline.criticism.regression.noise_floors import _readings_error, noise_floor
 from pipeline.criticism.residuals.segments import _by_encoder
 from pipeline.criticism.selection.stepwise import _floor_factors
 from tests.unit.criticism.machines import BASE, coasting, log, machine
@@ -106,6 +106,23 @@ def test_a_beat_of_steps_and_sampling_is_as_loud_when_the_angle_is_rounded_anew(
 
     anew = [beat(rounding_error(even, step, random.uniform(-0.5, 0.5))) for _ in range(20)]
     assert np.mean(anew) == pytest.approx(beat(theta - moved), rel=0.3)
+
+
+def test_the_mean_of_rounded_readings_has_their_noise_and_not_that_of_its_fractions():
+    """Six readings a sample of a shaft that turns tens of steps in it: q √(6/12), not q/√12."""
+    coarse, t = 2.0 * np.pi / 4096.0, np.arange(48000) / 12000.0
+    readings = 40.0 * np.sin(6.0 * t)
+    rounded_readings = np.round(readings / coarse) * coarse
+    theta, true = (one.reshape(-1, 6).mean(axis=1) for one in (rounded_readings, readings))
+    noise = sensor_noise(theta, SENSORS)
+    sensors = Sensors({"theta_mech_rad": noise})
+    segment = replace(log(), recorded={"theta_mech_rad": theta}, sensors=sensors)
+    found = _by_encoder(segment, replace(machine(), encoder_rad=coarse / 6.0)).sensors
+    assert found.angle_step_rad == pytest.approx(coarse / 6.0)
+    assert 4 <= found.readings <= 7
+    anew = _readings_error(true, coarse / 6.0, found.readings, 0.3)
+    assert np.std(anew) == pytest.approx(np.std(theta - true), rel=0.15)
+    assert np.std(anew) > 2.0 * coarse / 6.0 / np.sqrt(12.0)
 
 
 def test_a_noisy_angle_has_no_step():
