@@ -211,7 +211,8 @@ def _in_scale(u: float, total: float, shown: Reading | None) -> str:
 
 
 def _relative(estimate: Estimate) -> str:
-    if not estimate.known or estimate.number == 0.0 or estimate.u == 0.0:
+    """U as a share of the value; empty where the value could as well be zero."""
+    if not estimate.known or estimate.u == 0.0 or 2.0 * estimate.u >= abs(estimate.number):
         return ""
     return f"{significant(200.0 * estimate.u / abs(estimate.number), 2)} %"
 

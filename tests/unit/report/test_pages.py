@@ -16,10 +16,11 @@ from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
+from pipeline.records.uncertainty import Contribution
 from pipeline.report.pages.fleet_page import page_of, render_fleet
 from pipeline.report.pages.motor_page import render_motor
 from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
-from pipeline.views.motor import conditions, kind_of, parts_of
+from pipeline.views.motor import _relative, conditions, kind_of, parts_of
 from tests.unit.report.conftest import flat
 
 VOID = {"meta", "br", "input", "path", "rect", "circle"}
@@ -157,6 +158,13 @@ def test_what_u_comes_from_is_a_bar_that_adds_up(
 )
 def test_a_source_of_uncertainty_in_a_word(source: str, kind: str) -> None:
     assert kind_of(source) == kind
+
+
+@pytest.mark.parametrize(("u", "share"), [(0.01, "2.0 %"), (0.49, "98 %"), (0.5, ""), (1.0, "")])
+def test_a_value_that_could_be_zero_has_no_share(u: float, share: str) -> None:
+    """An imbalance of 0.0007 ± 0.0014 was shown as known to 210 %."""
+    parts = (Contribution("scatter", u, "A", 40.0),)
+    assert _relative(Estimate("resistance_imbalance", 1.0, "1", "measured", "m", parts)) == share
 
 
 def test_what_failed_is_a_card_above_the_constants(
