@@ -61,8 +61,7 @@ class Projection:
 
         """
         windows = sliding_window_view(residuals, self.length, axis=1)[:, self.starts, :]
-        by_window = np.ascontiguousarray(windows.transpose(1, 2, 0))
-        projected: Array = np.matmul(self.functions, by_window).transpose(2, 0, 1)
+        projected: Array = np.matmul(self.functions, windows.transpose(1, 2, 0)).transpose(2, 0, 1)
         return projected
 
     def means(self, signals: Array) -> Array:

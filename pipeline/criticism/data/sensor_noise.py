@@ -356,7 +356,10 @@ def is_rounded(signal: Array, step: float, policy: SensorNoise) -> bool:
     """
     if step <= 0.0 or float(np.ptp(signal)) < policy.moving * step:
         return False
-    return abs(complex(np.exp(2j * np.pi / step * signal).mean())) > policy.in_step
+    turns = signal / step
+    # in single precision, as above
+    phase = (2.0 * np.pi * (turns - np.round(turns))).astype(np.float32)
+    return math.hypot(np.cos(phase).mean(), np.sin(phase).mean()) > policy.in_step
 
 
 def _rounding(third: Array) -> float:

@@ -122,7 +122,7 @@ def state(segment: Segment, signals: Signals, model: Model, values: Values) -> O
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     x = operating(segment, signals, model, values, current, motion)
     volts = (signals["vd_v"] + 1j * signals["vq_v"]).astype(np.complex128)
-    volts = volts / (1.0 + values[segment.instrument.meter])
+    volts = volts * (1.0 / (1.0 + values[segment.instrument.meter]))
     if segment.instrument.frame:
         turn = model.machine.pole_pairs * motion.omega_rad_s * x.supply.hold_s
         volts = volts * np.exp(-1j * segment.instrument.frame * turn)
@@ -225,7 +225,9 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
         mean = mean + lead * x.supply.hold_s / segment.ts_s * np.gradient(mean)
     if shift:
         psi = ahead(pieces.psi_wb) if is_held else pieces.psi_wb
-        mean = mean - shift * 1j * psi * np.gradient(x.machine.pole_pairs * x.omega_rad_s)
+        pairs, speed = x.machine.pole_pairs, x.omega_rad_s
+        gathers = x.once(x.theta_rad, "gathers", lambda: np.gradient(pairs * speed))
+        mean = mean - shift * 1j * psi * gathers
     return mean
 
 

@@ -498,14 +498,14 @@ def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values)
         In A.
 
     """
-    gain = 1.0 + values[ammeter]
+    gain = 1.0 / (1.0 + values[ammeter])
     ahead = recorded.ahead
-    recorded = replace(recorded, i_a=recorded.i_a / gain)
+    recorded = replace(recorded, i_a=gain * recorded.i_a)
     if ahead is not None:
 
         def scaled(delay_s: float) -> tuple[Complex, Array, Array]:
             current, torque, turned = ahead(delay_s)
-            return current / gain, torque, turned
+            return gain * current, torque, turned
 
         recorded = replace(recorded, ahead=scaled)
     for effect in model.effects:

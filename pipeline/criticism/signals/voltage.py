@@ -128,7 +128,7 @@ def central(signal: Any, period_s: float) -> Any:
 
     """
     slope = np.zeros_like(signal)
-    slope[1:-1] = (signal[2:] - signal[:-2]) / (2 * period_s)
+    slope[1:-1] = (signal[2:] - signal[:-2]) * (0.5 / period_s)
     return slope
 
 
@@ -185,7 +185,7 @@ def forward(signal: Any, period_s: float) -> Any:
 
     """
     slope = np.zeros_like(signal)
-    slope[:-1] = np.diff(signal) / period_s
+    slope[:-1] = np.diff(signal) * (1.0 / period_s)
     return slope
 
 
