@@ -304,4 +304,5 @@ def percent(now: float, before: float) -> str:
     """
     if before <= 0.0:
         return ""
-    return f"{100.0 * (now / before - 1.0):+.0f} %".replace("-", MINUS)
+    change = f"{100.0 * (now / before - 1.0):+.0f}"
+    return "0 %" if change in ("+0", "-0") else f"{change} %".replace("-", MINUS)

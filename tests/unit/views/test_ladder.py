@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from pipeline.records.diagnosis import Diagnosis, RankedEffect, Separation, StepRecord
 from pipeline.report.text.ladder_text import ladder_text
-from pipeline.views.ladder import headline, ladder_view, mapped_signals, shown_signals
+from pipeline.views.ladder import headline, ladder_view, mapped_signals, percent, shown_signals
 from tests.unit.ladders import make_diagnosis, make_step
 
 
@@ -105,3 +105,12 @@ def test_the_signal_farthest_over_its_floor_comes_first_and_one_without_map_last
 
 def test_a_terminal_says_the_same() -> None:
     assert "Encoder disc off-centre" in ladder_text(two())
+
+
+def test_a_change_that_rounds_to_nothing_has_no_sign() -> None:
+    assert [percent(now, 1.0) for now in (0.999, 1.0, 1.001, 0.9, 1.1)] == [
+        *["0 %"] * 3,
+        "−10 %",
+        "+10 %",
+    ]
+    assert percent(1.0, 0.0) == ""
