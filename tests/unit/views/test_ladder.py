@@ -91,7 +91,7 @@ def test_steps_tell_what_came_its_numbers_and_the_fall() -> None:
     cells = [cell for cell in last.errors if cell is not None]
     assert [(c.signal, c.rmse, c.floor, c.ratio, c.change) for c in cells] == [
         ("v_q", "2.60 mV", "2.00 mV", "1.30", "−98 %"),
-        ("line voltage", "500 µV", "500 µV", "1.00", "+0 %"),
+        ("line voltage", "500 µV", "500 µV", "1.00", "0 %"),
     ]
     gone = replace(make_diagnosis(), ladder=(make_step(("dead_time",), 1.0), make_step((), 1.0)))
     assert ladder_view(gone).steps[1].title == "− dead_time"
