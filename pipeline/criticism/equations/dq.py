@@ -289,7 +289,6 @@ EQUATION = Equation(
             *(
                 "ripple_slope",
                 "ripple_mean",
-                "ripple_pulses",
                 "ripple_edge",
                 "ripple_shift",
                 "frame_lag_s",
@@ -302,7 +301,9 @@ EQUATION = Equation(
         torque_in=TORQUE,
     ),
     recorder="log",
-    sensing=Sensing(_reading, frozenset({"voltage_jumps", "encoder_lines", "standstill"})),
+    sensing=Sensing(
+        _reading, frozenset({"voltage_jumps", "encoder_lines", "standstill", "pulses"})
+    ),
     use=Use(
         shows=frozenset({"current", "turning"}),
         warms=frozenset({"drop", "flux"}),

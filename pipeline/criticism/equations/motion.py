@@ -147,14 +147,14 @@ EQUATION = Equation(
     observes=Observes(
         (
             *("ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad"),
-            *("ripple_mean", "ripple_pulses", "ripple_torque", *STATE),
+            *("ripple_mean", "ripple_torque", *STATE),
         ),
         hooks=frozenset({"flux", "torque"}),
         sensors=frozenset({"angle", "current", "clock"}),
         form="affine",
     ),
     recorder=RECORDER,
-    sensing=Sensing(_reading, frozenset({"standstill", "current_jumps"})),
+    sensing=Sensing(_reading, frozenset({"standstill", "current_jumps", "pulses"})),
     use=Use(warms=frozenset({"flux"})),
     # behind the voltage of the same log
     rank=1,

@@ -85,9 +85,6 @@ BASE: tuple[Constant, ...] = (
     Constant("b_nm_s_rad", "N·m·s/rad", "viscous friction", hook="torque"),
     Constant("ripple_slope", "1", "T_s, mean current before the sample", hook="hold"),
     Constant("ripple_mean", "1", "(ω_e T_s)² ψ/L, ripple of the current", 0.02, hook="hold"),
-    Constant(
-        "ripple_pulses", "1", "R (T_s/L)² of the voltage, lag of a ripple", 0.005, hook="hold"
-    ),
     Constant("ripple_edge", "1", "(ω_e T_s)² of the voltage, what a mean misses", hook="hold"),
     Constant("ripple_shift", "1", "T_s dω_e/dt ψ, angle against voltage", hook="hold"),
     Constant("frame_lag_s", "s", "lag of the speed that a drive turns its voltage by", hook="hold"),
@@ -436,9 +433,6 @@ def air_gap_torque(x: Operating, psi_wb: Complex, slope_wb: Array) -> Array:
     return torque
 
 
-_OF_THE_CURRENT = ("ripple_slope", "ripple_mean", "ripple_pulses")
-
-
 def mean_current(x: Operating, values: Values) -> Operating:
     """Where the drops of a sample period act: at its mean current, not at the sampled one.
 
@@ -447,7 +441,7 @@ def mean_current(x: Operating, values: Values) -> Operating:
     x
         State at the samples [n].
     values
-        With the nuisances `ripple_slope`, `ripple_mean` and `ripple_pulses` [1].
+        With the nuisances `ripple_slope` and `ripple_mean` [1].
 
     Returns
     -------
@@ -461,7 +455,7 @@ def mean_current(x: Operating, values: Values) -> Operating:
     its samples. The nuisances of the fit say by how much.
 
     """
-    if not x.inverter or not any(values[name] for name in _OF_THE_CURRENT):
+    if not x.inverter or not (values["ripple_slope"] or values["ripple_mean"]):
         return x
     current = x.i_a
     slope = np.zeros(current.shape, dtype=complex)
@@ -505,21 +499,13 @@ def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]
     A voltage v that is held for T while the rotor turns by φ = ω_e T makes the flux ripple by
     v T φ; the means are `part` of that below, −j v T φ with v = R i + j ω_e ψ.
 
-    Pulses make the current ripple about the zero vectors, where it is sampled. Without resistance
-    their mean there is none. The drop of the ripple makes one of R T² v/(96 L²), less where the
-    pulses fill the period, above the samples: `ripple_pulses` has it, for a log may hold means.
-
     """
-    hold_s, r_ohm = x.supply.hold_s, values["r_ohm"]
+    hold_s = x.supply.hold_s
     turn = x.machine.pole_pairs * x.omega_rad_s * hold_s
-    # the voltage that is held, times T
-    held = hold_s * r_ohm * x.i_a + 1j * turn * base_flux(x, values)
-    flux = -1j * part * turn * held
+    flux = part * turn * (turn * base_flux(x, values) - 1j * hold_s * values["r_ohm"] * x.i_a)
     # what no capture determines is zero
     l_d, l_q = values["ld_h"] or math.inf, values["lq_h"] or math.inf
-    lag = values["ripple_pulses"] * r_ohm * hold_s
-    d = flux.real / l_d - lag * held.real / l_d**2
-    return flux, d + 1j * (flux.imag / l_q - lag * held.imag / l_q**2)
+    return flux, flux.real / l_d + 1j * flux.imag / l_q
 
 
 HOOKS = frozenset({"flux", "drop", "torque"})

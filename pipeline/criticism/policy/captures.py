@@ -291,10 +291,6 @@ class Priors:
         0.04, "(ω_e T_s)² ψ/L", "ripple of the current beside its centre, 0.02",
         source="from −1/24 to 1/12, as the log samples between two changes of voltage or at them",
     )  # fmt: skip
-    ripple_pulses: float = derived(
-        0.003, "R (T_s/L)² of the voltage", "lag of a ripple beside its centre, 0.005",
-        source="uniform from 0, of a log of means, to 1/96, of samples at little voltage",
-    )  # fmt: skip
     ripple_edge: float = derived(
         0.08, "(ω_e T_s)² of the voltage", "what a mean of the voltage misses",
         source="1/12, of a log that samples at the changes of the voltage",

@@ -137,6 +137,10 @@ class NoiseFloors:
         8.0, "standard deviations of noise", "bend of the voltage from which on it is a jump",
         source="white noise comes to 6 in a log of 1e5 samples",
     )  # fmt: skip
+    pulses: float = derived(
+        0.006, "R (T/L)² of the EMF", "mean of a pulsed current above its samples",
+        source="1/(96 √3): uniform from 0, of a log of means, to 1/96, at little voltage",
+    )  # fmt: skip
     jump_periods: float = calibrated(
         0.25, "sample periods", "what a jump's instant is known to",
         by="python -m tests.benchmark",

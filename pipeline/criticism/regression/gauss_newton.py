@@ -1,7 +1,9 @@
 """Fits by Gauss-Newton: from orders of magnitude, and from a fit that is near.
 
 References: [1] Marquardt, SIAM J. Appl. Math. 11 (1963), a ridge for steps that reach too far; [2]
-Ortega & Rheinboldt, Iterative Solution of Nonlinear Equations (1970), ch. 7, the chord method.
+Ortega & Rheinboldt, Iterative Solution of Nonlinear Equations (1970), ch. 7, the chord method; [3]
+Chamberlain, Powell, Lemarechal & Pedersen, Math. Program. Stud. 16 (1982), the watchdog technique:
+a step that does harm may be followed by one that more than mends it.
 """
 
 from __future__ import annotations
@@ -88,6 +90,9 @@ def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
             halvings = policy.halvings if fresh else 1
             tried, promised = _tried(system, step, halvings)
             gain = system.deviance - tried.deviance
+            if fresh and gain < policy.kept_share * promised:
+                tried = _over_the_ridge(system, step, tried)
+                gain = system.deviance - tried.deviance
             if gain > 0:
                 system = tried
             fresh = fresh and gain <= 0
@@ -112,6 +117,19 @@ def _tried(system: LinearSystem, step: Array, halvings: int) -> tuple[LinearSyst
             break
         step = policy.shortening * step
     return tried, promised
+
+
+def _over_the_ridge(system: LinearSystem, step: Array, shortened: LinearSystem) -> LinearSystem:
+    """The system after the whole of a step and another from there, if that is better than the
+    shortened one [3].
+
+    A product of two parameters that a capture knows well, such as a coast's friction and its share,
+    is a narrow curve: short steps creep along it, and two whole ones are next to its end.
+    """
+    beyond = linear_system(system.fit.moved(system.columns, step), before=system)
+    further = bounded_step(_damped(beyond), beyond.columns, beyond.fit.model, beyond.fit.values)
+    end, _ = _tried(beyond, further, 1)
+    return min(shortened, end, key=lambda one: one.deviance)
 
 
 def _damped(system: LinearSystem) -> Best:

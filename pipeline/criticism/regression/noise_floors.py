@@ -358,11 +358,31 @@ def _of_torque(segment: Segment, model: Model, values: Values) -> Array | float:
     if "standstill" in errors:
         x = operate(segment, segment.recorded, model, values)
         total[:, 0] = np.hypot(total[:, 0], _at_rest(segment, model, values, x))
+    if "pulses" in errors:
+        total[:, 0] = np.hypot(total[:, 0], _of_pulses(segment, model, values, x))
     if "current_jumps" in errors:
         kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
         jumps = kt * _jumps(segment, "id_a", "iq_a", policy)
         total = np.hypot(total, jumps[:, None])
     return total / reported_unit(segment, values)
+
+
+def _of_pulses(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
+    """Torque [W] of what the mean of a pulsed current may be above its samples, as weak samples.
+
+    Pulses make the current ripple about the zero vectors, where a drive samples it. Without
+    resistance the mean of the ripple there is none. Its drop makes one, of up to R T² v/(96 L²):
+    a tenth of the friction current where a period is a quarter of L/R. A log may hold means.
+    """
+    weak, l_q = segment.weak, values["lq_h"]
+    period_s = x.supply.pwm_s or x.supply.hold_s
+    if weak is None or not l_q or not period_s:
+        return np.zeros(segment.size if weak is None else weak.starts.size)
+    pairs, finer = model.machine.pole_pairs, x.theta_rad.size // segment.size
+    emf_v = pairs * values["psi_wb"] * x.omega_rad_s[::finer]
+    share = model.policy.noise_floors.pulses * (period_s / l_q) ** 2 * values["r_ohm"]
+    torque = 1.5 * pairs * values["psi_wb"] * share * emf_v
+    return np.abs(weak.project(torque[None])[0, :, 0])
 
 
 def steep_drops(model: Model, values: Values, x: Operating) -> Complex:

@@ -12,7 +12,7 @@ from pipeline.criticism.operating import Array, Complex, Operating, Recorded, Si
 from pipeline.criticism.signals.true_state import ahead_in
 from pipeline.criticism.signals.voltage import central
 
-TORQUE_RIPPLES = ("ripple_mean", "ripple_pulses", "ripple_torque", "ripple_held")
+TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
 """Nuisances of the current's ripple that are in the torque (`model.BASE`)."""
 
 

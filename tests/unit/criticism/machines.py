@@ -24,7 +24,6 @@ BASE = {
     "b_nm_s_rad": 2.2e-5,
     "ripple_slope": 0.0,
     "ripple_mean": 0.0,
-    "ripple_pulses": 0.0,
     "ripple_edge": 0.0,
     "ripple_shift": 0.0,
     "frame_lag_s": 0.0,
