@@ -104,7 +104,7 @@ def test_a_gap_of_half_a_cycle_parts_a_run(lost: int, parted: bool) -> None:
     keep = np.ones(200, dtype=bool)
     keep[100 : 100 + lost - 1] = False
     t, vector = t[keep], vector[keep]
-    found = _unbroken(t, vector, np.ones(t.size, dtype=bool))
+    found = list(_unbroken(t, vector, np.ones(t.size, dtype=bool)))
     assert found == ([(0, 100), (100, t.size)] if parted else [(0, t.size)])
 
 
@@ -113,13 +113,13 @@ def test_rows_at_rest_part_runs_and_a_late_row_does_not() -> None:
     vector = np.exp(0.9j * math.pi * np.arange(30))
     moving = np.ones(30, dtype=bool)
     moving[10:13] = False
-    assert _unbroken(t, vector, moving) == [(0, 10), (13, 30)]
+    assert list(_unbroken(t, vector, moving)) == [(0, 10), (13, 30)]
     late = t.copy()
     late[20:] += 0.45e-3  # more than half a cycle, yet within 1.5 sampling intervals
-    assert _unbroken(late, vector, np.ones(30, dtype=bool)) == [(0, 30)]
+    assert list(_unbroken(late, vector, np.ones(30, dtype=bool))) == [(0, 30)]
     late[20:] += 0.1e-3
-    assert _unbroken(late, vector, np.ones(30, dtype=bool)) == [(0, 20), (20, 30)]
-    assert _unbroken(t, vector, np.zeros(30, dtype=bool)) == []
+    assert list(_unbroken(late, vector, np.ones(30, dtype=bool))) == [(0, 20), (20, 30)]
+    assert list(_unbroken(t, vector, np.zeros(30, dtype=bool))) == []
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
