@@ -125,9 +125,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         fit = at_better_place(reconsidered(_backward(chosen, base))).fit
         effects = fit.model.effects[base:]
         fit = replace(fit, tolerance=tolerances(fit, effects))
-        if effects and (
-            effects[-1].hook in ("sensor", "drop") or effects[-1].discriminator is not None
-        ):
+        if effects:
             fit = _floored_anew(fit)
         if tuple(e.name for e in effects) in {r.added for r in steps}:
             break
@@ -155,13 +153,13 @@ def _may_join(score: Score, inside: Set[object], couplings: bool) -> bool:
 
 
 def _floored_anew(fit: Fit) -> Fit:
-    """The fit by noise floors made anew, now that a sensor's effect, a drop or a coupling is in.
+    """The fit by noise floors made anew, now that another effect is in.
 
     If no floor changes by half and nothing is left over them, the fit stays as it is. If a rough
     fit finds another inertia, a fit is begun there as well and the better one stays. Undoing a
     sensor's lag adds noise, so does a twist derived from an angle, and so do the edges of a
-    dead time. An encoder off its centre drives J to next to nothing, and the
-    floors were made with that J.
+    dead time. An encoder off its centre drives J to next to nothing, an unbalance to six times what
+    it is, and the floors were made with that J.
     """
     policy = fit.policy.selection
     floor = floors(fit.segments, fit.model, fit.values)

@@ -16,6 +16,7 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.stepwise import (
+    _floored_anew,
     _form_error_factors,
     _same_hook,
     material,
@@ -168,6 +169,20 @@ def test_windage_is_found_with_its_size():
     steps = search(fitted(segments), LIBRARY)
     assert steps[-1].added == ("windage",)
     assert steps[-1].fit.values["windage.drag_nm"] == pytest.approx(0.034, rel=0.05)
+
+
+def test_the_fit_is_looked_at_anew_whatever_joins(monkeypatch):
+    """An unbalance had driven J to six times what it is, and the fit stayed there with it."""
+    asked = []
+
+    def spy(fit):
+        asked.append(fit.model.effects[-1].name)
+        return _floored_anew(fit)
+
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise._floored_anew", spy)
+    steps = search(fitted((with_drag(curved(0.1)), with_drag(curved(0.1), 6))), LIBRARY)
+    assert steps[-1].added == ("windage",)
+    assert asked == ["windage"]
 
 
 def test_two_effects_are_found_whatever_their_order():
