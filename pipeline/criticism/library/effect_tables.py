@@ -75,7 +75,7 @@ def effect_tables(
         else:
             machine = Machine(pole_pairs, None, model.scales)
             q = dict.fromkeys(_names(library[name], machine), 0.0) | known
-            tables_of_effect = _tables(library[name], _over_all_ranges(machine, base), q)
+            tables_of_effect = _tables(library[name], over_all_ranges(machine, base), q)
             tables += tables_of_effect
             if not tables_of_effect:
                 without[name] = _why_not(library[name])
@@ -93,8 +93,17 @@ def _why_not(effect: Effect) -> str:
     return "it needs more than a table over speed, angle or currents"
 
 
-def _over_all_ranges(machine: Machine, base: Mapping[str, float]) -> Operating:
-    """States of the machine all over its range [n], no two variables in step."""
+def over_all_ranges(machine: Machine, base: Mapping[str, float]) -> Operating:
+    """States of the machine all over its range [n], no two variables in step.
+
+    Parameters
+    ----------
+    machine
+        Its scales.
+    base
+        `r_ohm`, `ld_h`, `lq_h`, `psi_wb` of the motor, in their units.
+
+    """
     rng = np.random.default_rng(1)
     current, speed = machine.scales["current_a"], machine.scales["speed_rad_s"]
     draw = rng.uniform(-1.0, 1.0, (7, _PROBES))
@@ -168,7 +177,7 @@ def _torque_table(effect: str, hook: TorqueHook, x: Operating, q: Values) -> Eff
         name, axis = "omega_mech_rad_s", {"omega_rad_s": grid}
     else:
         return None
-    values = drag(_at_rest(x, grid.size, **axis))
+    values = drag(at_rest(x, grid.size, **axis))
     if not np.any(values):
         return None
     axes = {name: _floats(grid)}
@@ -193,7 +202,7 @@ def _flux_tables(effect: Effect, x: Operating, q: Values) -> list[EffectTable]:
         return []
     grid = np.linspace(-1.0, 1.0, _CURRENTS) * x.machine.scales["current_a"]
     d, i = (one.ravel() for one in np.meshgrid(grid, grid, indexing="ij"))
-    flux, _ = effect_flux(effect, _at_rest(x, d.size, id_a=d, iq_a=i), q)
+    flux, _ = effect_flux(effect, at_rest(x, d.size, id_a=d, iq_a=i), q)
     axes = {"id_a": _floats(grid), "iq_a": _floats(grid)}
     return [
         EffectTable(effect.name, name, "Wb", axes, _floats(part))
@@ -205,8 +214,19 @@ def _packed(flux: Any) -> Array:
     return np.stack([flux.real, flux.imag])
 
 
-def _at_rest(x: Operating, size: int, **changed: Array) -> Operating:
-    """The machine at 25 °C without current or motion, but for what is changed."""
+def at_rest(x: Operating, size: int, **changed: Array) -> Operating:
+    """The machine at 25 °C without current or motion, but for what is changed.
+
+    Parameters
+    ----------
+    x
+        A state, of `over_all_ranges`.
+    size
+        Number of states n.
+    **changed
+        Variables that are not 0 [n].
+
+    """
     zeros = {name: np.zeros(size) for name in (*_VARIABLES, "freq_hz")}
     return _fresh(x, **{**zeros, "travel_rad": np.full(size, math.inf), **changed})
 

@@ -11,13 +11,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.criticism.effect import Effect
+from pipeline.criticism.library.effect_tables import at_rest, over_all_ranges
 from pipeline.criticism.machine.model import base_flux
-from pipeline.criticism.operating import Array, Operating, ShaftState, Values
+from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.model_verdict import Parameters
 
 _SPEEDS = 64
+_MAGNET_ALONE = {"psi_wb": 1.0, "ld_h": 1.0, "lq_h": 1.0, "r_ohm": 1.0}
+"""Constants of a machine whose flux is told in that of its magnet."""
 _FORMS = (("torque_coulomb_nm", "N·m"), ("b_visc_nm_s_rad", "N·m·s/rad"))
 
 
@@ -70,7 +73,8 @@ def _projected(effect: Effect, values: Values, machine: Machine) -> Array:
     """T_c [N·m] and b [N·m·s/rad] of the drag."""
     highest = machine.scales["speed_rad_s"]
     speeds = highest * (np.arange(_SPEEDS) + 0.5) / _SPEEDS
-    x = _at_no_current(machine, speeds)
+    x = at_rest(over_all_ranges(machine, _MAGNET_ALONE), _SPEEDS, omega_rad_s=speeds)
+    x.psi_wb, x.torque_em_nm = base_flux(x, _MAGNET_ALONE), np.zeros(_SPEEDS)
     assert effect.torque is not None
     drag = effect.torque(x, values) + np.zeros(_SPEEDS)
     forms = np.column_stack([np.ones(_SPEEDS), speeds])
@@ -78,27 +82,3 @@ def _projected(effect: Effect, values: Values, machine: Machine) -> Array:
     # rounding of the one form in a drag that has only the other
     least = 1e-9 * np.max(np.abs(drag), initial=0.0) / np.array([1.0, highest])
     return np.where(np.abs(solved) > least, solved, 0.0)
-
-
-def _at_no_current(machine: Machine, speeds_rad_s: Array) -> Operating:
-    zeros = np.zeros(speeds_rad_s.size)
-    base = {"psi_wb": 1.0, "ld_h": 1.0, "lq_h": 1.0, "r_ohm": 1.0}
-    x = Operating(
-        machine=machine,
-        base=base,
-        id_a=zeros,
-        iq_a=zeros,
-        eps_rad=zeros,
-        theta_rad=zeros,
-        omega_rad_s=speeds_rad_s,
-        winding_k=zeros,
-        magnet_k=zeros,
-        travel_rad=np.full(zeros.size, np.inf),
-        inverter=False,
-        freq_hz=zeros,
-        ts_s=machine.scales["period_s"],
-        shaft=ShaftState(held=True),
-    )
-    x.psi_wb = base_flux(x, base)
-    x.torque_em_nm = zeros
-    return x

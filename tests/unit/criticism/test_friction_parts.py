@@ -19,7 +19,8 @@ from pipeline.records.uncertainty import type_b
 
 B, DRY = "b_visc_nm_s_rad", "torque_coulomb_nm"
 HIGHEST_RAD_S = 400.0
-MACHINE = Machine(4, None, {"speed_rad_s": HIGHEST_RAD_S, "period_s": 1e-4, "torque_nm": 2.0})
+SCALES = {"speed_rad_s": HIGHEST_RAD_S, "period_s": 1e-4, "torque_nm": 2.0}
+MACHINE = Machine(4, None, {**SCALES, "current_a": 10.0, "freq_hz": 250.0})
 EDDY = {
     "drag_nm": ReportedParameter(0.08, 0.004, "N·m"),
     "parallel": ReportedParameter(1.0, 0.0, "1"),

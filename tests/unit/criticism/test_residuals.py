@@ -313,13 +313,12 @@ def test_the_drop_of_a_ripple_is_within_what_a_drive_may_be_off_by(size_v, least
 
 def test_a_drive_is_allowed_the_drop_of_a_ripple_where_a_period_is_no_small_part_of_l_over_r():
     """T R/L of the base is a twentieth; at a tenth of the inductance it is a half."""
-    segment = log()
+    segment = replace(log(), fixed={**log().fixed, "pwm_s": 5e-5})
     little = {**BASE, "lq_h": 0.1 * BASE["lq_h"]}
     usual, large = (reading_error(segment, PLAIN, v)[2, :, 0] for v in (BASE, little))
     speed = np.abs(np.gradient(segment.recorded["theta_mech_rad"], segment.ts_s)).max()
-    period_s = segment.fixed.get("pwm_s", segment.ts_s)
     emf = 7.0 * BASE["psi_wb"] * speed
-    current = 0.006 * BASE["r_ohm"] * (period_s / little["lq_h"]) ** 2 * emf
+    current = 0.006 * BASE["r_ohm"] * (5e-5 / little["lq_h"]) ** 2 * emf
     gain = segment.weak.functions[0, 0].sum()
     torque = 10.5 * BASE["psi_wb"] * current * gain
     assert large.max() == pytest.approx(torque, rel=0.2)
