@@ -116,7 +116,7 @@ def _unreleased(version: Version, settings: ExportSettings) -> UsageError:
     name = f"motor {version.motor_id!r} revision {version.revision}"
     points = "; ".join(version.open_points[:3])
     approve = f"registry approve {shlex.quote(version.motor_id)} revision={version.revision} "
-    approve += f"by=NAME why=REASON output={shlex.quote(settings.output)}"
+    approve += f"by=NAME why=REASON{naming(settings)}"
     remedy = "complete it first" if points else f"`{approve}` releases it"
     why = f": {points}" if points else ""
     return UsageError(f"{name} is {version.status}, not released{why}", remedy)

@@ -76,14 +76,22 @@ def _list(registry: Registry, settings: RegistrySettings) -> Outcome:
 def _show(registry: Registry, settings: RegistrySettings) -> Outcome:
     version = _version(registry, settings, newest=True)
     (sheet,) = registry.datasheets([version])
-    text, motor = datasheet_text(version, sheet), shlex.quote(version.motor_id)
-    next_ = f"registry approve {motor} revision={version.revision} by=NAME why=REASON"
+    text = datasheet_text(version, sheet)
+    return Outcome(text=text, result=sheet.document(), next=_next(version, settings))
+
+
+def _next(version: Version, settings: RegistrySettings) -> str:
+    """What a version is good for as it stands: to be exported, completed or approved."""
+    motor = shlex.quote(version.motor_id)
+    if version.status == "revoked":
+        return f"registry list {motor}{naming(settings)}"
     if version.status == "released":
-        next_ = f"export json {motor} revision={version.revision}"
-    elif version.open_points:
-        plan = f"plan motor={motor} output={shlex.quote(settings.output)}"
-        return Outcome(text=text, result=sheet.document(), next=plan)
-    return Outcome(text=text, result=sheet.document(), next=next_ + naming(settings))
+        return f"export json {motor} revision={version.revision}{naming(settings)}"
+    if version.open_points:
+        return f"plan motor={motor} output={shlex.quote(settings.output)}"
+    return (
+        f"registry approve {motor} revision={version.revision} by=NAME why=REASON{naming(settings)}"
+    )
 
 
 def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -96,7 +104,8 @@ def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
         pair.append(one_of([v for v in history if wanted.takes(v)], wanted, registry.place))
     one, other = registry.datasheets(pair)
     differences = changes(one.constants, other.constants)
-    return Outcome(text=difference_text(pair[0], pair[1], differences), result=differences)
+    text = difference_text(pair[0], pair[1], differences)
+    return Outcome(text=text, result=differences, next=_next(pair[1], settings))
 
 
 def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -116,10 +125,16 @@ def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
     valid = sum(version is not None for _, version, _ in rows)
     text = f"{counted(len(rows), 'motor')}, {valid} with a released datasheet at {when(until)}"
     current = [{"motor_id": motor_id, "in_force": version} for motor_id, version, _ in rows]
-    return Outcome(text="\n".join([in_force_table(rows), "", text]), result=current)
+    motor_id, version, last = next((row for row in rows if row[1] is not None), rows[0])
+    shown = f"{shlex.quote(motor_id)} revision={(version or last).revision}"
+    return Outcome(
+        text="\n".join([in_force_table(rows), "", text]),
+        result=current,
+        next=f"registry show {shown}{naming(settings)}",
+    )
 
 
-def _verify(registry: Registry, _: RegistrySettings) -> Outcome:
+def _verify(registry: Registry, settings: RegistrySettings) -> Outcome:
     broken = registry.verify()
     count = f"{counted(broken.versions, 'version')}, {counted(broken.decisions, 'decision')}"
     faults = counted(len(broken.faults), "mismatch")
@@ -129,7 +144,8 @@ def _verify(registry: Registry, _: RegistrySettings) -> Outcome:
         *(f"note: {n}" for n in broken.notes),
     )
     text = f"{registry.place}: {count}, {verdict}"
-    return Outcome(1 if broken.faults else 0, text, errors, result=broken)
+    next_ = f"registry list{naming(settings)}"
+    return Outcome(1 if broken.faults else 0, text, errors, result=broken, next=next_)
 
 
 def _decide(
@@ -148,14 +164,7 @@ def _decide(
     except PipelineError as error:
         failed = f"error: decided, but not shown: {error}; `run` again shows it"
         return Outcome(error.exit_code, "\n".join(lines), (failed,))
-    motor = shlex.quote(version.motor_id)
-    return Outcome(
-        text="\n".join(lines),
-        result=version,
-        next=f"export json {motor} revision={version.revision}{naming(settings)}"
-        if version.status == "released"
-        else "",
-    )
+    return Outcome(text="\n".join(lines), result=version, next=_next(version, settings))
 
 
 def _name(kind: Literal["tag", "untag"], registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -176,8 +185,10 @@ def _name(kind: Literal["tag", "untag"], registry: Registry, settings: RegistryS
     changed = registry.tag(kind, chosen, tag, by, datetime.now(UTC))
     one = "s" if len(chosen) == 1 else ""
     done = f"now bear{one}" if kind == "tag" else f"no longer bear{one}"
+    use = f"regress baseline=tag:{tag} candidate=lot:LOT" if kind == "tag" else "registry list"
     return Outcome(
-        text=f"{counted(len(chosen), 'version')} {done} the tag {tag}, {changed} of them changed"
+        text=f"{counted(len(chosen), 'version')} {done} the tag {tag}, {changed} of them changed",
+        next=f"{use}{naming(settings)}",
     )
 
 

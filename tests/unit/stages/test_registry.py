@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 from datetime import UTC, datetime
 from pathlib import Path
@@ -9,12 +10,15 @@ from pathlib import Path
 import pytest
 
 from pipeline.__main__ import main
+from pipeline.cli.commands import COMMANDS
 from pipeline.io.registry.store import Registry
 from pipeline.records.errors import UsageError
 from pipeline.stages.registry import moment
 from tests.registered import HOUR, NOON, document, version_of
 
 SERIAL = "joint/7\x1b[31m"
+ESCAPED = r"joint/7\x1b[31m"
+WHO = ("by=A. Smith", "why=bench 2 agrees")
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +81,7 @@ def test_diff_in_units_of_uncertainty(place: str, capsys: pytest.CaptureFixture[
     code, out, _ = told(capsys, place, "diff", SERIAL, "from=1", "to=2")
     assert code == 0
     lines = out.splitlines()
-    assert max(map(len, lines)) <= 80
+    assert max(map(len, lines[:-1])) <= 80
     words = [w for line in lines if line.startswith("r_phase_ohm") for w in line.split()[1:]]
     assert words[-4:] == ["+10.0", "m\u03a9", "+14.14", "+23.57"]
     unknown = [w for line in lines if line.startswith("j_rotor_kgm2") for w in line.split()[1:]]
@@ -123,6 +127,34 @@ def test_verify(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert code == 1
     assert "4 mismatches" in out
     assert err.count("mismatch: _versions/") == 4
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["list"], "registry show 00123 registry={}"),
+        (["show", "00123"], "registry approve 00123 revision=1 by=NAME why=REASON registry={}"),
+        (["diff", SERIAL, "from=1", "to=2"], f"registry approve '{ESCAPED}' revision=2 "),
+        (["diff", SERIAL, "from=2", "to=3"], f"plan motor='{ESCAPED}' output=reports/demo"),
+        (["at", "2999-01-01"], "registry show 00123 revision=1 registry={}"),
+        (["verify"], "registry list registry={}"),
+        (["tag", "00123", "tag=gold", "by=A"], "regress baseline=tag:gold candidate=lot:LOT "),
+        (["untag", "00123", "tag=gold", "by=A"], "registry list registry={}"),
+        (["approve", "00123", "revision=1", *WHO], "export json 00123 revision=1 registry={}"),
+        (["revoke", "00123", "revision=1", *WHO], "registry list 00123 registry={}"),
+    ],
+)
+def test_every_action_ends_with_the_next_command(
+    place: str, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    """It names the registry that was worked on, and is one of the command line's own."""
+    code, out, err = told(capsys, place, *words)
+    assert (code, err) == (0, "")
+    program, _, command = out.splitlines()[-1].removeprefix("next: ").partition("pipeline ")
+    assert program == "python -m "
+    assert command.startswith(said.format(place))
+    assert place in command or command.startswith("plan")
+    assert shlex.split(command)[0] in COMMANDS
 
 
 @pytest.mark.parametrize(
