@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from html.parser import HTMLParser
 from itertools import pairwise
@@ -341,6 +342,24 @@ def test_an_empty_fleet_says_why() -> None:
     text = squeezed(Page(render_fleet([], FINDINGS)).text)
     assert "No datasheet came out" in text
     assert "the file ends early" in text
+
+
+@pytest.mark.parametrize("findings", [(), FINDINGS[:1], FINDINGS])
+def test_a_count_leads_to_what_it_counts_and_none_to_nothing(
+    datasheet: Datasheet, findings: Sequence[Finding]
+) -> None:
+    """A link within the page ends at a section that is there; a count of nothing has neither."""
+    page = Page(render_fleet([datasheet], findings))
+    places = {ref for tag, attrs in page.tags if (ref := attrs.get("href") or "")[:1] == "#"}
+    ids = {attrs["id"] for tag, attrs in page.tags if "id" in attrs}
+    severities = {finding.severity for finding in findings}
+    expected = {"#refused"} if "refused" in severities else set()
+    expected |= {"#warnings"} if "warning" in severities else set()
+    assert places == expected
+    assert {place[1:] for place in places} == ids & {"refused", "warnings"}
+    text = squeezed(page.text)
+    for severity, count in (("refused", "captures refused"), ("warning", "warnings")):
+        assert (f"0 {count}" in text) == (severity not in severities)
 
 
 def test_strips_need_two_motors_that_differ(datasheet: Datasheet) -> None:
