@@ -49,7 +49,10 @@ _output = partial(
     key, "reports/demo", "folder for everything that is written", result=False, place=True
 )
 _source = partial(
-    key, "auto", "source map for foreign files, a name or path/to/map.yaml; auto recognises them"
+    key,
+    "auto",
+    "source map for foreign files, a name or path/to/map.yaml; auto recognises them",
+    place=True,
 )
 _limits = partial(
     key, "default", "limits file of conf/limits/: constants a release must hold", place=True
@@ -224,7 +227,7 @@ class PlanSettings(ReadingSettings):
     input: str | None = key(
         None, "folder of captures to plan from, where there is no run of them", place=True
     )
-    source: str = key("auto", "source map for foreign files, a name or path/to/map.yaml")
+    source: str = _source()
     motor: str | None = key(None, "motor_id; every motor without it")
     limits: str = _limits()
     constants: dict[str, Any] = _constants()

@@ -6,27 +6,17 @@ Text keys are taken as typed, because an override grammar would turn serial numb
 
 from __future__ import annotations
 
-import re
 import shlex
 import typing
-from collections.abc import Iterable, Sequence
-from dataclasses import fields, is_dataclass
-from difflib import get_close_matches
+from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from pipeline.cli.commands import Command, program
+from pipeline.cli.overrides import check_override, is_group, refused, unknown_key, unquoted
 from pipeline.records.errors import UsageError
-from pipeline.settings import Settings, configuration_folder, named_file
-
-_BOOL = re.compile("true|false|yes|no|on|off|0|1", re.IGNORECASE)
-_INT = re.compile("[+-]?[0-9]+")
-_FLOAT = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(inf|nan)", re.IGNORECASE)
-_KINDS: dict[Any, tuple[re.Pattern[str], str, str]] = {
-    bool: (_BOOL, "neither true nor false", "true or false"),
-    int: (_INT, "no whole number", "a whole number"),
-    float: (_FLOAT, "no number", "a number"),
-}
+from pipeline.settings import Settings, configuration_folder
 
 
 def load_settings(
@@ -64,17 +54,14 @@ def load_settings(
         if f"{key}_" in kinds:
             key = f"{key}_"  # the key is a word of Python, such as `from`
         if _is_text(kinds.get(key)):
-            texts[key] = _text(command, key, _unquoted(value), kinds[key])
+            texts[key] = _text(command, key, unquoted(value), kinds[key])
         elif command.free and key not in kinds:
-            free[key] = _unquoted(value)
+            free[key] = unquoted(value)
         else:
             if key.lstrip("+").split(".")[0] not in kinds:
-                raise UsageError(
-                    f"{command.name}: no key {key.lstrip('+')!r}",
-                    _meant(key.lstrip("+"), kinds, command),
-                )
-            _well_formed(command, key.lstrip("+"), value, config_dir)
-            nested = typing.get_origin(kinds.get(key.split(".")[0])) is dict and not _group(key)
+                raise unknown_key(command, key.lstrip("+"))
+            check_override(command, key.lstrip("+"), value, config_dir)
+            nested = typing.get_origin(kinds.get(key.split(".")[0])) is dict and not is_group(key)
             rest.append(f"++{word}" if nested else word)
     texts["config_dir"] = config_dir
     if config_dir is not None and not Path(config_dir).is_dir():
@@ -142,50 +129,6 @@ def origin_text(command: Command, settings: Settings) -> str:
     return "\n".join([f"{command.name}: the first of these that names a key", *files, defaults])
 
 
-def _meant(key: str, kinds: Iterable[str], command: Command) -> str:
-    """What to write instead of a key that there is not."""
-    near = get_close_matches(key, [kind.rstrip("_") for kind in kinds], 1)
-    lists = f"`{program()} {command.name} --help` lists the keys"
-    return f"did you mean {near[0]}? {lists}" if near else lists
-
-
-def _well_formed(command: Command, key: str, value: str, config_dir: str | None) -> None:
-    """Refuses a word that Hydra would refuse without saying what to write instead."""
-    kind: Any = command.settings
-    for depth, name in enumerate(parts := key.split(".")):
-        if not is_dataclass(kind):
-            return
-        group, kinds = ".".join(parts[:depth]), typing.get_type_hints(kind)
-        if name not in kinds:
-            has = ", ".join(f"{group}.{known}" for known in kinds)
-            raise UsageError(f"{command.name}: no key {key!r}", f"{group} has {has}")
-        kind = kinds[name]
-    if _group(key):
-        _known_name(command, key, value, config_dir)
-    if kind in _KINDS and not _KINDS[kind][0].fullmatch(_unquoted(value)):
-        _, wrong, right = _KINDS[kind]
-        raise UsageError(f"{command.name}: {key}={value} is {wrong}", f"write {key}= and {right}")
-    if kind is str and value == "null":
-        raise UsageError(f"{command.name}: {key}=null is nothing", f"write {key}= and a name")
-    if is_dataclass(kind):
-        _known_name(command, key, value, config_dir)
-    elif typing.get_origin(kind) is list and not (value[:1] == "[" and value[-1:] == "]"):
-        listed = f"[{value.strip('[]')}]"
-        raise UsageError(f"{command.name}: {key}={value} is no list", f"write {key}={listed}")
-
-
-def _group(key: str) -> bool:
-    """Whether a key takes the name of a file of `conf/KEY/`."""
-    return key == "policy"
-
-
-def _known_name(command: Command, key: str, value: str, config_dir: str | None) -> None:
-    try:
-        named_file(key, value, config_dir)
-    except UsageError as error:
-        raise UsageError(f"{command.name}: {error.message}", error.remedy) from error
-
-
 def _with_names(command: Command, words: Sequence[str]) -> list[str]:
     """Words without `=` take the positional names in their order."""
     free = list(command.positional)
@@ -209,6 +152,7 @@ def _composed(command: Command, overrides: list[str], config_dir: str | None) ->
     from hydra.errors import HydraException
     from omegaconf import OmegaConf
     from omegaconf.errors import OmegaConfBaseException
+    from yaml import YAMLError
 
     if any("${" in word for word in overrides):
         raise UsageError("overrides hold no ${...}", "write the value itself")
@@ -226,23 +170,13 @@ def _composed(command: Command, overrides: list[str], config_dir: str | None) ->
         if "${" in repr(OmegaConf.to_container(config, resolve=False)):
             raise UsageError(f"{config_dir} holds ${{...}}", "write the value itself")
         settings: Settings = typing.cast(Settings, OmegaConf.to_object(config))
-    except (HydraException, OmegaConfBaseException) as error:
-        reasons = [str(one).splitlines()[0].rstrip(".") for one in (error, error.__cause__) if one]
-        reason = ": ".join(dict.fromkeys(reasons))
-        raise UsageError(
-            f"{command.name}: {reason}",
-            f"`{program()} {command.name} --help` lists the keys",
-        ) from error
+    except (HydraException, OmegaConfBaseException, YAMLError) as error:
+        raise refused(command, error, config_dir) from error
     return settings
 
 
 def _is_text(kind: Any) -> bool:
     return kind is str or kind == str | None
-
-
-def _unquoted(value: str) -> str:
-    quoted = len(value) >= 2 and value[0] == value[-1] and value[0] in "'\""
-    return value[1:-1] if quoted else value
 
 
 def with_source(command: str, settings: Settings) -> str:

@@ -14,7 +14,13 @@ from pipeline.cli.commands import COMMANDS, Command
 from pipeline.cli.configuration import load_settings, with_source
 from pipeline.criticism.library.registry import effects
 from pipeline.records.errors import UsageError
-from pipeline.settings import ModelSettings, OperateSettings, RunSettings, result_document
+from pipeline.settings import (
+    ModelSettings,
+    OperateSettings,
+    RunSettings,
+    configuration_folder,
+    result_document,
+)
 
 
 def test_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
@@ -123,7 +129,30 @@ def test_a_reader_that_leaves_early_is_no_failure() -> None:
         ("compare policy.tie=abc", "policy: no field 'tie'; did you mean selection.tie?"),
         ("run policy=strict", "run: no policy 'strict'; known are default"),
         ("run release=yes", "release=yes is unknown; it is manual or auto"),
-        ("run gates=3", "gates=3"),
+        (
+            "run source.root=x",
+            "source has no keys below it; did you mean source=x? it takes source",
+        ),
+        ("compare source.root=x", "source has no keys below it; did you mean source=x?"),
+        ("run source=", "source= is empty; it takes source map"),
+        ("run workers.most=2", "workers has no keys below it; did you mean workers=2? it takes a"),
+        ("run workers.most=x", "workers has no keys below it; it takes a whole number: motors"),
+        ("run release.auto=true", "did you mean release=auto? it takes manual, or auto"),
+        (
+            "run model.name.x=ideal",
+            "no keys below it; did you mean model.name=ideal?",
+        ),
+        ("run model.effects.cogging=1", "no keys below it; write model.effects=[cogging]"),
+        (
+            "run operate.vdc_v.x=48",
+            "no keys below it; did you mean operate.vdc_v=48? it takes",
+        ),
+        ("run operate.vdc_v=x", "operate.vdc_v=x is no number; write operate.vdc_v= and a number"),
+        ("run operate=3", "operate is a group of keys; it has operate.vdc_v, operate.current_a"),
+        ("run fit=3", "fit is a group of keys; write fit.NAME=value (options of an estimator"),
+        ("run fit..share=3", "no key 'fit..share'"),
+        ("run gates={a", "gates={a cannot be read; close its brackets and quotes"),
+        ("run gates=3", "gates=3: gates is a group of keys"),
         ("run gates.sampling_rate=3", "write gates.sampling_rate.OPTION=number; it has enabled"),
         ("run fit.current_step=null", "write fit.current_step.OPTION=number; it has least_share"),
         ("run crosscheck.kt_vs_ke=abc", "crosscheck.kt_vs_ke=abc: kt_vs_ke is no option"),
@@ -169,8 +198,35 @@ def test_a_value_that_cannot_be_is_named_with_what_can_be(
 
 
 @pytest.mark.parametrize(
+    ("yaml", "told"),
+    [
+        ("source:\n  root: x", "source is one value: no list, no keys; it takes source map for"),
+        ("workers: x", "workers is no whole number; it takes a whole number: motors worked on"),
+        ("sauce: x", "no key 'sauce'; did you mean source?"),
+        ("model:\n  nam: x", "no key 'model.nam'; model has model.name, model.effects"),
+        ("model:\n  effects: x", "model.effects is no list of texts; it takes [a,b]"),
+        ("fit: 5", "fit is a group of keys; write fit.NAME=value"),
+        ("operate:\n  vdc_v: x", "operate.vdc_v is no number; it takes a number: DC bus voltage"),
+        ("a: [b", "expected ',' or ']'"),
+    ],
+)
+def test_a_configuration_file_at_fault_is_named_with_its_key(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], yaml: str, told: str
+) -> None:
+    file = tmp_path / "command" / "run.yaml"
+    file.parent.mkdir()
+    file.write_text(f"{(configuration_folder() / 'command' / 'run.yaml').read_text()}{yaml}\n")
+    assert main(["run", f"input={tmp_path}", f"config_dir={tmp_path}"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert file.as_posix() in line
+    assert told in line
+
+
+@pytest.mark.parametrize(
     "word",
     [
+        "operate.vdc_v=null",
+        "constants={r_phase_ohm: 0.3, u_r_phase_ohm: 0.01}",
         "fit.soak.temp_assumed_degc=-40",
         "fit.hand_turn.alpha_assumed_1_k=-0.002",
         "gates.sampling_rate.enabled=false",
