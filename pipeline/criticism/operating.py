@@ -191,8 +191,7 @@ class Operating(Samples):
         if known is None:
             # the column is kept with it, so that nothing else takes its identity
             known = self.cache[id(column), name] = column, make()
-        result: Made = known[1]
-        return result
+        return known[1]
 
     def waves(self, order: int) -> tuple[Any, Any]:
         """Cosine and sine of a multiple of the electrical angle, computed once an angle.

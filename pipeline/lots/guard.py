@@ -150,8 +150,7 @@ def _accepted(eta: Array, tolerance: Tolerance, u: float) -> Array:
         return np.zeros(eta.shape)
     if u == 0.0:
         return ((eta >= low) & (eta <= high)).astype(float)
-    probability: Array = ndtr((high - eta) / u) - ndtr((low - eta) / u)
-    return probability
+    return ndtr((high - eta) / u) - ndtr((low - eta) / u)
 
 
 def _nodes(start: float, end: float) -> tuple[Array, Array]:

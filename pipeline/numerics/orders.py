@@ -305,8 +305,7 @@ def held_out_gain(spec: Spectrum) -> Array:
     total = spec.coefficients.sum(axis=0)
     others = (total - spec.coefficients) / (spec.turns - 1)
     gain = np.abs(spec.coefficients) ** 2 - np.abs(spec.coefficients - others) ** 2
-    share: Array = np.mean(gain > 0.0, axis=0)
-    return share
+    return np.mean(gain > 0.0, axis=0)
 
 
 def orders_present(spec: Spectrum, level: float = 0.01, share: float = 0.75) -> list[OrderLine]:

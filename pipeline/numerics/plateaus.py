@@ -211,8 +211,7 @@ def block_means(values: Array, size: int) -> Array:
 
     """
     blocks = values.shape[0] // size
-    means: Array = values[: blocks * size].reshape(blocks, size, *values.shape[1:]).mean(axis=1)
-    return means
+    return values[: blocks * size].reshape(blocks, size, *values.shape[1:]).mean(axis=1)
 
 
 def decimated(size: int, most: int = 2000) -> slice:

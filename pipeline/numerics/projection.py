@@ -61,8 +61,7 @@ class Projection:
 
         """
         windows = sliding_window_view(residuals, self.length, axis=1)[:, self.starts, :]
-        projected: Array = np.matmul(self.functions, windows.transpose(1, 2, 0)).transpose(2, 0, 1)
-        return projected
+        return np.matmul(self.functions, windows.transpose(1, 2, 0)).transpose(2, 0, 1)
 
     def means(self, signals: Array) -> Array:
         """Means over each window, weighted with the plain window.
@@ -81,8 +80,7 @@ class Projection:
         order_zero = self.functions[:, :1, :]
         weights = order_zero / order_zero.sum(axis=2, keepdims=True)
         windows = sliding_window_view(signals, self.length, axis=1)[:, self.starts, :]
-        sums: Array = np.matmul(weights, windows.transpose(1, 2, 0))[:, 0, :].T
-        return sums
+        return np.matmul(weights, windows.transpose(1, 2, 0))[:, 0, :].T
 
     def only(self, windows: NDArray[np.bool_]) -> Projection:
         """The same test functions over some of the windows.

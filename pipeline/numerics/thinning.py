@@ -69,5 +69,4 @@ def cloud_points(x_px: Array, y_px: Array, cell_px: float) -> Indices:
     column = np.floor(x_px[finite] / cell_px).astype(np.int64)
     row = np.floor(y_px[finite] / cell_px).astype(np.int64)
     _, first = np.unique(column * 1_000_003 + row, return_index=True)
-    places: Indices = finite[np.sort(first)]
-    return places
+    return finite[np.sort(first)]

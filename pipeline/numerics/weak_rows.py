@@ -75,8 +75,7 @@ class WeakRows:
         if self.members.size == 0:
             views = np.lib.stride_tricks.sliding_window_view(signal, kernel.size)[self.starts]
             centred = views - views.mean(axis=1, keepdims=True) if order else views
-            sums: Array = centred @ kernel
-            return sums
+            return centred @ kernel
         part = signal[self.members]
         if order:
             means = _sums(part, self.sizes) / self.sizes
@@ -100,8 +99,7 @@ class WeakRows:
 
         """
         stretch = np.floor((self.centres_s - self.centres_s[0]) / length_s)
-        number: NDArray[np.int64] = stretch.astype(np.int64) + 1_000_000 * capture
-        return number
+        return stretch.astype(np.int64) + 1_000_000 * capture
 
     def noise_gain(self, order: int) -> float:
         """How much white noise of the signal is left in the window averages.
@@ -269,8 +267,7 @@ def _slopes(t_s: Array, y: Array, size: int) -> Array:
     def stretches(values: Array) -> Array:
         padded = np.pad(values, (0, -count % step), mode="edge")
         rows = np.lib.stride_tricks.sliding_window_view(padded, length)[::step]
-        centred: Array = rows - rows.mean(axis=1, keepdims=True)
-        return centred
+        return rows - rows.mean(axis=1, keepdims=True)
 
     def means(values: Array) -> Array:
         running = np.cumsum(np.pad(values, ((0, 0), (1, 0))), axis=1)

@@ -45,12 +45,11 @@ def space_vector(a: ArrayLike, b: ArrayLike, c: ArrayLike) -> Complex:
     (2+0j)
 
     """
-    vector: Complex = (2.0 / 3.0) * (
+    return (2.0 / 3.0) * (
         np.asarray(a, dtype=np.float64)
         + np.asarray(b, dtype=np.float64) * _THIRD
         + np.asarray(c, dtype=np.float64) * _THIRD.conjugate()
     )
-    return vector
 
 
 def vector_of_lines(lines: Mapping[str, Array]) -> Complex:

@@ -325,14 +325,13 @@ class Capture:
                 keep = self.kept(index) & np.isfinite(other[name].to_numpy())
                 if not keep.any():
                     return np.full(table.height, np.nan)
-                on_clock: Array = np.interp(
+                return np.interp(
                     table["t_s"].to_numpy(),
                     other["t_s"].to_numpy()[keep],
                     other[name].to_numpy()[keep],
                     left=np.nan,
                     right=np.nan,
                 )
-                return on_clock
         raise KeyError(f"{self.path} holds no column {name}")
 
 

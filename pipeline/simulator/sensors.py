@@ -69,8 +69,7 @@ def first_order_lag(signal: Array, step: float) -> Array:
 
     kept = math.exp(-step)
     mean = -math.expm1(-step) / step
-    lagged: Array = lfilter([1.0 - mean, mean - kept], [1.0, -kept], signal - signal[0]) + signal[0]
-    return lagged
+    return lfilter([1.0 - mean, mean - kept], [1.0, -kept], signal - signal[0]) + signal[0]
 
 
 def scope_range(largest: float) -> float:

@@ -139,8 +139,7 @@ def _block_means(capture: Capture, names: list[str]) -> Array | None:
     size = rows.shape[0] // BLOCKS
     if size == 0:
         return None
-    means: Array = rows[: size * BLOCKS].reshape(BLOCKS, size, len(names)).mean(axis=1)
-    return means
+    return rows[: size * BLOCKS].reshape(BLOCKS, size, len(names)).mean(axis=1)
 
 
 def _first_slope(x: Array, y: Array) -> tuple[float, float]:

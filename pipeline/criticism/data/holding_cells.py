@@ -99,8 +99,7 @@ def _about_a_line(theta: Array, current: Array) -> Array:
     at = theta - theta.mean()
     power = float(at @ at)
     slope = float(at @ current) / power if power > 0 else 0.0
-    residual: Array = current - current.mean() - slope * at
-    return residual
+    return current - current.mean() - slope * at
 
 
 def _noise(spread: list[Array], means: list[Array], policy: Policy) -> float:

@@ -209,8 +209,7 @@ class Segment:
         """
         known = self.cache.get(name)
         if known is not None and known[0] is column and known[1] == by:
-            earlier: Made = known[2]
-            return earlier
+            return known[2]
         result = make()
         if any(column is one for one in self.recorded.values()):
             self.cache[name] = column, by, result

@@ -157,8 +157,7 @@ def unrounded(signal: Array, step: float) -> Array:
     middle = 0.5 * (signal[slow] + signal[slow + 1])
     level = np.concatenate([middle, signal[far], signal[far + 1], signal[[0, -1]]])
     order = np.argsort(known, kind="stable")
-    levels: Array = np.interp(np.arange(signal.size), known[order], level[order])
-    return levels
+    return np.interp(np.arange(signal.size), known[order], level[order])
 
 
 def smoothed(signal: Array, step: float, policy: SensorNoise) -> Array:
@@ -329,8 +328,7 @@ def _parts(signal: Array, length: int) -> Array:
     inside = np.linspace(0, length - 1, min(length, _LOOKED_AT // starts.size))
     parts = signal[starts[:, None] + inside.round().astype(np.int64)]
     span = np.ptp(parts, axis=1)
-    longest: Array = (parts - parts[:, :1])[span >= np.median(span)]
-    return longest
+    return (parts - parts[:, :1])[span >= np.median(span)]
 
 
 def _coherence(parts: Array, steps: Array) -> Array:

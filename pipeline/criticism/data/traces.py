@@ -165,8 +165,7 @@ def smoothed(signal: Array, width: int) -> Array:
         [np.full(half, signal[:half].mean()), signal, np.full(half, signal[-half:].mean())]
     )
     total = np.concatenate([[0.0], np.cumsum(padded)])
-    means: Array = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-    return means
+    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
 
 
 def decimated(signal: Array, factor: int) -> Array:
@@ -186,8 +185,7 @@ def decimated(signal: Array, factor: int) -> Array:
 
     """
     n = signal.size // factor * factor
-    means: Array = signal[:n].reshape(-1, factor).mean(axis=1)
-    return means
+    return signal[:n].reshape(-1, factor).mean(axis=1)
 
 
 def reversals(theta: Array, slack: float) -> NDArray[np.int64]:

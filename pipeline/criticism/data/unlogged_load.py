@@ -112,8 +112,7 @@ def _rests(theta: Array, log: DriveLog, policy: Cutting) -> NDArray[np.bool_]:
     """
     size = max(3, round(policy.load_window_s / 4 / log.period_s))
     span = maximum_filter1d(theta, size) - minimum_filter1d(theta, size)
-    rests: NDArray[np.bool_] = span < policy.rest_rad
-    return rests
+    return span < policy.rest_rad
 
 
 def _mounting(theta: Array, omega: Array, weak: WeakRows) -> list[Array]:

@@ -272,5 +272,4 @@ def _cardinal(knots: Array, at: Array) -> Array:
     from scipy.interpolate import CubicSpline  # slow to import and rarely used
 
     spline = CubicSpline(knots, np.eye(knots.size), bc_type="natural")
-    values: Array = spline(np.clip(at, knots[0], knots[-1]))
-    return values
+    return spline(np.clip(at, knots[0], knots[-1]))

@@ -110,8 +110,7 @@ class Expression:
             return np.zeros(np.shape(v))
         slope = np.stack(rows)
         variance = np.einsum("iv,ij,jv->v", slope, self.covariance, slope)
-        deviation: Array = np.sqrt(np.maximum(variance, 0.0))
-        return deviation
+        return np.sqrt(np.maximum(variance, 0.0))
 
     def u(self, term: int, name: str) -> float:
         """Standard uncertainty of an amplitude or scale of a term.
@@ -237,8 +236,7 @@ class Pursuit:
         solved = np.linalg.lstsq(
             normal + _RIDGE * np.diag(np.diag(normal)), curves.T @ self.moment, rcond=1e-10
         )
-        coefficients: Array = solved[0]
-        return coefficients
+        return solved[0]
 
     def curves(self, terms: Sequence[Term]) -> Array:
         """Terms as coefficients of the hats and waves of the input.
@@ -466,10 +464,7 @@ def _inverse(normal: Array) -> Array:
     if not normal.size:
         return normal
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    covariance: Array = np.linalg.pinv(unit_diagonal(normal), hermitian=True) / np.outer(
-        scale, scale
-    )
-    return covariance
+    return np.linalg.pinv(unit_diagonal(normal), hermitian=True) / np.outer(scale, scale)
 
 
 def curve_about(

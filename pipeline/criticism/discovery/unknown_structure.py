@@ -256,8 +256,7 @@ def _ridge_step(
     normal = weighted.T @ matrix + np.diag(system.prior_precision[places] + ridge)
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     slope = (weighted.T @ system.residual + system.prior_gradient[places]) / scale
-    step: Array = -np.linalg.lstsq(normal / np.outer(scale, scale), slope, rcond=1e-12)[0] / scale
-    return step
+    return -np.linalg.lstsq(normal / np.outer(scale, scale), slope, rcond=1e-12)[0] / scale
 
 
 def _held_out(

@@ -16,8 +16,7 @@ def _current(r: Recorded, q: Values) -> Complex:
         return r.i_a
     # of phase currents, the rotor has turned on since they were sampled
     later, _, turned = r.later(q["delay_s"])
-    delayed: Complex = np.exp(1j * turned * q["of_phases"]) * later
-    return delayed
+    return np.exp(1j * turned * q["of_phases"]) * later
 
 
 EFFECT = Effect(

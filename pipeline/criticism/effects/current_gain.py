@@ -14,8 +14,7 @@ def _current(r: Recorded, q: Values) -> Complex:
     mean = 1.0 + q["mean"] + 1j * _turn(q)
     # recorded = mean i + gamma conj(i), solved for i
     size = abs(mean) ** 2 - np.abs(gamma) ** 2
-    recorded: Complex = (np.conj(mean) * r.i_a - gamma * np.conj(r.i_a)) / size
-    return recorded
+    return (np.conj(mean) * r.i_a - gamma * np.conj(r.i_a)) / size
 
 
 def _turn(q: Values) -> float:

@@ -11,8 +11,7 @@ def _current(r: Recorded, q: Values) -> Complex:
     if not r.inverter:
         return r.i_a
     offset = (q["alpha_a"] + 1j * q["beta_a"]) * np.exp(-1j * r.eps_rad)
-    recorded: Complex = r.i_a - offset
-    return recorded
+    return r.i_a - offset
 
 
 EFFECT = Effect(

@@ -41,8 +41,7 @@ def _given(x: Operating, q: Values) -> Complex:
     """
     _, phases, _ = _phases(x, q["given_lag_s"])
     turn = x.once(x.eps_rad, "turning", lambda: turning(x.eps_rad))
-    given_v: Complex = q["given_v"] * vector_of(np.tanh(phases / q["ramp_a"])) * np.conj(turn)
-    return given_v
+    return q["given_v"] * vector_of(np.tanh(phases / q["ramp_a"])) * np.conj(turn)
 
 
 def _phases(x: Operating, lag_s: float) -> tuple[Complex, Array, Array]:
@@ -84,8 +83,7 @@ def _sampled(x: Operating, q: Values) -> Complex:
 
 def _torque(x: Operating, q: Values) -> Array:
     """Torque [n, N·m] that the recorded current seems to make beyond its mean's."""
-    torque: Array = 1.5 * x.machine.pole_pairs * (np.conj(x.flux_wb) * _sampled(x, q)).imag
-    return torque
+    return 1.5 * x.machine.pole_pairs * (np.conj(x.flux_wb) * _sampled(x, q)).imag
 
 
 EFFECT = Effect(

@@ -9,8 +9,7 @@ from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Val
 
 def _drop(x: Operating, q: Values) -> Complex:
     gamma = q["cosine"] + 1j * q["sine"]
-    drop: Complex = x.base["r_ohm"] * gamma * np.conj(x.i_a) * np.exp(-2j * x.eps_rad)
-    return drop
+    return x.base["r_ohm"] * gamma * np.conj(x.i_a) * np.exp(-2j * x.eps_rad)
 
 
 EFFECT = Effect(

@@ -25,8 +25,7 @@ def _voltage(v_v: Complex, x: Operating, q: Values, _: str) -> Complex:
     if x.supply.q_alone:
         # what is turned into the q axis cannot be known without the d axis
         return v_v + 1j * q["delay_s"] / x.ts_s * np.gradient(v_v.imag)
-    turned: Complex = v_v * np.exp(1j * turn)
-    return turned
+    return v_v * np.exp(1j * turn)
 
 
 def _speed(omega: Array, q: Values, period: float) -> Array:

@@ -14,8 +14,7 @@ from pipeline.criticism.effect import Array, Complex, Effect, Operating, Paramet
 
 def _bench(x: Operating) -> NDArray[np.bool_]:
     """Whether an instrument drives each sample [n] at standstill: a step, or an LCR meter."""
-    at_bench: NDArray[np.bool_] = (x.omega_rad_s == 0.0) & (not x.inverter)
-    return at_bench
+    return (x.omega_rad_s == 0.0) & (not x.inverter)
 
 
 def _square(x: Operating) -> Array:

@@ -97,8 +97,7 @@ def measured(segment: Segment, signals: Signals, _: Model, values: Values) -> Ar
     """The voltage that drives each sample's motion [1, n], with what the delay is longer."""
     volts = signals[VOLTAGE]
     late = values[LATE_VOLTAGE] / segment.ts_s
-    shifted: Array = between(volts, np.arange(volts.size, dtype=np.float64) - late)[None]
-    return shifted
+    return between(volts, np.arange(volts.size, dtype=np.float64) - late)[None]
 
 
 def predicted(segment: Segment, x: Operating, _: Pieces, model: Model, values: Values) -> Array:
@@ -151,8 +150,7 @@ def _across_l(segment: Segment, bend: Array, model: Model, values: Values) -> Ar
     scales = base_scales(model.machine)
     kt = 1.5 * model.machine.pole_pairs * scales["psi_wb"]
     per_jerk = values[ELECTRICAL] * scales["r_ohm"] * scales["j_kgm2"] / kt
-    change: Array = per_jerk * np.gradient(bend, segment.ts_s)
-    return change
+    return per_jerk * np.gradient(bend, segment.ts_s)
 
 
 def _winding(segment: Segment, model: Model, values: Values) -> tuple[float, float]:

@@ -110,8 +110,7 @@ def _parts(current: Array, policy: Tables) -> NDArray[np.int64] | None:
     if levels.max(initial=0) > 0 or reach == 0.0:
         return None
     place = (current - current.min()) / reach * policy.parts
-    parts: NDArray[np.int64] = np.minimum(place.astype(np.int64), policy.parts - 1)
-    return parts
+    return np.minimum(place.astype(np.int64), policy.parts - 1)
 
 
 def _noise(columns: Signals, reading: float) -> float | None:

@@ -139,8 +139,7 @@ def lost_shares(
         fall = current_a + per_volt * (after - winding * (duty + dead))
         late = _passed(rise + (low - 0.5) * ramp, ramp, width)
         keeps = _passed(fall + (low_after - 0.5) * ramp, ramp, width)
-    share: Array = late + keeps - 1.0
-    return share
+    return late + keeps - 1.0
 
 
 def swept_shares(x: Operating, eps_rad: Array, current_a: Array, width_a: float) -> Array:

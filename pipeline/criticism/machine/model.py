@@ -330,8 +330,7 @@ def base_flux(x: Operating, base: Mapping[str, float]) -> Complex:
         L_d i_d + ψ_m + j L_q i_q [Wb].
 
     """
-    flux: Complex = base["ld_h"] * x.id_a + base["psi_wb"] + 1j * base["lq_h"] * x.iq_a
-    return flux
+    return base["ld_h"] * x.id_a + base["psi_wb"] + 1j * base["lq_h"] * x.iq_a
 
 
 def flux_of(current: Complex, base: Values) -> Complex:
@@ -388,8 +387,7 @@ def effect_flux(effect: Hooks, x: Operating, q: Values) -> tuple[Complex, Array]
     ones = np.ones(shape)
 
     def slope(moved: Operating) -> Array:
-        torque: Array = np.imag(hook(moved, q)) / _STEP * ones
-        return torque
+        return np.imag(hook(moved, q)) / _STEP * ones
 
     by_d = slope(replace(x, id_a=x.id_a + 1j * _STEP))
     by_q = slope(replace(x, iq_a=x.iq_a + 1j * _STEP))
@@ -427,10 +425,7 @@ def air_gap_torque(x: Operating, psi_wb: Complex, slope_wb: Array) -> Array:
     T = 1.5 p [ψ_d i_q − ψ_q i_d + ∂W/∂ε]
 
     """
-    torque: Array = (
-        1.5 * x.machine.pole_pairs * (psi_wb.real * x.iq_a - psi_wb.imag * x.id_a + slope_wb)
-    )
-    return torque
+    return 1.5 * x.machine.pole_pairs * (psi_wb.real * x.iq_a - psi_wb.imag * x.id_a + slope_wb)
 
 
 def mean_current(x: Operating, values: Values) -> Operating:

@@ -219,8 +219,7 @@ def _kernel(block: int) -> tuple[Array, Array]:
 def _closed(through: Array, least: float) -> NDArray[np.bool_]:
     """Blocks [n] that pass torque on, as do those beside them, to the same side."""
     side = np.where(np.abs(through) > least, np.sign(through), 0.0)
-    closed: NDArray[np.bool_] = np.abs(sliding_window_view(np.pad(side, 1), 3).sum(axis=1)) == 3.0
-    return closed
+    return np.abs(sliding_window_view(np.pad(side, 1), 3).sum(axis=1)) == 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -316,5 +315,4 @@ def _spreads(normal: Array, slope: Array, power: Array, count: Array, coefficien
     explained = 2.0 * slope @ coefficients - np.einsum(
         "ijk,j,k->i", normal, coefficients, coefficients
     )
-    noise: Array = np.maximum(power - explained, 0.0) / count
-    return noise
+    return np.maximum(power - explained, 0.0) / count

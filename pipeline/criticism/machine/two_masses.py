@@ -295,8 +295,7 @@ def side_of(through_nm: Array, least_nm: float) -> Array:
     after = closed[np.minimum(place, closed.size - 1)]
     passed = np.clip((at - last) / np.maximum(after - last, 1), 0.0, 1.0)
     begin, end = np.sign(through_nm[last]), np.sign(through_nm[after])
-    side: Array = begin + (end - begin) * passed**2
-    return side
+    return begin + (end - begin) * passed**2
 
 
 def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:

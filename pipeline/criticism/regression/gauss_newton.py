@@ -159,8 +159,7 @@ def _ridge(fit: Fit, columns: Sequence[Column]) -> Array:
                 abs(fit.values[name]), p.typical * machine.scale(p)
             )
     spans = np.array([reach.get(column.name, np.inf) for column in columns])
-    precision: Array = np.maximum(spans, 1e-30) ** -2
-    return precision
+    return np.maximum(spans, 1e-30) ** -2
 
 
 def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = None) -> Fit:

@@ -135,8 +135,7 @@ class LinearSystem:
         counts = self.counts
         noise = (np.concatenate(self.fit.sigma)[self.group] * self.row_weight) ** 2
         share = np.bincount(self.group, noise, counts.size) / np.maximum(counts, 1.0)
-        each: Array = counts / (1.0 + np.maximum(counts - 1.0, 0.0) * (1.0 - share))
-        return each
+        return counts / (1.0 + np.maximum(counts - 1.0, 0.0) * (1.0 - share))
 
     @property
     def deviance(self) -> float:

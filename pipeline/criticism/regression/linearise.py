@@ -299,8 +299,7 @@ def _reading_error(segment: Segment, model: Model, near: Values) -> Array:
     if known is None or known[0] is not segment or known[1:3] != (model, near):
         error = reading_error(segment, model, near)
         known = segment.cache["reading"] = segment, model, dict(near), error
-    kept: Array = known[3]
-    return kept
+    return known[3]
 
 
 class _Sampler:

@@ -149,8 +149,7 @@ def _readings_error(even_rad: Array, step_rad: float, readings: int, shift: floa
     turned, coarse = np.gradient(even_rad), readings * step_rad
     places = (np.arange(readings) + 0.5) / readings - 0.5
     errors = [rounding_error(even_rad + place * turned, coarse, shift) for place in places]
-    mean: Array = np.mean(errors, axis=0)
-    return mean
+    return np.mean(errors, axis=0)
 
 
 def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
@@ -439,8 +438,7 @@ def _jumps(segment: Segment, direct: str, quadrature: str, policy: NoiseFloors) 
     bend[1:-1] = np.abs(np.diff(vector, 2)) / math.sqrt(2.0)
     bend[bend < policy.jump * noise] = 0.0
     rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
-    jumps: Array = policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
-    return jumps
+    return policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
 
 
 def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Array:

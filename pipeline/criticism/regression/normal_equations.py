@@ -175,8 +175,7 @@ class NormalEquations:
     def _products(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int64]:
         """Where the products of columns are in `normal`."""
         first, second = np.minimum(rows, columns), np.maximum(rows, columns)
-        places: NDArray[np.int64] = first * (2 * self.slope.shape[1] - first - 1) // 2 + second
-        return places
+        return first * (2 * self.slope.shape[1] - first - 1) // 2 + second
 
     def moved(self, places: NDArray[np.int64], step: Array) -> NormalEquations:
         """The normal equations at the end of a step; the priors stay where they were.
@@ -320,8 +319,7 @@ def pseudo_inverse(normal: Array) -> Array:
     power, axes = np.linalg.eigh(normal / np.outer(size, size))
     nonzero = power > _TIE * max(float(power[-1]), 1.0)
     inverse: Array = (axes[:, nonzero] / power[nonzero]) @ axes[:, nonzero].T
-    unscaled: Array = inverse / np.outer(size, size)
-    return unscaled
+    return inverse / np.outer(size, size)
 
 
 def _solved(normal: Array, slope: Array) -> Array:
@@ -337,8 +335,7 @@ def _solved(normal: Array, slope: Array) -> Array:
     norm = float((entries.sum(axis=0) + entries.sum(axis=1)).max(initial=1.0)) - 1.0
     factor, failed = lapack.dpotrf(scaled.T, lower=1)
     if not failed and lapack.dpocon(factor, norm, uplo="L")[0] > _SAFE:
-        solution: Array = lapack.dpotrs(factor, slope / size, lower=1)[0] / size
-        return solution
+        return lapack.dpotrs(factor, slope / size, lower=1)[0] / size
     whole = scaled + np.triu(scaled, 1).T
     return pseudo_inverse(whole) @ (slope / size) / size
 
@@ -382,5 +379,4 @@ def unit_diagonal(normal: Array) -> Array:
 
     """
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    scaled: Array = normal / np.outer(scale, scale)
-    return scaled
+    return normal / np.outer(scale, scale)

@@ -123,5 +123,4 @@ def slowest(time_s: Array, terms: int) -> Array:
     """
     time = (time_s - time_s[0]) / max(float(time_s[-1] - time_s[0]), 1e-300)
     rates = (np.arange(terms)[:, None] + 0.5) * math.pi
-    sines: Array = math.sqrt(2.0) * np.sin(rates * time) / rates
-    return sines
+    return math.sqrt(2.0) * np.sin(rates * time) / rates

@@ -110,8 +110,7 @@ class Part:
     def scales(self) -> Array:
         """What the square of a sum over one carrier is in mean squares of the signal [2]."""
         power = np.array([self.weight.sum(), (self.weight * self.current) @ self.current])
-        scales: Array = 2.0 / np.maximum(power * self.weight.sum(), 1e-300)
-        return scales
+        return 2.0 / np.maximum(power * self.weight.sum(), 1e-300)
 
     def power(self, orders: Array) -> Array:
         """Mean square of waves of some orders with each carrier.
@@ -128,8 +127,7 @@ class Part:
             current.
 
         """
-        power: Array = self.scales[:, None] * np.abs(self.waves(orders)) ** 2
-        return power
+        return self.scales[:, None] * np.abs(self.waves(orders)) ** 2
 
     def waves(self, orders: Array) -> Complex:
         """Sums of the residual times a wave of the angle and a carrier.
@@ -171,8 +169,7 @@ class Part:
         for place in range(count):
             carried *= turn
             sums[:, place] = carried.sum(axis=1)
-        power: Array = self.scales[:, None] * np.abs(sums) ** 2
-        return power
+        return self.scales[:, None] * np.abs(sums) ** 2
 
     def without(self, order: float) -> Part:
         """The part less its best waves of one order.
@@ -348,8 +345,7 @@ def _in_phase(logs: Sequence[Part], orders: Array) -> Array:
     """Power [2, K] of waves that have one size and phase in all logs, with each carrier."""
     total = np.sum([log.waves(orders) for log in logs], axis=0)
     weight = np.sum([[log.weight.sum(), log.carriers[1] @ log.current] for log in logs], axis=0)
-    power: Array = np.abs(total) ** 2 / np.maximum(weight, 1e-300)[:, None]
-    return power
+    return np.abs(total) ** 2 / np.maximum(weight, 1e-300)[:, None]
 
 
 def _seen_to(theta: Array, samples: float) -> float:

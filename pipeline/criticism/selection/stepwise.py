@@ -365,8 +365,7 @@ def _form_error_factors(wide: LinearSystem, added: Sequence[Effect]) -> Array:
     noise = np.bincount(wide.group, wide.row_weight**-2, len(wide.labels)) / np.maximum(
         wide.counts, 1.0
     )
-    factors: Array = noise / np.maximum(noise + wrong**2, 1e-300)
-    return factors
+    return noise / np.maximum(noise + wrong**2, 1e-300)
 
 
 def _improves_held_out(

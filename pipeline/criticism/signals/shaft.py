@@ -96,8 +96,7 @@ def _moved_on(segment: Segment, x: Operating, values: Values) -> Complex:
 
     """
     period = segment.ts_s * segment.size / x.theta_rad.size
-    torque: Complex = values["ripple_torque"] * segment.ts_s * central(x.i_a, period)
-    return torque
+    return values["ripple_torque"] * segment.ts_s * central(x.i_a, period)
 
 
 def _torque_of_current(x: Operating, pieces: Pieces, current: Complex) -> Array:

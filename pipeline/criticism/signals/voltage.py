@@ -38,8 +38,7 @@ def rotor_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Comp
 
     """
     slope = central(pieces.psi_wb, period_s)
-    volts: Complex = pieces.drop_v + slope + 1j * omega_e_rad_s * pieces.psi_wb
-    return volts
+    return pieces.drop_v + slope + 1j * omega_e_rad_s * pieces.psi_wb
 
 
 def held_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Complex:
@@ -66,8 +65,7 @@ def held_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Compl
     """
     slope = forward(pieces.psi_wb, period_s)
     psi, drop = ahead(pieces.psi_wb), ahead(pieces.drop_v)
-    volts: Complex = drop + slope + 1j * omega_e_rad_s * psi
-    return volts
+    return drop + slope + 1j * omega_e_rad_s * psi
 
 
 def recorded_voltage(

@@ -189,8 +189,7 @@ def _signal(batch: Batch, signals: Signals, name: str) -> Array:
 
 def _means(error: Array) -> Array:
     window = bump(error.shape[1])
-    mean: Array = error @ window / window.sum()
-    return mean
+    return error @ window / window.sum()
 
 
 @dataclass(frozen=True, slots=True)

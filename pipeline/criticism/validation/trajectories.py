@@ -99,8 +99,7 @@ class Batch:
             Without the surroundings.
 
         """
-        inside: Array = self.folded(column)[:, self.pad : self.pad + self.length]
-        return inside
+        return self.folded(column)[:, self.pad : self.pad + self.length]
 
 
 def batch_of(segment: Segment, model: Model, values: Values) -> Batch | None:
@@ -340,14 +339,12 @@ def _first_speed(batch: Batch, theta: Array) -> Array:
     # the slope of a straight line through the samples around
     offset = np.arange(-half, half + 1)
     around = folded[:, batch.pad - half : batch.pad + half + 1]
-    speed: Array = around @ offset / float(offset @ offset) / batch.segment.ts_s
-    return speed
+    return around @ offset / float(offset @ offset) / batch.segment.ts_s
 
 
 def _central_speed(batch: Batch, theta: Array) -> Array:
     folded = batch.folded(theta)
-    speed: Array = (folded[:, batch.pad + 1] - folded[:, batch.pad - 1]) / (2 * batch.segment.ts_s)
-    return speed
+    return (folded[:, batch.pad + 1] - folded[:, batch.pad - 1]) / (2 * batch.segment.ts_s)
 
 
 def _corrected(

@@ -105,8 +105,7 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> Array:
     rows = np.column_stack([*columns, np.ones(omega.size)])
     size = max(1, rows.shape[0] // BINS)
     usable = rows[: rows.shape[0] // size * size]
-    means: Array = usable.reshape(-1, size, rows.shape[1]).mean(axis=1)
-    return means
+    return usable.reshape(-1, size, rows.shape[1]).mean(axis=1)
 
 
 def _slope(blocks: Array) -> tuple[float, float]:

@@ -104,8 +104,7 @@ class Spin:
             (only,) = self.channels
             mean = 0.0 if centred else float(np.mean(only.v_v))
             turn = np.exp(1j * only.angle_rad) / only.gain
-            analytic: Complex = (_analytic(self.t_s, only.v_v) + mean) * turn
-            return analytic
+            return (_analytic(self.t_s, only.v_v) + mean) * turn
         rows = np.array([c.gain * np.exp(1j * c.angle_rad) for c in self.channels])
         design = np.column_stack([rows.real, rows.imag])
         if np.linalg.matrix_rank(design, tol=1e-6) < 2:
@@ -123,8 +122,7 @@ def _analytic(t_s: Array, values: Array) -> Complex:
 
     even = np.linspace(t_s[0], t_s[-1], t_s.size)
     signal = hilbert(np.interp(even, t_s, values - np.mean(values)))
-    resampled: Complex = np.interp(t_s, even, signal.real) + 1j * np.interp(t_s, even, signal.imag)
-    return resampled
+    return np.interp(t_s, even, signal.real) + 1j * np.interp(t_s, even, signal.imag)
 
 
 def read_spin(capture: Capture, temp_column: str | None) -> Spin:

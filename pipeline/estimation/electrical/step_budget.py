@@ -240,8 +240,7 @@ def _lever(name: str, solution: Solution) -> Array:
     scale[scale == 0.0] = 1.0
     scaled = fit.jacobian / scale
     inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
-    weights: Array = -(inverse[row] / scale[row]) @ scaled.T
-    return weights
+    return -(inverse[row] / scale[row]) @ scaled.T
 
 
 def _place(record: StepRecord) -> tuple[str, float]:

@@ -263,8 +263,7 @@ def attenuation(blocks: Blocks, solution: LinearFit, design: Array) -> Array:
     moment[0] = float(np.sum(2.0 * torque * blocks.torque_noise_nm**2 * error))
     size = np.linalg.norm(design, axis=0)
     gram = (design / size).T @ (design / size)
-    shift: Array = np.linalg.solve(gram, moment / size) / size
-    return shift
+    return np.linalg.solve(gram, moment / size) / size
 
 
 def _constants(coefficients: Array) -> Array:

@@ -192,13 +192,12 @@ def driving_torque(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) 
     reluctance = torque.reluctance_nm_a2 + shift.get("reluctance", 0.0)
     magnet = torque.magnet_1_k + shift.get("magnet", 0.0)
     warm = rows.warm_current_k_a + rows.q_current_a * warmer
-    driving_nm: Array = (
+    return (
         kt * current * (rows.q_current_a + magnet * warm)
         + reluctance * current**2 * rows.product_a2
         + (rows.ripple_nm + shift.get(RIPPLE, 0.0) * rows.u_ripple_nm)
         - load * rows.load_nm
     )
-    return driving_nm
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:

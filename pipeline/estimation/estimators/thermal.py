@@ -434,8 +434,7 @@ def _by_offset(
         return 0.5 * (low - high)
     rise = float(record.temp_winding_degc.max()) - ambient
     signs = np.array([1.0, -1.0, 0.0, 0.0])[: balance.values.size]
-    shift: Array = balance.values * signs * u_degc / rise
-    return shift
+    return balance.values * signs * u_degc / rise
 
 
 def _evidence(balance: Balance, record: HeatRecord) -> Evidence:

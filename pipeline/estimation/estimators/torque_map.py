@@ -205,8 +205,7 @@ def _regress(points: Sequence[Point], alpha_1_k: float, chosen: Sequence[str]) -
 def _sigma(points: Sequence[Point]) -> Array:
     """Relative weights: the noise of a mean falls with the root of its rows."""
     rows = _column(points, "rows")
-    ratio: Array = np.sqrt(rows.mean() / rows)
-    return ratio
+    return np.sqrt(rows.mean() / rows)
 
 
 def _estimates(

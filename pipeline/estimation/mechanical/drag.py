@@ -195,8 +195,7 @@ class DragFit:
         scale = np.sqrt(np.maximum(np.diag(joint), 1e-300))
         correlation = joint / np.outer(scale, scale) + 1e-12 * np.eye(3)
         values, vectors = np.linalg.eigh(correlation)
-        root: Array = vectors * np.sqrt(np.maximum(values, 0.0)) * scale[:, None]
-        return root
+        return vectors * np.sqrt(np.maximum(values, 0.0)) * scale[:, None]
 
     def curve(self, rows: ShaftRows) -> tuple[Array, Array, Array]:
         """Drag over speed, for a plot.
@@ -492,8 +491,7 @@ def _implausible(rows: ShaftRows, design: Design, y: Array, sigma: Array) -> boo
 def _drag_part(design: Design, fit: LinearFit) -> Array:
     """Drag [w] in torque that a fit gives each row: its drag columns over g."""
     places = [k for k, name in enumerate(design.names) if name in _DRAG_NAMES]
-    drag: Array = design.columns[:, places] @ fit.coefficients[places] / fit.coefficients[0]
-    return drag
+    return design.columns[:, places] @ fit.coefficients[places] / fit.coefficients[0]
 
 
 def _low_end(curve: Array, fastest: float) -> tuple[float, float]:

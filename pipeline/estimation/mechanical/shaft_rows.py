@@ -257,8 +257,7 @@ def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:
     for rows, _ in coasting_rows(speed):
         outside[rows] = False
     before = np.concatenate([[0], np.cumsum(outside)])
-    driven: NDArray[np.bool_] = before[weak.starts + weak.sizes] > before[weak.starts]
-    return driven
+    return before[weak.starts + weak.sizes] > before[weak.starts]
 
 
 def _undetermined(part: _Part, fastest: float) -> NDArray[np.bool_]:

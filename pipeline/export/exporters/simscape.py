@@ -104,8 +104,7 @@ def _torque(source: Source) -> Iterator[str]:
 def _summed(tables: Sequence[EffectTable], variable: str, grid: np.ndarray) -> list[float]:
     turn = 2.0 * np.pi if variable == "theta_mech_rad" else None
     each = [np.interp(grid, t.axes[variable], t.values, period=turn) for t in tables]
-    torques: list[float] = np.sum(each, axis=0).tolist()
-    return torques
+    return np.sum(each, axis=0).tolist()
 
 
 def _delay(source: Source) -> list[str]:

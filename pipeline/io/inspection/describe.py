@@ -366,5 +366,4 @@ def _time_s(table: RawTable, fields: Sequence[FieldSeen]) -> NDArray[np.float64]
         return values * factor * (clock.scale or 1.0)
     if table.log_time_ns is None or table.blocks:
         return None
-    time: NDArray[np.float64] = table.log_time_ns.astype(np.float64) / 1e9
-    return time
+    return table.log_time_ns.astype(np.float64) / 1e9

@@ -148,8 +148,7 @@ def _clock(name: str, values: Array) -> Clock | None:
 
 def _without_line(values: Array, along: Array) -> Array:
     slope, start = np.polyfit(along - along[0], values, 1)
-    flat: Array = values - start - slope * (along - along[0])
-    return flat
+    return values - start - slope * (along - along[0])
 
 
 def _integrals(numbers: Mapping[str, Array], clock: str) -> tuple[Relation, ...]:

@@ -138,8 +138,7 @@ def _zero_of(current: Array) -> float:
 def _smoothed(values: Array) -> Array:
     """Means over five rows, which single readings of a coarse speed need."""
     padded = np.pad(values, 2, mode="edge")
-    smooth: Array = np.convolve(padded, np.full(5, 0.2), mode="valid")
-    return smooth
+    return np.convolve(padded, np.full(5, 0.2), mode="valid")
 
 
 def _drift(speed: Array) -> Array:
@@ -147,8 +146,7 @@ def _drift(speed: Array) -> Array:
     width = LEAST_ROWS
     padded = np.pad(speed, (width // 2, width - width // 2 - 1), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, width)
-    ranges: Array = windows.max(axis=1) - windows.min(axis=1)
-    return ranges
+    return windows.max(axis=1) - windows.min(axis=1)
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -274,8 +274,7 @@ class _Pass:
 
     def places(self, rows: Integers | None) -> Integers:
         """Byte positions in the buffer of the messages `rows`."""
-        at: Integers = self.origin + self.at if rows is None else self.origin[rows] + self.at[rows]
-        return at
+        return self.origin + self.at if rows is None else self.origin[rows] + self.at[rows]
 
     def align(self, width: int, rows: Integers | None, only: Any = True) -> None:
         to = min(width, self.align_most)

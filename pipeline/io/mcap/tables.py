@@ -284,8 +284,7 @@ def _place(batch: Batch, names: Leaf, counts: Integers, joint: str | None) -> In
             "check the joint's name with `inspect`",
             (row, row),
         )
-    places: Integers = place[equal].astype(np.int64)
-    return places
+    return place[equal].astype(np.int64)
 
 
 class Column:

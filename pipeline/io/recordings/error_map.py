@@ -57,8 +57,7 @@ def diverging(share: NDArray[np.float64]) -> Image:
     """
     strength = np.clip(np.abs(share), 0.0, 1.0)[..., None]
     end = np.where(share[..., None] < 0.0, _COLD, _WARM)
-    colours: Image = np.rint(_NEUTRAL + (end - _NEUTRAL) * strength).astype(np.uint8)
-    return colours
+    return np.rint(_NEUTRAL + (end - _NEUTRAL) * strength).astype(np.uint8)
 
 
 def map_picture(error_map: ErrorMap, reach: float) -> Image:

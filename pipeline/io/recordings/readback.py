@@ -42,8 +42,7 @@ def recording_property(path: Path, name: str, key: str) -> list[Any]:
         for chunk in stream.filter(content=f"/__properties/{name}", is_static=True):
             batch = chunk.to_record_batch()
             if key in batch.schema.names:
-                value: list[Any] = batch.column(key)[0].as_py()
-                return value
+                return batch.column(key)[0].as_py()
     except (RuntimeError, ValueError, OSError) as error:
         raise RecordingError(f"{path.name} cannot be read: {error}", "make it again") from error
     return []

@@ -241,8 +241,7 @@ def _descriptor(names: list[str], block: int | None) -> bytes:
     from google.protobuf import descriptor_pb2
 
     files = descriptor_pb2.FileDescriptorSet(file=[_file_descriptor(names, block)])
-    content: bytes = files.SerializeToString(deterministic=True)
-    return content
+    return files.SerializeToString(deterministic=True)
 
 
 def _protobuf(table: Table, block: int | None) -> Payloads:

@@ -123,8 +123,7 @@ def _ranges(evidence: Evidence) -> tuple[tuple[float, float], tuple[float, float
 
 def _finite(arrays: Iterable[Array]) -> Array:
     joined: Array = np.concatenate([np.empty(0), *arrays])
-    finite: Array = joined[np.isfinite(joined)]
-    return finite
+    return joined[np.isfinite(joined)]
 
 
 def _bar_pitch(xs: Array) -> float:
