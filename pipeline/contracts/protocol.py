@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records.capture import Capture, Mask
+from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
 
 
@@ -63,7 +64,27 @@ def warning(
         First and last row concerned, from 0.
 
     """
-    return Finding(capture.path, "warning", code, message, remedy, rows)
+    return Finding(capture.path, "warning", code, message + time_of(capture, rows), remedy, rows)
+
+
+def time_of(capture: Capture, rows: tuple[int, int] | None) -> str:
+    """The time of rows, by which one finds them where rows have no numbers; empty if unknown.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+    rows
+        First and last row; None for none. Of a capture of several tables they are those of any.
+
+    """
+    if rows is None or len(capture.tables) != 1 or "t_s" not in capture.tables[0].columns:
+        return ""
+    t_s = capture.tables[0]["t_s"].to_numpy()
+    if rows[1] >= t_s.size or not np.isfinite(t_s[list(rows)]).all():
+        return ""
+    first, last = (f"{t_s[row]:.6g}" for row in rows)
+    return f" (at {first} s)" if rows[0] == rows[1] else f" ({first} to {last} s)"
 
 
 def span_of(rows: NDArray[np.bool_]) -> tuple[int, int]:
@@ -77,3 +98,18 @@ def span_of(rows: NDArray[np.bool_]) -> tuple[int, int]:
     """
     where = np.flatnonzero(rows)
     return int(where[0]), int(where[-1])
+
+
+def with_time(capture: Capture, fault: CaptureError) -> CaptureError:
+    """A refusal whose message ends with the time of its rows.
+
+    Parameters
+    ----------
+    capture
+        That is refused.
+    fault
+        Why.
+
+    """
+    message = fault.message + time_of(capture, fault.rows)
+    return CaptureError(fault.code, message, fault.remedy, fault.rows)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
+from pipeline.contracts.protocol import with_time
 from pipeline.contracts.requirements import requirements
 from pipeline.physics.glossary import COLUMNS, METADATA, TESTS, Term, has_clock
 from pipeline.records.capture import Capture, CaptureMeta
@@ -150,7 +151,7 @@ def check_tables(capture: Capture) -> None:
     for table in capture.tables:
         faults.extend(_table_faults(table))
     if faults:
-        raise merged(faults)
+        raise merged([with_time(capture, fault) for fault in faults])
 
 
 def _table_faults(table: pl.DataFrame) -> list[CaptureError]:

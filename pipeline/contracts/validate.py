@@ -10,7 +10,7 @@ import polars as pl
 import polars.selectors as cs
 
 from pipeline.contracts.gates import missing_values
-from pipeline.contracts.protocol import warning
+from pipeline.contracts.protocol import warning, with_time
 from pipeline.contracts.registry import gates
 from pipeline.contracts.schemas import check_columns, check_metadata, check_tables
 from pipeline.numerics.alike import same_but_for_noise
@@ -74,7 +74,7 @@ def validate(
         try:
             passed = gate.check(capture, chosen)
         except CaptureError as refusal:
-            refusals[gate.name] = refusal
+            refusals[gate.name] = with_time(capture, refusal)
         except BROKEN as error:
             broken.append(_broken(gate.name, error))
         else:

@@ -36,6 +36,8 @@ def test_nan_rows_are_set_aside(rng: np.random.Generator) -> None:
     torque[1000:1400] = np.nan
     passed, finding = warned(with_column(capture, "torque_shaft_nm", torque))
     assert (finding.code, finding.rows) == ("missing_values", (1000, 1399))
+    t_s = column(capture, "t_s")
+    assert finding.message.endswith(f" ({t_s[1000]:.6g} to {t_s[1399]:.6g} s)")
     assert [mask.dropped for mask in passed.masks] == [400]
     assert passed.arrays("iq_a")["iq_a"].size == 15600
 
@@ -249,7 +251,9 @@ def test_clock_jump_in_a_step(rng: np.random.Generator) -> None:
     capture = current_step(MOTOR, rng)
     t = column(capture, "t_s")
     t[350:] += 30.0 * (t[1] - t[0])
-    assert refused(with_column(capture, "t_s", t)).code == "clock_jump"
+    error = refused(with_column(capture, "t_s", t))
+    assert error.code == "clock_jump"
+    assert f"({t[349]:.6g} to {t[350]:.6g} s)" in error.message
 
 
 def test_clock_set_back(rng: np.random.Generator) -> None:
@@ -259,3 +263,4 @@ def test_clock_set_back(rng: np.random.Generator) -> None:
     t[20000:] -= 1.0
     error = refused(with_column(capture, "t_s", t))
     assert (error.code, error.rows) == ("time_not_increasing", (20000, 20000))
+    assert error.message.endswith(f" (at {t[20000]:.6g} s)")

@@ -23,10 +23,9 @@ _EXACT_INTEGER = 2**53
 _BREAKS = bytes.maketrans(b"\r\n", b"  ")
 
 
-def _bad(what: str, row: int | None = None) -> CaptureError:
-    rows = None if row is None else (row, row)
+def _bad(what: str) -> CaptureError:
     return CaptureError(
-        "bad_message", f"a JSON message {what}", "write each message as one JSON object", rows
+        "bad_message", f"a JSON message {what}", "write each message as one JSON object"
     )
 
 
@@ -69,18 +68,18 @@ class JsonDecoder:
             buffer[at : at + n]
             for at, n in zip(batch.start.tolist(), batch.length.tolist(), strict=True)
         ]
-        template = _object(payloads[0], 0)
+        template = _object(payloads[0])
         fast = _all_at_once(payloads, template, wanted)
         return _one_by_one(payloads, wanted) if fast is None else fast
 
 
-def _object(payload: bytes, row: int) -> dict[str, Any]:
+def _object(payload: bytes) -> dict[str, Any]:
     try:
         value = json_value(payload, unique_keys=True)
     except ParseError as fault:
-        raise _bad(str(fault), row) from None
+        raise _bad(str(fault)) from None
     if not isinstance(value, dict):
-        raise _bad("is no object", row)
+        raise _bad("is no object")
     return value
 
 
@@ -186,30 +185,28 @@ def _one_by_one(payloads: list[bytes], wanted: Wanted) -> dict[str, Leaf]:
     """The leaves by reading each message on its own."""
     rows: list[dict[str, Any]] = []
     keys: dict[str, None] = {}
-    for row, payload in enumerate(payloads):
+    for payload in payloads:
         flat: dict[str, Any] = {}
-        _flatten(_object(payload, row), "", flat, row, 0)
+        _flatten(_object(payload), "", flat, 0)
         rows.append(flat)
         keys.update(dict.fromkeys(flat))
         if len(keys) > MAX_FIELDS:
-            raise _bad(f"stream has more than {MAX_FIELDS} fields", row)
+            raise _bad(f"stream has more than {MAX_FIELDS} fields")
     names = [name for name in keys if wanted(name)]
     return {name: _leaf(name, [flat.get(name) for flat in rows]) for name in names}
 
 
-def _flatten(
-    value: dict[str, Any], prefix: str, flat: dict[str, Any], row: int, depth: int
-) -> None:
+def _flatten(value: dict[str, Any], prefix: str, flat: dict[str, Any], depth: int) -> None:
     if depth > MAX_DEPTH:
-        raise _bad("nests too deep", row)
+        raise _bad("nests too deep")
     for key, part in value.items():
         name = prefix + key
         if isinstance(part, dict):
-            _flatten(part, f"{name}.", flat, row, depth + 1)
+            _flatten(part, f"{name}.", flat, depth + 1)
         elif isinstance(part, list) and part and all(isinstance(item, dict) for item in part):
             for item in part:
                 inner: dict[str, Any] = {}
-                _flatten(item, f"{name}.", inner, row, depth + 1)
+                _flatten(item, f"{name}.", inner, depth + 1)
                 for leaf, number in inner.items():
                     flat.setdefault(leaf, []).append(number)
         elif part is None or isinstance(part, (int, float, list)):

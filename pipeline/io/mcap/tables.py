@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.io.mcap.cdr import CdrDecoder
 from pipeline.io.mcap.container import Definitions, Layout
+from pipeline.io.mcap.first_fault import of_first_message
 from pipeline.io.mcap.json_payload import JsonDecoder
 from pipeline.io.mcap.leaf import Decoder, Leaf
 from pipeline.io.mcap.messages import Batch, batches
@@ -124,7 +125,10 @@ def read_tables(layout: Layout, wanted: WantedIn, joint: str | None = None) -> l
             if number not in known:
                 known[number] = _stream(streams, layout.definitions, number)
         for stream in streams.values():
-            _decode(stream, batch.of(stream.channels), wanted, joint, len(layout.chunks))
+            of_stream = batch.of(stream.channels)
+            if of_stream.start.size:
+                leaves = _decoded(stream, of_stream, wanted, joint, first)
+                stream.gathered.add(leaves, of_stream.log_time, max(len(layout.chunks), 1))
     tables = (_table(stream, first or 0) for stream in streams.values())
     return [table for table in tables if table is not None]
 
@@ -143,17 +147,24 @@ def _stream(
     return streams[key]
 
 
-def _decode(
-    stream: _Stream, batch: Batch, wanted: WantedIn, joint: str | None, batches_in_all: int
-) -> None:
-    if stream.decoder is None or batch.start.size == 0:
-        return
+def _decoded(
+    stream: _Stream, batch: Batch, wanted: WantedIn, joint: str | None, first_ns: int
+) -> dict[str, Leaf]:
+    """The leaves of a batch; a CaptureError names the first message at fault."""
     extra = ("name", *QUANTITIES) if stream.joint_state else ()
-    leaves = stream.decoder.decode(batch, lambda name: name in extra or wanted(stream.topic, name))
-    if stream.joint_state:
-        leaves = pick_joint(batch, leaves, joint)
-    leaves = {name: leaf for name, leaf in leaves.items() if not leaf.places}
-    stream.gathered.add(leaves, batch.log_time, max(batches_in_all, 1))
+    decoder = stream.decoder
+    if decoder is None:
+        return {}
+
+    def decode(messages: Batch) -> dict[str, Leaf]:
+        leaves = decoder.decode(messages, lambda n: n in extra or wanted(stream.topic, n))
+        return pick_joint(messages, leaves, joint) if stream.joint_state else leaves
+
+    try:
+        leaves = decode(batch)
+    except CaptureError as fault:
+        raise of_first_message(fault, batch, decode, stream.gathered.messages, first_ns) from None
+    return {name: leaf for name, leaf in leaves.items() if not leaf.places}
 
 
 def _table(stream: _Stream, first: int) -> RawTable | None:
@@ -197,7 +208,8 @@ def _counts(
             row = int(first[: differs[0]].sum())
             raise CaptureError(
                 "ragged_block",
-                f"a block of {topic} has arrays {first_name!r} and {name!r} of different length",
+                f"a block of {topic} has arrays {first_name!r} and {name!r} of different length "
+                f"(message {int(differs[0])})",
                 "write every field of a block with one length",
                 (row, row),
             )
@@ -290,9 +302,7 @@ def _place(batch: Batch, names: Leaf, counts: Integers, joint: str | None) -> In
 class Column:
     """One field of a stream. Room that was not needed is never touched, so it costs no memory."""
 
-    def __init__(self, name: str, topic: str) -> None:
-        self.name = name
-        self.topic = topic
+    def __init__(self) -> None:
         self.array: bool | None = None
         self._buffer: NDArray[Any] = np.empty(0)
         self._size = 0
@@ -309,20 +319,8 @@ class Column:
         batches
             How many of them may come in all.
 
-        Raises
-        ------
-        CaptureError
-            The field is a number in one message and an array in another (`bad_message`).
-
         """
-        array = leaf.counts is not None
-        if self.array not in (None, array):
-            raise CaptureError(
-                "bad_message",
-                f"the field {self.name!r} of {self.topic} is a number here and an array there",
-                "write one sample, or one block, in every message",
-            )
-        self.array = array
+        self.array = leaf.counts is not None
         if leaf.counts is not None:
             self._counts.append(leaf.counts)
         self._append(leaf.values, batches)
@@ -368,7 +366,7 @@ class Gathered:
         self.topic = topic
         self.messages = 0
         self._columns: dict[str, Column] = {}
-        self._times = Column("log_time", topic)
+        self._times = Column()
 
     def add(self, leaves: dict[str, Leaf], times: NDArray[np.uint64], batches: int) -> None:
         """Takes in one batch of messages.
@@ -382,14 +380,27 @@ class Gathered:
         batches
             How many batches may come in all, to reserve room.
 
+        Raises
+        ------
+        CaptureError
+            The field is a number in one message and an array in another (`bad_message`).
+
         """
         for name, leaf in leaves.items():
             if name not in self._columns:
-                column = Column(name, self.topic)
+                column = Column()
                 column.array = leaf.counts is not None
                 if self.messages:
                     column.skip(self.messages)
                 self._columns[name] = column
+            if self._columns[name].array != (leaf.counts is not None):
+                raise CaptureError(
+                    "bad_message",
+                    f"the field {name!r} of {self.topic} is a number in one message and an array "
+                    f"in another (from message {self.messages} on)",
+                    "write one sample, or one block, in every message",
+                    (self.messages, self.messages),
+                )
             self._columns[name].add(leaf, batches)
         for name in self._columns.keys() - leaves.keys():
             self._columns[name].skip(times.size)

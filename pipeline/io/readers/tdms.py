@@ -36,7 +36,7 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     Raises
     ------
     CaptureError
-        It is no TDMS file, or one that is cut off (`not_tdms`), or npTDMS is missing
+        It is no TDMS file (`not_tdms`), or one that is cut off (`truncated`), or npTDMS is missing
         (`missing_library`).
 
     References
@@ -51,7 +51,7 @@ def read(data: bytes) -> tuple[RawTable, ...]:
         with _warnings_of("nptdms") as warnings:
             file = nptdms.TdmsFile.read(io.BytesIO(data))
         if warnings:
-            raise ValueError(warnings[0])
+            raise _cut_off(file, warnings[0])
         for group in file.groups():
             for channel in group.channels():
                 values = np.asarray(channel[:])
@@ -65,12 +65,25 @@ def read(data: bytes) -> tuple[RawTable, ...]:
                 if step > 0.0:
                     fields[f"{group.name}/time"] = _time(channel, values.size, step)
                     units[f"{group.name}/time"] = "s"
+    except CaptureError:
+        raise
     except Exception as fault:
         raise CaptureError("not_tdms", f"it is no TDMS file: {fault}", "write it anew") from fault
     return tuple(
         RawTable(group, fields, units=tuple((n, units[n]) for n in fields if units[n]))
         for (group, _, _), fields in sorted(channels.items())
     )
+
+
+def _cut_off(file: Any, warning: str) -> CaptureError:
+    """What is said of a file that ends early: how many samples of each channel there are."""
+    channels = [channel for group in file.groups() for channel in group.channels()]
+    whole = min((len(channel) for channel in channels), default=0)
+    step = max((float(c.properties.get("wf_increment", 0.0)) for c in channels), default=0.0)
+    time = f", {whole * step:.9g} s" if step > 0.0 else ""
+    words = f"it is cut off: {whole} samples of each channel are whole{time} ({warning})"
+    remedy = "copy it again, once the recording has ended"
+    return CaptureError("truncated", words, remedy, (whole, whole))
 
 
 @contextmanager

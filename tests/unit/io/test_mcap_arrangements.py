@@ -18,7 +18,8 @@ from mcap.writer import CompressionType
 
 from pipeline.io.mcap.container import scan
 from pipeline.io.mcap.tables import read_tables
-from tests.unit.io.recordings import START_NS, mcap_file, protobuf_schema
+from pipeline.records.errors import CaptureError
+from tests.unit.io.recordings import START_NS, json_messages, mcap_file, protobuf_schema
 
 N = 3000
 LARGE = 1 << 18
@@ -132,3 +133,45 @@ def test_scalars_alone_and_log_times(encoding: str, chunk_size: int) -> None:
     assert tables[1].fields["a"].tolist() == [base + 0.5 * n for n in range(N)]
     assert tables[1].log_time_ns.tolist() == [500 + 3 * n for n in range(N)]
     assert tables[0].log_time_ns.tolist() == [0]
+
+
+BROKEN = {
+    "cdr": lambda payload: payload[:-3],
+    "protobuf": lambda payload: payload[:-3],
+    "json": lambda payload: payload[:-3] + b'"x}',
+}
+
+
+@pytest.mark.parametrize("arrangement", [alone, between])
+@pytest.mark.parametrize("encoding", WRITERS)
+@pytest.mark.parametrize("chunk_size", [3000, 1 << 24])
+@pytest.mark.parametrize("number", [0, 1, 2345, N - 1])
+def test_a_refused_message_is_named_with_its_number_and_time(
+    encoding: str, arrangement: Any, chunk_size: int, number: int
+) -> None:
+    """Expected: the first one at fault of its topic, however many chunks and topics there are."""
+    write, schema, _ = WRITERS[encoding]
+    messages = [
+        (topic, START_NS + n * 1000, one) for n, (topic, _, one) in enumerate(arrangement(write, N))
+    ]
+    of_topic = [n for n, (topic, _, _) in enumerate(messages) if topic == "/a"]
+    for at in {number, N - 1}:
+        topic, time, payload = messages[of_topic[at]]
+        messages[of_topic[at]] = (topic, time, BROKEN[encoding](payload))
+    data = mcap_file(messages, schema, encoding, chunk_size=chunk_size)
+    with pytest.raises(CaptureError) as refused:
+        read_tables(scan(data), lambda _topic, _name: True)
+    fault = refused.value
+    assert fault.code == "bad_message"
+    assert fault.rows == (number, number)
+    seconds = of_topic[number] * 1e-6
+    assert f"(message {number}, {seconds:.9g} s after the first of the file)" in fault.message
+
+
+def test_a_field_that_becomes_an_array_is_named_with_the_message() -> None:
+    rows = [{"a": float(n)} for n in range(2000)] + [{"a": [float(n)]} for n in range(2000)]
+    data = mcap_file(json_messages(rows), ("M", "jsonschema", b"{}"), chunk_size=3000)
+    with pytest.raises(CaptureError) as refused:
+        read_tables(scan(data), lambda _topic, _name: True)
+    (row, _) = refused.value.rows or (0, 0)
+    assert row == 2000

@@ -238,8 +238,12 @@ def test_a_log_of_entries_tells_arrays_apart_and_leaves_texts() -> None:
 def test_a_tdms_that_lacks_its_end_is_refused_though_its_library_reads_on() -> None:
     """NpTDMS logs a warning and gives what there is; nothing is said on standard error."""
     data = tdms()
-    with pytest.raises(CaptureError, match="less data than expected"):
+    with pytest.raises(CaptureError, match="less data than expected") as refused:
         find_reader("tdms").read(data[: len(data) - 40])
+    whole = CURRENT.size - 5
+    assert refused.value.code == "truncated"
+    assert refused.value.rows == (whole, whole)
+    assert f"{whole} samples of each channel are whole, {0.01 * whole:.9g} s" in str(refused.value)
 
 
 def test_complex_numbers_are_no_column() -> None:
