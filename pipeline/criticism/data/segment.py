@@ -46,6 +46,9 @@ class Sensors:
     speed_noise_rad_s
         Standard deviation of the noise of a speed whose integral is the angle; None of a recorded
         angle.
+    held_speed
+        Whether only windows of such a speed are used in which it does not change, so that no
+        inertia is in the torque.
 
     """
 
@@ -56,6 +59,7 @@ class Sensors:
     readings: int = 1
     parabola: int = 1
     speed_noise_rad_s: float | None = None
+    held_speed: bool = False
 
 
 @dataclass(frozen=True, slots=True)

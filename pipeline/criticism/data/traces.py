@@ -578,6 +578,40 @@ def evened(
     return replace(sensors, noise=noise, parabola=width)
 
 
+def held_speed(
+    theta_rad: Array, noise_rad: float, window: int, policy: Cutting
+) -> NDArray[np.bool_]:
+    """Samples around which a recorded speed does not change beyond its noise.
+
+    Parameters
+    ----------
+    theta_rad
+        Integral of the speed [n].
+    noise_rad
+        Standard deviation of the speed's noise, times the sample period.
+    window
+        Samples of a weak window.
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    array [n] of bool
+        Where the speed scatters no more than its noise in a window, and the means of the window
+        before and of the one behind agree; none in a record of less than three windows.
+
+    """
+    travel, width = np.diff(theta_rad), 2 * (window // 2) + 1
+    if travel.size < 3 * width:
+        return np.zeros(theta_rad.size, dtype=bool)
+    mean = smoothed(travel, width)
+    apart = np.zeros(travel.size)
+    apart[width:-width] = mean[2 * width :] - mean[: -2 * width]
+    level = np.abs(apart) <= policy.change_u * noise_rad * math.sqrt(2.0 / width)
+    calm = smoothed((travel - mean) ** 2, width) <= (policy.motion_u * noise_rad) ** 2
+    return np.append(level & calm, False)
+
+
 def parabolas(signal: Array, width: int) -> Array:
     """Local parabolas by least squares, those of the ends to the ends.
 

@@ -14,6 +14,7 @@ from pipeline.criticism.data.traces import (
     SMOOTHED,
     even_clock,
     evened,
+    held_speed,
     prepared,
     shaft_angle,
     thinned,
@@ -70,21 +71,28 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if not turning and capture.meta.test != "heat_run":
         return None
     angle = not ANGLES.isdisjoint(names)
-    torque = capture.has("torque_shaft_nm") and turning and angle
+    held = not angle and capture.meta.test == "torque_map"
+    torque = capture.has("torque_shaft_nm") and turning and (angle or held)
     names += ["torque_shaft_nm"] if torque else []
     policy = machine.policy.cutting
     period, columns, keep = even_clock(capture, tuple(names), policy)
     speed_noise = shaft_angle(columns, period, machine)
     turned = float(np.ptp(columns["theta_mech_rad"]))
-    channels: tuple[str, ...] = ("vd_v", "vq_v")
-    if torque and turned > policy.turning_rad:
-        channels += ("torque_shaft_nm",)
     size = columns["vd_v"].size
     window = window_of(period, size, policy)
     orders = electrical_orders(machine) if angle and turned > policy.turning_rad else ()
     sensors = evened(
         capture, columns, prepared(columns, period, machine.policy, speed_noise), machine, window
     )
+    if held and torque:
+        # a noisy speed that is differenced, times J, would be a torque
+        still = held_speed(columns["theta_mech_rad"], (speed_noise or 0.0) * period, window, policy)
+        torque = 2 * np.count_nonzero(still) > size
+        keep = keep & still if torque else keep
+        sensors = replace(sensors, held_speed=torque)
+    channels: tuple[str, ...] = ("vd_v", "vq_v")
+    if torque and turned > policy.turning_rad:
+        channels += ("torque_shaft_nm",)
     most = policy.windows if capture.meta.test == "torque_map" else policy.windows_drive
     columns["t_s"] = period * np.arange(size, dtype=np.float64)
     logged = capture.meta.test == "drive" and len(channels) > 2

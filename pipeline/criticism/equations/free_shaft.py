@@ -82,17 +82,21 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 def _coasts(theta: Array, window: int, driven_share: float) -> NDArray[np.bool_]:
     """Samples [n] in which a shaft coasts.
 
-    These are all samples, unless the shaft is driven or held at its speed before some coast, or
-    rests behind it, for more than a share of that coast. Then they are those of the coasts alone.
+    A shaft at rest does not: friction holds it, and what is left of its recorded speed is of the
+    sensor. What is before a coast counts, unless the shaft was driven or held there for more than
+    a share of some coast. A shaft that never turns has no coast, and all of it counts.
     """
     speed = smoothed(np.gradient(theta), 2 * (window // 2) + 1)
     runs = sorted(((rows.start, rows.stop) for rows, _ in coasting_rows(speed)))
-    ends, starts = [0, *(stop for _, stop in runs)], [*(start for start, _ in runs), theta.size]
+    if not runs:
+        return np.ones(theta.size, dtype=bool)
+    ends = [0, *(stop for _, stop in runs)]
     driven = any(
-        max(start - end, after - stop) > driven_share * (stop - start)
-        for (start, stop), end, after in zip(runs, ends, starts[1:], strict=False)
+        start - end > driven_share * (stop - start)
+        for (start, stop), end in zip(runs, ends, strict=False)
     )
-    free = np.full(theta.size, not driven)
+    free = np.zeros(theta.size, dtype=bool)
+    free[: runs[0][0]] = not driven
     for start, stop in runs:
         free[start:stop] = True
     return free

@@ -178,12 +178,13 @@ def sensed_torque(
 
     Notes
     -----
-    T − J d²θ/dt² in the shaft, T at the stator, with its errors and its gain.
+    T − J d²θ/dt² in the shaft, T at the stator and where the speed is held, with its errors and
+    its gain.
 
     """
     finer = x.theta_rad.size // segment.size
     torque = averaged(torque_nm, finer) if finer > 1 else torque_nm
-    if not segment.instrument.stator:
+    if not segment.instrument.stator and not segment.sensors.held_speed:
         acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
         torque = torque - values["j_kgm2"] * acceleration
     return as_sensed(torque, model, values)

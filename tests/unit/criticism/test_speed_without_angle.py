@@ -8,9 +8,11 @@ import pytest
 
 from pipeline.criticism.comparison import compare
 from pipeline.criticism.equations.dq import cut
+from pipeline.criticism.equations.free_shaft import cut as cut_coast
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.noise_floors import noise_floor, window_gain
+from pipeline.criticism.residuals.residual import residual
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -20,11 +22,13 @@ DRY_RAD_S2, VISCOUS_1_S = 70.0, 0.25
 CURRENT_A = 10.0
 
 
-def coast(seed: int, noise_rad_s: float, begins_rad_s: float) -> Capture:
-    """The speed of a shaft with dry and viscous friction alone, once a millisecond."""
+def coast(seed: int, noise_rad_s: float, begins_rad_s: float, until: float = 0.98) -> Capture:
+    """The speed of a shaft with dry and viscous friction alone, once a millisecond, until a share
+    of the time at which it stops.
+    """
     dry = DRY_RAD_S2 / VISCOUS_1_S
     ends_s = np.log1p(begins_rad_s / dry) / VISCOUS_1_S
-    t_s = np.arange(0.0, 0.98 * ends_s, 1e-3)
+    t_s = np.arange(0.0, until * ends_s, 1e-3)
     speed = (begins_rad_s + dry) * np.exp(-VISCOUS_1_S * t_s) - dry
     noise = noise_rad_s * np.random.default_rng(seed).standard_normal(t_s.size)
     table = pl.DataFrame({"t_s": t_s, "omega_mech_rad_s": speed + noise})
@@ -74,3 +78,59 @@ def test_what_goes_with_the_angle_is_noise_where_no_angle_is_recorded() -> None:
     wave_v = 0.03 * BASE["r_ohm"] * CURRENT_A
     assert floors["omega_mech_rad_s"][1] == pytest.approx(wave_v, rel=0.35)
     assert floors["omega_mech_rad_s"][0] < 0.1 * wave_v
+
+
+def test_what_a_filter_makes_of_a_shaft_that_has_stopped_is_no_coast() -> None:
+    """A filtered speed fades and is never zero, so its sign is that of a shaft that turns."""
+    moving = coast(1, 0.02, 200.0, until=1.0)
+    speed = moving.tables[0]["omega_mech_rad_s"].to_numpy()
+    fading = speed[-1] * np.exp(-np.arange(40) / 2.0)
+    record = np.concatenate([speed, fading])
+    table = pl.DataFrame({"t_s": 1e-3 * np.arange(record.size), "omega_mech_rad_s": record})
+    stopped = Capture("coast.csv", "1", "verified", moving.meta, (table,))
+    segment = cut_coast(stopped, machine())
+    assert segment is not None and segment.weak is not None
+    recorded = np.gradient(segment.recorded["theta_mech_rad"], segment.ts_s)
+    slowest = recorded[segment.weak.starts + segment.weak.length - 1].min()
+    assert 0.1 < slowest < 6.0
+
+
+def held_map(test: str, sag_rad_s: float = 0.0) -> Capture:
+    """Three seconds at 20 and three at 40 rad/s, half a second between, a speed and no angle."""
+    random, t_s = np.random.default_rng(4), np.arange(0.0, 6.5, 1e-3)
+    speed = np.interp(t_s, [3.0, 3.5], [20.0, 40.0]) + sag_rad_s * np.sin(40.0 * t_s)
+    columns = dict.fromkeys(("vd_v", "id_a"), np.zeros(t_s.size))
+    columns |= {"vq_v": 7.0 * BASE["psi_wb"] * speed, "iq_a": np.zeros(t_s.size)}
+    columns |= {"torque_shaft_nm": -BASE["b_nm_s_rad"] * speed, "omega_mech_rad_s": speed}
+    sizes = {"omega_mech_rad_s": 0.1, "torque_shaft_nm": 1e-5}
+    noisy = {
+        n: one + random.normal(0.0, sizes.get(n, 1e-3), t_s.size) for n, one in columns.items()
+    }
+    table = pl.DataFrame({"t_s": t_s, **noisy})
+    return Capture("map.csv", "1", "verified", CaptureMeta("m", test, pole_pairs=7), (table,))
+
+
+def test_a_torque_beside_a_speed_that_is_held_counts_without_inertia() -> None:
+    """Where the speed changes is left out; the noise of a speed times J would be a torque."""
+    segment = cut(held_map("torque_map"), machine())
+    assert segment is not None and segment.weak is not None
+    assert "torque_shaft_nm" in segment.channels
+    middle = segment.recorded["t_s"][segment.weak.starts + segment.weak.length // 2]
+    assert middle.min() < 3.0
+    assert middle.max() > 3.5
+    assert not np.any((middle > 3.02) & (middle < 3.48))
+    torque = segment.channels.index("torque_shaft_nm")
+    model = Model(machine(), ())
+    missed = [
+        residual(segment, model, BASE | {"j_kgm2": inertia})[torque]
+        for inertia in (0.0, 10.0 * BASE["j_kgm2"])
+    ]
+    assert np.array_equal(*missed)
+
+
+@pytest.mark.parametrize(("test", "sag_rad_s"), [("drive", 0.0), ("torque_map", 2.0)])
+def test_a_torque_beside_a_speed_that_moves_needs_the_angle(test: str, sag_rad_s: float) -> None:
+    segment = cut(held_map(test, sag_rad_s), machine())
+    assert segment is not None and segment.weak is not None
+    assert "torque_shaft_nm" not in segment.channels
+    assert segment.weak.starts.size
