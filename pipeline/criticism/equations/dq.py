@@ -87,7 +87,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if held and torque:
         # a noisy speed that is differenced, times J, would be a torque
         still = held_speed(columns["theta_mech_rad"], (speed_noise or 0.0) * period, window, policy)
-        torque = 2 * np.count_nonzero(still) > size
+        torque = bool(2 * np.count_nonzero(still) > size)
         keep = keep & still if torque else keep
         sensors = replace(sensors, held_speed=torque)
     channels: tuple[str, ...] = ("vd_v", "vq_v")
