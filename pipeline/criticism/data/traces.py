@@ -608,8 +608,8 @@ def held_speed(
     apart = np.zeros(travel.size)
     apart[width:-width] = mean[2 * width :] - mean[: -2 * width]
     level = np.abs(apart) <= policy.change_u * noise_rad * math.sqrt(2.0 / width)
-    calm = smoothed((travel - mean) ** 2, width) <= (policy.motion_u * noise_rad) ** 2
-    return np.append(level & calm, False)
+    quiet = smoothed((travel - mean) ** 2, width) <= (policy.motion_u * noise_rad) ** 2
+    return np.append(level & quiet, False)
 
 
 def parabolas(signal: Array, width: int) -> Array:
