@@ -44,6 +44,7 @@ PLANS: dict[str, Plan] = {
     "torque_map": MAP,
     "inductance_rated": MAP,
     "torque_table": (("torque_table", "torque_table", {}),),
+    "flux_map": (("flux_map", "flux_map", {}),),
     "cogging": TURNS,
     "holding_current": (("holding_current", "holding_current", {}),),
     "drive_voltage": (("drive_0", "drive", {"voltage_timing": "held"}),),
@@ -200,7 +201,7 @@ def test_no_result_depends_on_the_size_of_the_machine(name: str) -> None:
                     assert q == pytest.approx(times * p, rel=1e-4, abs=size), one.title
 
 
-GAINS = {"voltage": ("V",), "current": ("A",), "torque": ("N·m",)}
+GAINS = {"voltage": ("V", "Wb"), "current": ("A",), "torque": ("N·m",)}
 
 
 @pytest.mark.parametrize("name", PLANS)
@@ -301,7 +302,7 @@ def test_no_result_depends_on_when_a_clock_began(name: str) -> None:
 
 
 # A row of these is a measurement of its own.
-TABLES = {"lcr", "torque_table", "holding_current"}
+TABLES = {"flux_map", "lcr", "torque_table", "holding_current"}
 
 
 @pytest.mark.parametrize("end", ["first", "last"])

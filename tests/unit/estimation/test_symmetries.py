@@ -21,7 +21,7 @@ EXCHANGED = {
 }  # fmt: skip
 TURNED = (
     "theta_mech_rad", "theta_elec_rad", "theta_elec_deg", "omega_mech_rad_s", "iq_a", "vq_v",
-    "torque_shaft_nm",
+    "torque_shaft_nm", "psi_q_wb",
 )  # fmt: skip
 PAIRS = {"ab": "ca", "bc": "bc", "ca": "ab"}
 NAMES = {"r_b_ohm": "r_c_ohm", "r_ab_ohm": "r_ca_ohm"} | {
