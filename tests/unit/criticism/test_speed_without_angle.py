@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 import pytest
+from numpy.typing import NDArray
 
 from pipeline.criticism.comparison import compare
+from pipeline.criticism.data.traces import held_speed
 from pipeline.criticism.equations.dq import cut
 from pipeline.criticism.equations.free_shaft import cut as cut_coast
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.operating import Array
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.noise_floors import noise_floor, window_gain
 from pipeline.criticism.residuals.residual import residual
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
@@ -134,3 +138,19 @@ def test_a_torque_beside_a_speed_that_moves_needs_the_angle(test: str, sag_rad_s
     assert segment is not None and segment.weak is not None
     assert "torque_shaft_nm" not in segment.channels
     assert segment.weak.starts.size
+
+
+def _speeds(moving: Array) -> NDArray[np.bool_]:
+    """Where a speed of 100 rad/s, a part of it `moving`, is held: 1 kHz, noise of 0.1 rad/s."""
+    noise = 0.1 * np.random.default_rng(1).standard_normal(moving.size)
+    theta = 1e-3 * np.cumsum(100.0 + moving + noise)
+    return held_speed(theta, 1e-4, 50, DEFAULT.cutting)
+
+
+def test_a_speed_is_held_where_neither_its_means_nor_its_samples_move():
+    """A ramp moves the means; a swing of a window's length moves the samples alone."""
+    t_s = 1e-3 * np.arange(1000)
+    assert _speeds(0.0 * t_s)[100:-100].mean() > 0.95
+    assert not _speeds(5.0 * t_s)[100:-100].any()
+    assert not _speeds(2.0 * np.sin(2.0 * np.pi * t_s / 0.051))[100:-100].any()
+    assert not _speeds(0.0 * t_s[:120]).any()
