@@ -197,7 +197,7 @@ def _chosen(
             cost = finished.deviance + math.log(wide.size) * finished.model_columns.size
             if cost > least + policy.tie:
                 return None
-            if _is_determined(linear_system(finished.fit, before=finished)):
+            if _is_determined(linear_system(finished.fit)):
                 return finished
             least = min(least, cost)
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
