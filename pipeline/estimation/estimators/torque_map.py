@@ -18,6 +18,7 @@ from pipeline.estimation.electrical.operating_points import (
 )
 from pipeline.estimation.electrical.ripple_torque import RIPPLE
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, angle_doubt, standstill_words
+from pipeline.estimation.mechanical.other_current import not_along_q, unlogged_share
 from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d
 from pipeline.estimation.method import Method, over_x
@@ -222,9 +223,11 @@ def _estimates(
     type_b = _type_b(points, chosen, alpha, instrument_uncertainties(used, ("current", "torque")))
     type_b[0] += propagate([(_per_alpha(points, chosen, alpha), alpha_parts)])
     type_b[0] += [Contribution("assumed:torque_form", slope_k.form_nm_a, "B"), *still]
+    why = ""
     if not _d_logged(points):
-        share = policy().torque_map.unlogged_d_share
+        share = unlogged_share(model.residuals, slope_k.kt_nm_a * _column(points, "iq_a"))
         type_b[0].append(Contribution("assumed:id_a", share * slope_k.kt_nm_a, "B"))
+        why = not_along_q(share)
     paths = sorted({p.capture.path for p in points})
     at = {"temp_magnet_degc": 25.0, "iq_a": float(np.max(np.abs(_column(points, "iq_a"))))}
 
@@ -234,7 +237,11 @@ def _estimates(
         return METHOD.measured(name, value, [METHOD.scatter(name, u, dof), *parts], paths, at, note)
 
     u = np.sqrt(np.diag(model.covariance))
-    estimates = [estimate(GIVES[0], slope_k.kt_nm_a, slope_k.u_nm_a, slope_k.dof, type_b[0])]
+    estimates = [
+        METHOD.missing(GIVES[0], why)
+        if why
+        else estimate(GIVES[0], slope_k.kt_nm_a, slope_k.u_nm_a, slope_k.dof, type_b[0])
+    ]
     if "id iq" in model.names:
         u_rel = float(u[model.index("id iq")])
         estimates.append(estimate(GIVES[1], _reluctance(model), u_rel, model.dof, type_b[1]))

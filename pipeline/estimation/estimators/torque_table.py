@@ -16,6 +16,7 @@ from pipeline.estimation.electrical.magnet_temperature import (
 )
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, RIPPLES, SOURCE, ripple_share
+from pipeline.estimation.mechanical.other_current import not_along_q, unlogged_share
 from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -118,6 +119,12 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         METHOD.scatter("kt", solution.u(1), solution.dof),
         Contribution(SOURCE, ripple_share(rows.theta_rad, pairs, known) * abs(kt), "B"),
     ]
+    if not any(capture.has("id_a") for capture in captures):
+        share = unlogged_share(solution.residuals, kt * rows.iq_a)
+        if why := not_along_q(share):
+            return METHOD.nothing(GIVES, why)
+        if share > policy().torque_map.unlogged_d_share:
+            parts.append(Contribution("assumed:id_a", share * abs(kt), "B"))
     sags = "; sags with current" if {"iq^3", "iq^5"} & set(chosen) else ""
     notes = [f"slope at small current{sags}", unstated_note(captures, ("current", "torque"))]
     notes.append(unlogged_note(captures))

@@ -164,6 +164,11 @@ class TorqueMap:
         why="a third of the current along d, where its field is a fifth of the magnet's and the "
         "axes' inductances differ by a third",
     )  # fmt: skip
+    other_current_share: float = chosen(
+        0.1, "1",
+        "scatter of torque over that of the recorded current, from which on Kt is not known",
+        why="conventions of Kt differ by no less: 1.10 at the least",
+    )  # fmt: skip
     level: float = derived(
         0.01, "1", "chance of offsets to count as beyond their scatter",
         source="beyond the 99 % interval",
