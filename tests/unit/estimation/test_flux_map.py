@@ -55,7 +55,7 @@ def swept(seed: int = 1, noise_v: float = 2e-3, **changes: float) -> Campaign:
 
 @pytest.mark.parametrize("name", sorted(TRUE))
 def test_intervals_hold_the_truth_over_benches_with_gains_of_their_own(name: str) -> None:
-    """Neither too narrow nor too wide: 60 errors over their u are chi square, to one in 1,000."""
+    """None too narrow: the squares of 60 errors over their u, to one in 1,000 of chi square."""
     each = [found(seed)[name] for seed in range(60)]
     assert sum(one.interval()[0] < TRUE[name] < one.interval()[1] for one in each) >= 54
     errors = np.array([(one.number - TRUE[name]) / one.u for one in each])
@@ -110,7 +110,7 @@ def test_drops_of_a_level_are_no_flux():
 
 
 def test_a_narrower_range_is_taken_where_the_flux_bends():
-    """The fourth power that the terms lack reaches a third of L_d i_d at the ends."""
+    """The fifth power of i_d that the terms lack reaches 0.37 of L_d i_d at the ends."""
     straight = by_name(swept(noise_v=1e-5))["ld_h"]
     campaign = swept(noise_v=1e-5)
     table = campaign.captures[0].tables[0]
