@@ -93,7 +93,8 @@ def _readings(
     readings: list[Reading] = []
     warmed = any(capture.meta.test in LOADED for capture in campaign.captures)
     for capture in captures:
-        constants, _, _ = fit_all(Campaign(campaign.motor_id, (capture,)), options)
+        alone = Campaign(campaign.motor_id, (capture,))
+        constants, _, _ = fit_all(alone, options, only=frozenset(QUANTITIES))
         for name, quantity in QUANTITIES.items():
             estimate = constants.best(name)
             if estimate is None or estimate.status != "measured" or estimate.number <= 0.0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from graphlib import TopologicalSorter
@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.estimation.policy import changed, under
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.uncertainty.agreement import reconciled
+from pipeline.estimation.uncertainty.agreement import SAME, reconciled
 from pipeline.estimation.uncertainty.instruments import with_clock
 from pipeline.numerics.identifiability import within
 from pipeline.physics.glossary import CONSTANTS, Term
@@ -81,8 +81,35 @@ def estimators() -> tuple[Estimator, ...]:
     return tuple(plug_ins[name] for name in TopologicalSorter(graph).static_order())
 
 
+@cache
+def estimators_of(constants: frozenset[str]) -> tuple[Estimator, ...]:
+    """The estimators that some constants depend on, in the order of `estimators`.
+
+    Parameters
+    ----------
+    constants
+        Names of the constants.
+
+    Returns
+    -------
+    tuple of Estimator
+        Those that give one of them, or something that these use or are held against.
+
+    """
+    needed, taken = set(constants), set[str]()
+    while True:
+        needed |= {other for name in needed for other in SAME.get(name, ())}
+        givers = [e for e in estimators() if needed.intersection(e.gives)]
+        if taken == (taken := {e.name for e in givers}):
+            return tuple(givers)
+        needed.update(used for e in givers for used in e.uses)
+
+
 def fit_all(
-    campaign: Campaign, options: Mapping[str, Mapping[str, float]], recall: Recall | None = None
+    campaign: Campaign,
+    options: Mapping[str, Mapping[str, float]],
+    recall: Recall | None = None,
+    only: frozenset[str] | None = None,
 ) -> tuple[Constants, tuple[Evidence, ...], tuple[Failure, ...]]:
     """Runs every estimator on one motor's campaign, or recalls what it gave before.
 
@@ -94,6 +121,8 @@ def fit_all(
         By estimator; those of `policy` are numbers of judgement, by section.
     recall
         Gives a fit that was cached; None fits anew.
+    only
+        Names of the constants that are wanted: estimators that they do not depend on are left out.
 
     Returns
     -------
@@ -111,10 +140,12 @@ def fit_all(
 
     """
     with under(changed(options)) as changes:
-        return _fit_all(campaign, options, changes, recall)
+        needed = estimators() if only is None else estimators_of(only)
+        return _fit_all(needed, campaign, options, changes, recall)
 
 
 def _fit_all(
+    needed: Sequence[Estimator],
     campaign: Campaign,
     options: Mapping[str, Mapping[str, float]],
     changes: Mapping[str, Any],
@@ -124,7 +155,7 @@ def _fit_all(
     failures: list[Failure] = []
     stated = stated_constants(campaign)
     known = Constants(stated)
-    for order, estimator in enumerate(estimators()):
+    for order, estimator in enumerate(needed):
         if campaign.of(*estimator.tests):
             chosen = {**estimator.options, **options.get(estimator.name, {}), **changes}
             try:

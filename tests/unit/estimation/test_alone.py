@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from pipeline.estimation import alone
+from pipeline.estimation import alone, registry
 from pipeline.estimation.electrical.step_budget import LD as LD_PLACE
 from pipeline.estimation.electrical.step_budget import LQ as LQ_PLACE
 from pipeline.estimation.electrical.step_budget import birge_ratio
 from pipeline.estimation.estimators import current_step
+from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import COVERAGE, Contribution, type_b
+from tests.unit.estimation.mechanical import recorded
 from tests.unit.estimation.signals import capture
 from tests.unit.estimation.test_steps_on_a_scope import LD, LQ, on_a_scope
 
@@ -87,6 +91,47 @@ def test_each_capture_by_itself_gives_what_it_determines() -> None:
     for (_, name), reading in inductances.items():
         assert reading.value == pytest.approx({"ld_h": LD, "lq_h": LQ}[name], rel=5e-3)
         assert any(part.source.endswith(f"#{reading.path}") for part in reading.budget)
+
+
+def test_estimators_that_no_reading_depends_on_are_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The readings are those of all estimators, to the last bit; a spin-down costs none."""
+    log, tests = recorded(), ("drive", "open_circuit", "spin_down")
+    captures = tuple(one for test in tests for one in log.of(test)[:1])
+    ran: list[str] = []
+
+    def counted(one: Estimator) -> Estimator:
+        def fit(*given: Any) -> Fit:
+            ran.append(one.name)
+            return one.fit(*given)
+
+        return replace(one, fit=fit)
+
+    def read() -> object:
+        ran.clear()
+        return alone.readings(log, captures, {})
+
+    every = tuple(map(counted, registry.estimators()))
+    needed = {one.name for one in registry.estimators_of(frozenset(alone.QUANTITIES))}
+    few = tuple(one for one in every if one.name in needed)
+    monkeypatch.setattr(registry, "estimators_of", lambda _: every)
+    of_all, ran_of_all = read(), set(ran)
+    monkeypatch.setattr(registry, "estimators_of", lambda _: few)
+    assert read() == of_all != ()
+    assert {"spin_down", "inertia"} <= ran_of_all
+    assert set(ran) == ran_of_all & needed
+    assert not {"spin_down", "inertia"} & needed
+
+
+def test_readings_run_what_they_need_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A kt is held against that of the EMF, which is therefore fitted as well."""
+    asked: list[frozenset[str]] = []
+    monkeypatch.setattr(registry, "estimators_of", lambda names: asked.append(names) or ())
+    steps = (on_a_scope("d", 12.0, 1),)
+    assert alone.readings(Campaign("m", steps), steps, {}) == ()
+    assert asked == [frozenset(alone.QUANTITIES)]
+    monkeypatch.undo()
+    given = {name for one in registry.estimators_of(asked[0]) for name in one.gives}
+    assert given >= {*alone.QUANTITIES, "kt_from_ke_nm_a"}
 
 
 def test_the_plot_of_steps_shows_the_inductance_between_the_terminals() -> None:
