@@ -144,7 +144,7 @@ class Use:
     Attributes
     ----------
     shows
-        Of `current` and `turning`, what such a test is done under; a diagnosis needs both.
+        Of `current` and `turning`, what such a test is done under; a diagnosis needs the latter.
     warms
         Hooks whose effects grow in it with a temperature.
     at_rest
