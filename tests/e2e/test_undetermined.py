@@ -160,10 +160,16 @@ def test_windage_of_coasts_alone_is_named_without_a_size(tmp_path, capsys):
     assert "windage.drag_nm/j_kgm2" in capsys.readouterr().out
 
 
-def test_nothing_is_diagnosed_of_coasts_that_show_nothing(tmp_path):
+def test_cogging_of_coasts_is_named_over_the_inertia(tmp_path):
+    """Coasts give no torque: the design's own cogging is known over the inertia alone."""
     document = made(recorded(tmp_path / "few", COASTS), "diagnose")
-    assert (document["verdict"], document["missing"]) == ("insufficient", [])
-    assert all(one["parameters"] == {} for one in document["ranking"])
+    assert (document["verdict"], document["missing"]) == ("missing", ["cogging"])
+    sizes = [size for one in document["ranking"] for size in one["parameters"].values()]
+    assert {(size["value"], size["u"]) for size in sizes} == {(None, None)}
+    parts = [combined(document)[f"cogging.{part}_84_nm/j_kgm2"] for part in ("sin", "cos")]
+    size = math.hypot(*(part["value"] for part in parts))
+    true = design("gimbal-5208").effects["cogging"]["size"] / J
+    assert abs(size - true) < REACH * math.hypot(*(part["u"] for part in parts))
 
 
 def test_cogging_of_holding_currents_is_named_without_a_torque(tmp_path):
