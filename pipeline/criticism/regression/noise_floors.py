@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -112,24 +112,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     shifts = _shifts(segment, replicates, seed)
     even = _before_rounding(segment, model.policy.sensor_noise)
     for replicate in range(replicates):
-        generator = np.random.default_rng([seed, replicate])
-        noisy = {
-            name: column + _smoothed(segment, name, generator.normal(size=column.size))
-            for name, column in segment.recorded.items()
-        }
-        if sensors.speed_noise_rad_s is not None:
-            noisy["theta_mech_rad"] += generator.uniform(0.0, 2.0 * math.pi)
-        for name, step in sensors.steps.items():
-            noisy[name] += rounding_error(even[name], step, shifts[name][replicate])
-        if sensors.angle_step_rad:
-            theta = segment.recorded["theta_mech_rad"]
-            error = _readings_error(
-                even["theta_mech_rad"],
-                sensors.angle_step_rad,
-                sensors.readings,
-                generator.uniform(-0.5, 0.5),
-            )
-            noisy["theta_mech_rad"] = theta + parabolas(error, sensors.parabola)
+        shift = {name: shifts[name][replicate] for name in sensors.steps}
+        noisy = _noisy(segment, even, shift, np.random.default_rng([seed, replicate]))
         change = projected(segment, residual(segment, model, values, noisy)) - unperturbed
         np.add.at(total, group[valid], change[valid] ** 2)
         np.add.at(count, group[valid], 1.0)
@@ -140,6 +124,37 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
         power = np.bincount(group[valid], change[valid] ** 2, len(groups))
         variance += power / np.maximum(np.bincount(group[valid], minlength=len(groups)), 1)
     return np.sqrt(variance) + 1e-300
+
+
+def _noisy(
+    segment: Segment,
+    even: Mapping[str, Array],
+    shift: Mapping[str, float],
+    generator: np.random.Generator,
+) -> dict[str, Array]:
+    """The recorded columns with other noise of their sensors.
+
+    `even` are those that are rounded anew, as they were before; `shift` the part of a step by which
+    coarse signals are moved.
+    """
+    sensors = segment.sensors
+    noisy = {
+        name: column + _smoothed(segment, name, generator.normal(size=column.size))
+        for name, column in segment.recorded.items()
+    }
+    if sensors.speed_noise_rad_s is not None:
+        noisy["theta_mech_rad"] += generator.uniform(0.0, 2.0 * math.pi)
+    for name, step in sensors.steps.items():
+        noisy[name] += rounding_error(even[name], step, shift[name])
+    if sensors.angle_step_rad:
+        turn = generator.uniform(-0.5, 0.5)
+        error = _readings_error(
+            even["theta_mech_rad"], sensors.angle_step_rad, sensors.readings, turn
+        )
+        noisy["theta_mech_rad"] = segment.recorded["theta_mech_rad"] + parabolas(
+            error, sensors.parabola
+        )
+    return noisy
 
 
 def _readings_error(even_rad: Array, step_rad: float, readings: int, shift: float) -> Array:

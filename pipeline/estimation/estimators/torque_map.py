@@ -223,11 +223,8 @@ def _estimates(
     type_b = _type_b(points, chosen, alpha, instrument_uncertainties(used, ("current", "torque")))
     type_b[0] += propagate([(_per_alpha(points, chosen, alpha), alpha_parts)])
     type_b[0] += [Contribution("assumed:torque_form", slope_k.form_nm_a, "B"), *still]
-    why = ""
-    if not _d_logged(points):
-        share = unlogged_share(model.residuals, slope_k.kt_nm_a * _column(points, "iq_a"))
-        type_b[0].append(Contribution("assumed:id_a", share * slope_k.kt_nm_a, "B"))
-        why = not_along_q(share)
+    unlogged, why = _unlogged_d(points, model, slope_k.kt_nm_a)
+    type_b[0] += unlogged
     paths = sorted({p.capture.path for p in points})
     at = {"temp_magnet_degc": 25.0, "iq_a": float(np.max(np.abs(_column(points, "iq_a"))))}
 
@@ -257,6 +254,16 @@ def _estimates(
         parts = [*type_b[2 + index], *_untested_form(points, model, index)]
         estimates.append(estimate(name, float(drag[index]), u_drag, dof, parts))
     return tuple(estimates)
+
+
+def _unlogged_d(
+    points: Sequence[Point], model: Regression, kt_nm_a: float
+) -> tuple[tuple[Contribution, ...], str]:
+    """What a d current that is not logged adds to u of Kt, and why Kt is then not published."""
+    if _d_logged(points):
+        return (), ""
+    share = unlogged_share(model.residuals, kt_nm_a * _column(points, "iq_a"))
+    return (Contribution("assumed:id_a", share * kt_nm_a, "B"),), not_along_q(share)
 
 
 def _values(
