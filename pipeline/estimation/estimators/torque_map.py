@@ -55,6 +55,7 @@ EXPERIMENT = (
     "record a torque_map: the dynamometer holds a speed while positive and negative q currents "
     "are stepped, at two or more d currents, in both senses of rotation"
 )
+TURNED = ("id", "id sense", "iq^2 - id^2", "id speed", "iq^2 - id^2 speed")
 BENDING = ("iq^3", "iq^5", "id^2 iq", "id iq^3", "id^3 iq", "id^2 iq^3")
 
 
@@ -140,9 +141,10 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
         Columns of the offset T0 of each group [1], of K [A] and, where i_d moves, of K_rel [A²].
     candidates : dict of array [n]
         Columns that enter where a test asks for them: saturation (odd powers of i_q, even and odd
-        ones of i_d), a frame that is turned (i_d, i_q² - i_d²) or wobbles (an eccentric encoder:
-        i_d cos θ, i_d sin θ), friction in proportion to torque, and the acceleration of a
-        shaft that the dynamometer lets give way, whose coefficient is -J.
+        ones of i_d), a frame that is turned (i_d, i_q² - i_d²), the more the faster where currents
+        are late (the same times ω), or wobbles (an eccentric encoder: i_d cos θ, i_d sin θ),
+        friction in proportion to torque, and the acceleration of a shaft that the dynamometer lets
+        give way, whose coefficient is -J.
 
     Notes
     -----
@@ -156,7 +158,8 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
 
     """
     i_d, i_q = _column(points, "id_a"), _column(points, "iq_a")
-    group, sense = _column(points, "group"), np.sign(_column(points, "omega_mech_rad_s"))
+    group, omega = _column(points, "group"), _column(points, "omega_mech_rad_s")
+    sense = np.sign(omega)
     warm = 1.0 + alpha_1_k * (_column(points, "temp_magnet_degc") - 25.0)
     base = {f"speed {g}": (group == g).astype(float) for g in sorted({p.group for p in points})}
     base["iq"] = i_q * warm
@@ -176,6 +179,8 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
             "id^3 iq": i_d**3 * i_q,
             "id^2 iq^3": i_d**2 * i_q**3,
             "iq^2 - id^2": i_q**2 - i_d**2,
+            "id speed": i_d * omega,
+            "iq^2 - id^2 speed": (i_q**2 - i_d**2) * omega,
         }
     return base, candidates
 
@@ -381,7 +386,7 @@ def _slope(
     u = float(np.sqrt(model.covariance[model.index("iq"), model.index("iq")]))
     if not any(name in BENDING for name in chosen):
         return Slope(model.kt_nm_a, u, model.dof, 0.0)
-    turned = any(name in chosen for name in ("id", "id sense", "iq^2 - id^2"))
+    turned = any(name in TURNED for name in chosen)
     without_d = slope_without_d(points, alpha, turned, "|iq| sense" in chosen)
     if without_d is None:
         return Slope(model.kt_nm_a, u, model.dof, _form_doubt(points, alpha, chosen))

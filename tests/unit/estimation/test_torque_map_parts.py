@@ -22,7 +22,7 @@ from pipeline.estimation.estimators.torque_map import (
 )
 from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d
 from pipeline.numerics.least_squares import linear_fit
-from tests.unit.estimation.points import point
+from tests.unit.estimation.points import W, point
 
 
 def ripple_map(curve, levels=(2.0, 4.0, 6.0, 8.0, 10.0), w=(-50.0, 50.0, 90.0), d=(0.0,)):
@@ -96,6 +96,7 @@ def test_columns_of_the_torque() -> None:
         "id": [-1.0, 3.0], "id sense": [1.0, 3.0], "id cos": [-0.5, 0.0], "id sin": [0.25, 0.0],
         "id^2 iq": [2.0, -36.0], "id iq^3": [-8.0, -192.0], "id^3 iq": [-2.0, -108.0],
         "id^2 iq^3": [8.0, -576.0], "iq^2 - id^2": [3.0, 7.0],
+        "id speed": [5.0, 3.0 * W], "iq^2 - id^2 speed": [-15.0, 7.0 * W],
     }  # fmt: skip
     assert {name: column.tolist() for name, column in more.items()} == expected
     for share, there in ((0.097, False), (0.103, True)):
