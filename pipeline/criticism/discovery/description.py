@@ -241,8 +241,7 @@ def _run(
     dense = np.linspace(low, high, _DENSE)
     values = expression.value(dense, carrier)
     if not expression.terms:
-        dense = np.array([p.at for p in curve])
-        values = np.array([p.value for p in curve])
+        dense, values = _determined(curve)
     top = int(np.argmax(np.abs(values)))
     warm = variable.kind == "warm"
     at = f"{dense[top] + 25.0:.3g} degC" if warm else f"{abs(dense[top]):.3g} {variable.unit}"
@@ -257,6 +256,15 @@ def _run(
             f"±{1e3 * step:.3g} mrad, as of an encoder that sits loose"
         )
     return f"{parity}{'largest,' if warm else _ending(dense, np.abs(values), policy)} {place}"
+
+
+def _determined(curve: Sequence[CurvePoint]) -> tuple[Array, Array]:
+    """Places and values [n] of the points whose band leaves out zero; all where none does.
+
+    Where few samples lie, a curve may be of any size.
+    """
+    points = [p for p in curve if p.low * p.high > 0.0] or curve
+    return np.array([p.at for p in points]), np.array([p.value for p in points])
 
 
 def _ending(at: Array, size: Array, policy: Discovery) -> str:

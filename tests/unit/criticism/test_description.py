@@ -8,24 +8,44 @@ import pytest
 from pipeline.criticism.discovery.description import _run, turn_angles
 from pipeline.criticism.discovery.dictionary import Term
 from pipeline.criticism.discovery.matching_pursuit import Expression
-from pipeline.criticism.discovery.residual_inputs import ports
+from pipeline.criticism.discovery.residual_inputs import Port, ports
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.records.diagnosis import CurvePoint
 from tests.unit.criticism.machines import machine
 
 
-def words(variable: str, low: float, high: float, *terms: tuple[float, Term]) -> str:
-    """What is said of a drag on one variable that is visited from low to high."""
-    port = next(
+def drag_on(variable: str) -> Port:
+    """A drag on one variable."""
+    return next(
         p
         for p in ports(machine(), DEFAULT.discovery, ("torque",))
         if p.variable.name == variable and not p.carriers[0].words
     )
+
+
+def words(variable: str, low: float, high: float, *terms: tuple[float, Term]) -> str:
+    """What is said of a drag on one variable that is visited from low to high."""
+    port = drag_on(variable)
     amplitudes = np.array([size for size, _ in terms])
     chosen = tuple(term for _, term in terms)
     found = Expression(chosen, amplitudes, (), np.eye(0), 1.0, np.zeros(0))
     curve = tuple(CurvePoint(float(at), 0.0, 0.0, 0.0) for at in np.linspace(low, high, 17))
     return _run(port, curve, found, 0, DEFAULT.discovery)
+
+
+def test_a_curve_without_terms_is_as_large_as_its_bands_show():
+    """A map's steps pass 1 A in a few samples: a drag of 128 ± 5000 N·m there was its maximum."""
+    none = Expression((), np.zeros(0), (), np.eye(0), 1.0, np.zeros(0))
+    size = {-8.0: -0.4, -4.0: -0.3, -1.0: -128.0, 0.0: 0.0, 1.0: 110.0, 4.0: 0.3, 8.0: 0.4}
+    band = {-1.0: 5e3, 1.0: 5e3}
+    curve = [
+        CurvePoint(at, v, v - band.get(at, 0.01), v + band.get(at, 0.01)) for at, v in size.items()
+    ]
+    told = _run(drag_on("iq_a"), curve, none, 0, DEFAULT.discovery)
+    assert told == "odd, still growing at the end of the range, 0.4 N·m at 8 A"
+    unknown = [CurvePoint(at, v, v - 5e3, v + 5e3) for at, v in size.items()]
+    told = _run(drag_on("iq_a"), unknown, none, 0, DEFAULT.discovery)
+    assert told.endswith("128 N·m at 1 A")
 
 
 SPEED = "omega_mech_rad_s"
