@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.estimation.electrical.step_record import integrated_form
 from pipeline.estimation.electrical.terminals import (
     bridged,
     first_temperature,
@@ -23,12 +24,13 @@ from pipeline.estimation.uncertainty.instruments import (
     voltage_source,
 )
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
-from pipeline.numerics.plateaus import find_plateaus
+from pipeline.numerics.plateaus import Plateau, find_plateaus
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import OHMMETER, of_ohmmeter
 from pipeline.records.capture import Array, Campaign, Capture, CaptureMeta
 
 TEST = "resistance"
+STEP = "current_step"
 UNLOGGED = "assumed:temp_winding_degc"
 POINT_OPTIONS = {"zero_crossing": 0.03, "temp_assumed_degc": 25.0}
 
@@ -80,6 +82,8 @@ def direct_current_points(
 ) -> tuple[list[Point], list[str]]:
     """The plateaus of all resistance captures, and what had to be assumed about them.
 
+    Where there are none, the ends of current steps stand in for them: V/I once the current settles.
+
     Plateaus below `zero_crossing` times the largest current of all are left out: the sign of their
     current, and what an inverter adds there, is in doubt. Temperature is the plateau's own, else
     the capture's ambient, else `temp_assumed_degc`.
@@ -102,10 +106,10 @@ def direct_current_points(
     points: list[Point] = []
     notes: list[str] = []
     temp_assumed_degc = options["temp_assumed_degc"]
-    for index, capture in enumerate(campaign.of(TEST)):
+    for index, capture in enumerate(_captures(campaign)):
         ambient = capture.meta.ambient_degc
         temp_degc = temp_assumed_degc if ambient is None else ambient
-        meter = of_ohmmeter(TEST, capture.columns)
+        meter = of_ohmmeter(capture.meta.test, capture.columns)
         pair = pair_of(capture)
         if not meter and pair is None:
             notes.append(f"{capture.path}: which terminal pair is not stated")
@@ -164,7 +168,7 @@ def captures_of(campaign: Campaign, points: Sequence[Point]) -> tuple[Capture, .
         Points of `direct_current_points` on the same campaign.
 
     """
-    captures = campaign.of(TEST)
+    captures = _captures(campaign)
     return tuple(captures[k] for k in sorted({p.capture for p in points}))
 
 
@@ -175,12 +179,39 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> Ite
     logged = column is not None and bool(np.isfinite(columns[column]).any())
     if column is not None and logged:
         temps = bridged(columns["t_s"], columns[column])
-    for plateau in find_plateaus(columns["i_a"]):
+    for plateau in _settled(capture, columns["i_a"]):
         v, i = columns["v_v"][plateau.rows], columns["i_a"][plateau.rows]
         temp = float(temps[plateau.rows].mean())
         errors = (_standard_error(v), _standard_error(i))
-        means = (float(v.mean()), float(i.mean()))
+        rising = _rising_v(columns, plateau.rows) if capture.meta.test == STEP else 0.0
+        means = (float(v.mean()) - rising, float(i.mean()))
+        errors = (math.hypot(errors[0], rising / math.sqrt(3.0)), errors[1])
         yield Point(index, pair, *means, temp, *errors, capture.meta, logged)
+
+
+def _captures(campaign: Campaign) -> tuple[Capture, ...]:
+    """The resistance captures; the current steps where there are none."""
+    return tuple(campaign.of(TEST)) or tuple(campaign.of(STEP))
+
+
+def _settled(capture: Capture, i_a: Array) -> Sequence[Plateau]:
+    """The plateaus of a current; of a step the one of most current, as others may be on its way."""
+    plateaus = find_plateaus(i_a)
+    if capture.meta.test != STEP or not plateaus:
+        return plateaus
+    return (max(plateaus, key=lambda plateau: abs(float(i_a[plateau.rows].mean()))),)
+
+
+def _rising_v(columns: Mapping[str, Array], rows: slice) -> float:
+    """L Δi/Δt [V] over a plateau of a step whose current still rises; all of it where L is unknown.
+
+    Iron that saturates has less than the L of the whole step: a uniform doubt, up to all of it.
+    """
+    t, v, i = (columns[name] for name in ("t_s", "v_v", "i_a"))
+    form = integrated_form(t, v, i)
+    ends = linear_fit(np.column_stack([t[rows] - t[rows].mean(), np.ones(t[rows].size)]), i[rows])
+    slope_a_s = float(ends.coefficients[0])
+    return abs(form[0]) * slope_a_s if form else float(v[rows].mean())
 
 
 def uncertainties_of(points: Sequence[Point], captures: Sequence[Capture]) -> dict[str, float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.estimation.electrical.direct_current import (
     POINT_OPTIONS,
+    STEP,
     TEST,
     Point,
     captures_of,
@@ -379,7 +380,7 @@ def _plot(points: Sequence[Point], residuals: Array) -> Evidence:
 ESTIMATOR = Estimator(
     METHOD.name,
     GIVES,
-    (TEST,),
+    (TEST, STEP),
     EXPERIMENT,
     fit_resistance,
     terms=TERMS,
