@@ -188,9 +188,6 @@ def _fit(captures: Sequence[Capture], options: Mapping[str, float]) -> Fit:
     motion = Motion((), (), fastest)
     solution = _solve(motion, coasts, None)
     for _ in range(2):
-        free = solution.residuals.size - solution.parameters.size
-        if solution.residuals @ solution.residuals < policy().coast_down.explained ** 2 * free:
-            break
         wider = _wider(motion, coasts, solution, options["level"])
         if wider == motion:
             break

@@ -117,10 +117,6 @@ class CoastDown:
     most_samples: int = chosen(
         4000, "1", "block means that a coast is thinned to", why="the time of the fit goes with it"
     )
-    explained: float = chosen(
-        1.05, "1", "residual over the encoder's noise, below which nothing is missing",
-        why="a twentieth is what the noise itself is not known to",
-    )  # fmt: skip
     unexplained: float = chosen(
         3.0, "1", "residual over the encoder's noise, above which drag's form is open",
         why="the halves of the coasts then say how far",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,10 @@ from pipeline.estimation.mechanical.shaft_rows import shaft_rows
 from pipeline.numerics.coasting import coast_down, coasting_rows
 from pipeline.numerics.least_squares import central_jacobian
 from pipeline.records.capture import Capture
+from pipeline.records.constants import Constants
+from pipeline.simulator.bench import CAMPAIGN, campaign
+from pipeline.simulator.design import EXACT, Bench
+from tests.simulated import campaign_of, design
 from tests.unit.estimation.signals import capture, estimates
 
 COULOMB_RAD_S2, VISCOUS_1_S = 20.0, 0.5
@@ -71,3 +77,20 @@ def test_derivatives_are_those_of_what_is_predicted() -> None:
     width = np.array([1e-3, 1e-5, 1e-3, *[1e-3, 1e-3, 1e-3, 1e-3] * 2])
     found = motion.jacobian(coasts, parameters, width)
     assert found == pytest.approx(central_jacobian(predict, parameters, width), abs=1e-7)
+
+
+@pytest.mark.parametrize(("name", "bits"), [("joint-11p", 11), ("servo-15kw", 10)])
+def test_friction_of_another_form_below_the_resolution_of_the_encoder(name: str, bits: int) -> None:
+    """Stribeck's excess left less than a step of the encoder and moved B/J by 0.3 to 1 % at 6 u."""
+    motor = replace(design(name), effects={}).having(stribeck=None)
+    coasts = tuple(step for step in CAMPAIGN if step[1] == "spin_down")
+    bench = Bench(instruments=EXACT, encoder_bits=bits)
+    captures = campaign_of(campaign(motor, bench, 1, coasts))
+    found = ESTIMATOR.fit(captures, Constants(), ESTIMATOR.options).estimates
+    truths = {
+        "coast_coulomb_rad_s2": motor.torque_coulomb_nm / motor.j_rotor_kgm2,
+        "coast_viscous_1_s": motor.b_visc_nm_s_rad / motor.j_rotor_kgm2,
+    }
+    for one in found:
+        assert one.number == pytest.approx(truths[one.name], rel=5e-4)
+        assert abs(one.number - truths[one.name]) < 3.0 * one.u
