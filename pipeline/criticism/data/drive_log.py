@@ -85,11 +85,13 @@ def drive_log(capture: Capture, machine: Machine) -> DriveLog | None:
 def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:
     """Samples [size] of the even clock that are not near a reading that came late.
 
-    A host that was held up reads again at once, and then gets old values.
+    A host that was held up reads again at once, and then gets old values. After samples that were
+    lost the next comes a period later, and is as good as any.
     """
     time = capture.arrays("t_s", masked=False)["t_s"]
     gaps = np.diff(time)
-    odd = np.flatnonzero((gaps > _LATE * period) | (gaps < period / _LATE / 2))
+    late = (gaps > _LATE * period) & (np.append(gaps[1:], period) < period / _LATE)
+    odd = np.flatnonzero(late | (gaps < period / _LATE / 2))
     on_time = np.ones(size, dtype=bool)
     for at in np.round((time[odd] - time[0]) / period).astype(np.int64).tolist():
         on_time[max(at - _STALE, 0) : at + 2 * _STALE] = False

@@ -7,9 +7,11 @@ import polars as pl
 import pytest
 
 from pipeline.criticism.data.clocks import counted
+from pipeline.criticism.data.drive_log import drive_log
 from pipeline.criticism.data.traces import even_clock
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.records.capture import Capture, CaptureMeta
+from tests.unit.criticism.machines import machine
 
 CUTTING = DEFAULT.cutting
 
@@ -82,3 +84,31 @@ def test_a_gap_of_samples_that_came_unevenly_is_bridged_and_not_kept(missing):
 def test_a_clock_that_runs_by_fits_and_starts_cannot_be_counted():
     steps = np.random.default_rng(3).choice([0.2, 1.0, 7.0], 4000, p=[0.3, 0.5, 0.2])
     assert counted(PERIOD * np.cumsum(steps), CUTTING) is None
+
+
+def kept(stamps):
+    """Which samples of a drive's log of these stamps are used, by number."""
+    found = drive_log(log(stamps, angle(stamps)), machine())
+    assert found is not None
+    return found.keep
+
+
+def test_samples_beside_lost_ones_are_kept():
+    """Thirty-six of them went with every gap."""
+    even, _ = instants()
+    there = np.ones(even.size, dtype=bool)
+    there[[700, 1500, 1501, 1502, 3000]] = False
+    lost = np.flatnonzero(~there)
+    without = np.setdiff1d(np.arange(1, even.size - 1), lost)
+    assert kept(even[there])[without].all()
+    assert not kept(even[there])[lost].any()
+
+
+def test_samples_that_a_host_read_late_and_then_at_once_are_not():
+    """It gets old values: a reading two periods after the last, and two that follow at once."""
+    even, _ = instants()
+    late = even.copy()
+    late[700:703] = even[702] - PERIOD * np.array([1.0, 0.5, 0.0])
+    found = kept(late)
+    assert not found[690:720].any()
+    assert found[1:680].all() and found[730:-1].all()
