@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.data.holding_cells import holding_cells
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
-from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.machine.model import Model, Pieces, evaluate
 from pipeline.criticism.operating import Array, Operating, Recorded, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.shaft import net_torque
@@ -18,6 +19,8 @@ from pipeline.records.capture import Capture
 
 _CRAWL = 1e-9
 """Speed [rad/s] of a held rotor that creeps: it has a sense and nothing else."""
+_ROUNDS = 2
+"""Times that the holding current is worked out from drags that may depend on it."""
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
@@ -52,7 +55,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
-    """True current of a held rotor, which creeps in the sense of its arrival.
+    """State of a held rotor, which creeps in the sense of its arrival.
 
     Parameters
     ----------
@@ -68,15 +71,27 @@ def state(segment: Segment, signals: Signals, model: Model, values: Values) -> O
     Returns
     -------
     Operating
-        The state [n], at a speed that has a sign and no other effect.
+        The state [n], at a speed that has a sign and no other effect, and with the current that
+        holds the rotor by the model. By the recorded one, a friction that grows with the torque
+        would take its share of the residual, noise and all.
 
     """
     theta, omega = signals["theta_mech_rad"], _CRAWL * signals["sense"]
-    pole_pairs = model.machine.pole_pairs
-    current = np.zeros(theta.size) + 1j * signals["iq_a"]
-    current = table_current(segment, current, pole_pairs * theta, pole_pairs * omega, model, values)
-    motion = Motion(theta, omega, np.abs(omega) * pole_pairs / (2 * math.pi))
-    return operating(segment, signals, model, values, current, motion)
+    pairs = model.machine.pole_pairs
+    motion = Motion(theta, omega, np.abs(omega) * pairs / (2 * math.pi))
+    none = np.zeros(theta.size, dtype=complex)
+    x = operating(segment, signals, model, values, none, motion)
+    for _ in range(_ROUNDS):
+        pieces = evaluate(model, x, values, frozenset({"flux", "torque"}))
+        x = replace(x, iq_a=_holding(x, pieces, values))
+    return x
+
+
+def _holding(x: Operating, pieces: Pieces, values: Values) -> Array:
+    """The q current [n, A] that balances the drags, which are those at the current of `x`."""
+    lacking = net_torque(x, pieces) / (1.5 * x.machine.pole_pairs * values["psi_wb"])
+    current: Array = x.i_a.imag - lacking
+    return current
 
 
 def measured(segment: Segment, signals: Signals, model: Model, values: Values) -> Array:
@@ -99,8 +114,11 @@ def measured(segment: Segment, signals: Signals, model: Model, values: Values) -
         In A.
 
     """
-    true = state(segment, signals, model, values).i_a.imag
-    return (true / _current_slope(segment, model, values))[None]
+    pairs = model.machine.pole_pairs
+    eps, omega = pairs * signals["theta_mech_rad"], pairs * _CRAWL * signals["sense"]
+    recorded = np.zeros(eps.size) + 1j * signals["iq_a"]
+    true = table_current(segment, recorded, eps, omega, model, values)
+    return (true.imag / _current_slope(segment, model, values))[None]
 
 
 def predicted(
@@ -113,7 +131,7 @@ def predicted(
     segment
         The cells.
     x
-        True state [n].
+        State [n].
     pieces
         Flux and drags of the model there.
     model
@@ -131,9 +149,7 @@ def predicted(
     i_q − (T − drags)/(1.5 p ψ): what it lacks in torque is made up by more of it.
 
     """
-    lacking = net_torque(x, pieces) / (1.5 * x.machine.pole_pairs * values["psi_wb"])
-    current: Array = (x.i_a.imag - lacking) / _current_slope(segment, model, values)
-    return current[None]
+    return (_holding(x, pieces, values) / _current_slope(segment, model, values))[None]
 
 
 def _current_slope(segment: Segment, model: Model, values: Values) -> float:
