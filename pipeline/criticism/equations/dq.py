@@ -310,7 +310,8 @@ EQUATION = Equation(
     ),
     recorder="log",
     sensing=Sensing(
-        _reading, frozenset({"voltage_jumps", "encoder_lines", "standstill", "pulses"})
+        _reading,
+        frozenset({"voltage_jumps", "torque_jumps", "encoder_lines", "standstill", "pulses"}),
     ),
     use=Use(
         shows=frozenset({"current", "turning"}),

@@ -16,11 +16,11 @@ from pipeline.criticism.data.traces import (
     window_of,
     with_angle,
 )
-from pipeline.criticism.equation import Channel, Equation, Observes, Use
+from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
-from pipeline.criticism.signals.shaft import net_torque, sensed_torque, true_load
+from pipeline.criticism.signals.shaft import net_torque, sensed_torque, torque_reading, true_load
 from pipeline.criticism.signals.true_state import at_true_angle, drive_current, motion_of, operating
 from pipeline.numerics.projection import projection
 from pipeline.records.capture import Capture
@@ -132,6 +132,11 @@ def predicted(
     return sensed_torque(segment, x, torque, model, values)[None]
 
 
+def _reading(segment: Segment, _: str, model: Model, values: Values) -> Array:
+    """Torque of the current's length [n, N·m]."""
+    return torque_reading(segment, model, values)
+
+
 EQUATION = Equation(
     name="load",
     words="T = 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags − J dω/dt",
@@ -149,6 +154,7 @@ EQUATION = Equation(
         torque_in=TORQUE,
     ),
     recorder="log",
+    sensing=Sensing(_reading, frozenset({"torque_jumps", "encoder_lines", "standstill", "pulses"})),
     use=Use(shows=frozenset({"current", "turning"}), warms=frozenset({"flux"}), angle_maps=True),
     # behind the voltage of the same log
     rank=1,

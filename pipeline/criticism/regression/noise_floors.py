@@ -347,7 +347,7 @@ def reading_error(segment: Segment, model: Model, values: Values) -> Array:
 def _of_voltages(segment: Segment, model: Model, values: Values) -> Array:
     """What a drive's log may be off by in its voltages [V, W, M], as weak samples of each."""
     errors = equation_of(segment).sensing.errors
-    total = _jumps(segment, *VOLTS, model.policy.noise_floors)[None, :, None]
+    total = _jumps(segment, VOLTS, model.policy.noise_floors)[None, :, None]
     if "unsampled" in errors:
         current = segment.recorded["iq_a"]
         change = values["lq_h"] * unresolved(current) * central(current, segment.ts_s)
@@ -376,7 +376,10 @@ def _of_torque(segment: Segment, model: Model, values: Values) -> Array | float:
         total[:, 0] = np.hypot(total[:, 0], _of_pulses(segment, model, values, x))
     if "current_jumps" in errors:
         kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
-        jumps = kt * _jumps(segment, "id_a", "iq_a", policy)
+        jumps = kt * _jumps(segment, ("id_a", "iq_a"), policy)
+        total = np.hypot(total, jumps[:, None])
+    if "torque_jumps" in errors:
+        jumps = _jumps(segment, ("torque_shaft_nm",), policy)
         total = np.hypot(total, jumps[:, None])
     return total / reported_unit(segment, values)
 
@@ -437,20 +440,21 @@ def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
     return change
 
 
-def _jumps(segment: Segment, direct: str, quadrature: str, policy: NoiseFloors) -> Array:
-    """Error [W] that a jump of a vector may make, as weak samples: a quarter of it for a sample.
+def _jumps(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array:
+    """Error [W] that a jump of signals may make, as weak samples: a quarter of it for a sample.
 
-    A log says what voltage or current was at its samples, not when within a period it changed.
+    A log says what a voltage, current or torque was at its samples, not when within a period it
+    changed.
     """
     weak = segment.weak
     if weak is None:
         return np.zeros(segment.size)
-    still, noises = np.zeros(segment.size), segment.sensors.noise
-    vector = segment.recorded.get(direct, still) + 1j * segment.recorded[quadrature]
-    noise = math.hypot(noises.get(direct, 0.0), noises[quadrature])
-    bend = np.zeros(vector.size)
+    there = [name for name in names if name in segment.recorded]
+    noise = math.hypot(*(segment.sensors.noise[name] for name in there))
+    bends = [np.diff(segment.recorded[name], 2) for name in there]
+    bend = np.zeros(segment.size)
     # a jump bends the line twice, there and back
-    bend[1:-1] = np.abs(np.diff(vector, 2)) / math.sqrt(2.0)
+    bend[1:-1] = np.sqrt(sum(one**2 for one in bends)) / math.sqrt(2.0)
     bend[bend < policy.jump * noise] = 0.0
     rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
     return policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
