@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pipeline.criticism.operating import Array, Complex, Operating
@@ -104,14 +106,17 @@ def lost_shares(
     zero; then it floats at the mean of the others. With c the part of the dead time in which these
     are low, and i the current where the dead time begins,
 
-        λ, μ = clip(c + i/W, 0, 1),  W = 2/3 V_loss T/L,
+        λ, μ = clip(c + i/W, 0, 1),  W = 2/3 V_loss T/L_k,
         c = ½ Σ_j clip((v_k − v_j)/(2 V_loss) + λ_j or μ_j, 0, 1).
 
-    The share is λ + μ − 1. Up to its edge the current moves from its mean by
-    T/(2L) [V_dc/3 Σ_j max(d_j − d_k − 2 λ_j V_loss/V_dc, 0) + e_k (1 − d_k + V_loss/V_dc)], d the
-    widths of the pulses, e the voltage at the winding; alike at the other edge. So where the ripple
-    exceeds the current nothing is lost, and at little voltage a current rests at zero while its
-    leg's voltage passes through the dead time.
+    The share is λ + μ − 1. Up to the edge of leg k the current vector moves from its mean by the
+    inverse of the inductance times T/2 [V_dc Σ_j a_j max(d_j − d_k − 2 λ_j V_loss/V_dc, 0) −
+    e (1 − d_k + V_loss/V_dc)], a the vectors of the legs over 3/2, d the widths of the pulses, e
+    the voltage at the winding; alike at the other edge. So where the ripple exceeds the current
+    nothing is lost, and at little voltage a current rests at zero while its leg's voltage passes
+    through the dead time. The ripple of unequal inductances turns with the rotor:
+    u → ½ (1/L_d + 1/L_q) u + ½ (1/L_d − 1/L_q)
+    e^{2jε} u*.
 
     References
     ----------
@@ -124,19 +129,18 @@ def lost_shares(
     known = _switching(x, eps_rad)
     if known is None or loss_v <= 0.0:
         return np.tanh(current_a / width)
-    inductance, winding, recorded = known
+    slopes, winding, recorded = known
     late = keeps = (current_a > 0.0).astype(float)
-    per_volt = supply.pwm_s / (2.0 * inductance)
-    ramp = 4.0 / 3.0 * loss_v * per_volt
+    ramp = 4.0 / 3.0 * loss_v * slopes.own
     dead = loss_v / supply.vdc_v
     for _ in range(_ROUNDS):
         volts = winding + loss_v * (late + keeps - 1.0) if recorded is None else recorded
         middle = 0.5 * (volts.max(axis=0) + volts.min(axis=0))
         duty = np.clip(0.5 + (volts - middle) / supply.vdc_v, 0.0, 1.0)
         low, before = _beside(volts, loss_v, late, -1.0)
-        rise = current_a - per_volt * (before + winding * (1.0 - duty + dead))
+        rise = current_a + slopes.at_edges(before, winding, 1.0 - duty + dead)
         low_after, after = _beside(volts, loss_v, 1.0 - keeps, 1.0)
-        fall = current_a + per_volt * (after - winding * (duty + dead))
+        fall = current_a + slopes.at_edges(-after, winding, duty + dead)
         late = _passed(rise + (low - 0.5) * ramp, ramp, width)
         keeps = _passed(fall + (low_after - 0.5) * ramp, ramp, width)
     return late + keeps - 1.0
@@ -173,7 +177,7 @@ def swept_shares(x: Operating, eps_rad: Array, current_a: Array, width_a: float)
     known = _switching(x, eps_rad)
     if known is None:
         return np.tanh(current_a / width)
-    inductance, winding, recorded = known
+    slopes, winding, recorded = known
     volts = winding if recorded is None else recorded
     duty = np.clip(
         0.5 + (volts - 0.5 * (volts.max(axis=0) + volts.min(axis=0))) / x.supply.vdc_v, 0.0, 1.0
@@ -181,9 +185,8 @@ def swept_shares(x: Operating, eps_rad: Array, current_a: Array, width_a: float)
     falling = np.sort(duty, axis=0)[::-1]
     lasts = -np.diff(falling, axis=0, prepend=1.0, append=0.0)
     above = np.stack([sum(volts[j] > volts[k] for j in others) for k, others in enumerate(_OTHERS)])
-    per_volt = 0.5 * x.supply.pwm_s / inductance / width
     moves = [
-        per_volt * share * (x.supply.vdc_v * ((high > above) - high / 3.0) - winding)
+        share / width * slopes.moved(x.supply.vdc_v * ((high > above) - high / 3.0) - winding)
         for high, share in enumerate(lasts)
     ]
     mean = current_a / width
@@ -198,18 +201,65 @@ def swept_shares(x: Operating, eps_rad: Array, current_a: Array, width_a: float)
     return shares
 
 
-def _switching(x: Operating, eps_rad: Array) -> tuple[float, Array, Array | None] | None:
-    """Inductance [H], voltages at the winding and, where they were recorded, those that were asked
-    for [3, n]; None where it is not known how the inverter switches.
+@dataclass(frozen=True, slots=True)
+class _Slopes:
+    """What a voltage does to phase currents in half a switching period.
+
+    `even` [A/V] is what it does along itself, `odd` [n, A/V], e^{2jε} times a share of the
+    saliency, what its conjugate does; `own` [3, n, A/V] is that of each phase's voltage to itself.
     """
-    supply, inductance = x.supply, 0.5 * (x.base["ld_h"] + x.base["lq_h"])
-    if not (supply.pwm_s and supply.vdc_v and inductance > 0.0 and x.psi_wb is not None):
+
+    even: float
+    odd: Complex | None
+    own: Array | float
+
+    def moved(self, volts: Array) -> Array:
+        """Change of the currents [3, n, A] by voltages [3, n, V] without a common part."""
+        if self.odd is None:
+            return self.even * volts
+        return self.even * volts + phases_of(self.odd * np.conj(vector_of(volts)))
+
+    def at_edges(self, others: Array, winding: Array, lasts: Array) -> Array:
+        """Change of each leg's current [3, n, A] up to its edge, by the `others` [3, 3, n, V]
+        (leg, of leg) and the winding's voltage, which `lasts` [3, n] of half a period.
+        """
+        total = others.sum(axis=1) / 3.0
+        change: Array = -self.even * (total + winding * lasts)
+        if self.odd is not None:
+            for k in range(3):
+                across = others[k] - total[k] - winding * lasts[k]
+                change[k] += phases_of(self.odd * np.conj(vector_of(across)))[k]
+        return change
+
+
+def _slopes_of(x: Operating, turn: Complex) -> _Slopes | None:
+    """The slopes at the base inductances, one standing for one that is not known; None without."""
+    l_d, l_q = x.base["ld_h"], x.base["lq_h"]
+    half_s = 0.5 * x.supply.pwm_s
+    if max(l_d, l_q) <= 0.0 or not half_s:
+        return None
+    along_d, along_q = half_s / (l_d if l_d > 0.0 else l_q), half_s / (l_q if l_q > 0.0 else l_d)
+    even = 0.5 * (along_d + along_q)
+    if along_d == along_q:
+        return _Slopes(even, None, even)
+    odd = 0.5 * (along_d - along_q) * turn**2
+    axes = np.exp(-4j * np.pi * np.arange(3) / 3.0)
+    return _Slopes(even, odd, even + (odd * axes[:, None]).real)
+
+
+def _switching(x: Operating, eps_rad: Array) -> tuple[_Slopes, Array, Array | None] | None:
+    """Slopes of the currents, voltages at the winding and, where they were recorded, those that
+    were asked for [3, n]; None where it is not known how the inverter switches.
+    """
+    supply = x.supply
+    turn = x.once(eps_rad, "turning", lambda: turning(eps_rad))
+    slopes = _slopes_of(x, turn)
+    if slopes is None or not supply.vdc_v or x.psi_wb is None:
         return None
     induced = 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
-    turn = x.once(eps_rad, "turning", lambda: turning(eps_rad))
     winding = phases_of((x.base["r_ohm"] * x.i_a + induced) * turn)
     recorded = None if supply.volts_v is None else phases_of(supply.volts_v * turn)
-    return inductance, winding, recorded
+    return slopes, winding, recorded
 
 
 def _mean_tanh(one: Array, other: Array, rise: Array) -> Array:
@@ -229,24 +279,24 @@ def _log_cosh(at: Array) -> Array:
 
 
 def _beside(volts: Array, loss_v: float, late: Array, side: float) -> tuple[Array, Array]:
-    """At each leg's edge [3, n]: the part of its dead time in which the others are low, and what
-    these did to its current since the middle of its zero vector [V].
+    """At each leg's edge: the part [3, n] of its dead time in which the others are low, and for how
+    long each of these [3, 3, n] was elsewhere since the middle of its zero vector [V].
 
     `late` [3, n] is the part of the dead time by which an edge comes late; `side` −1 at the edges
     before the pulses, 1 at those after.
     """
-    low, moved = np.zeros_like(volts), np.zeros_like(volts)
+    low, elsewhere = np.zeros_like(volts), np.zeros((3, *volts.shape))
     behind = late if side < 0.0 else 1.0 - late
     held = 2.0 * loss_v * late
     for k, others in enumerate(_OTHERS):
         for j in others:
             difference = volts[k] - volts[j]
             low[k] += 0.5 * np.clip(difference / (2.0 * loss_v) + behind[j], 0.0, 1.0)
-            moved[k] += np.maximum(side * difference - held[j], 0.0) / 3.0
-    return low, moved
+            elsewhere[k, j] = np.maximum(side * difference - held[j], 0.0)
+    return low, elsewhere
 
 
-def _passed(current_a: Array, ramp_a: float, width_a: float) -> Array:
+def _passed(current_a: Array, ramp_a: Array | float, width_a: float) -> Array:
     """A ramp from 0 to 1 of a length [A] about zero, smoothed by sech² of a width [A]."""
     up, down = (_log_cosh((current_a + part * ramp_a) / width_a) for part in (0.5, -0.5))
     return 0.5 + 0.5 * width_a / ramp_a * (up - down)
