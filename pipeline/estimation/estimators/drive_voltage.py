@@ -313,14 +313,16 @@ def _chosen(rows: VoltageRows, magnet: float, level: float) -> list[str]:
     return sure + needed_columns(base, candidates, rows.voltage_v, sigma, level, None, tau)
 
 
-def _unlogged_flux(rows: VoltageRows, residuals: Array) -> float:
-    """Standard uncertainty of Ke [V s/rad] for the flux of a d current that was not logged.
+def _unlogged_flux(rows: VoltageRows, residuals: Array, along: Array) -> float:
+    """Standard uncertainty of Ke [V s/rad] or R [ohm] for the flux of a d current that was not
+    logged.
 
-    What of it varies is in the remainder. As large as that, its mean may be, which reads as Ke.
+    What of it varies is in the remainder. As large as that, the part of it may be that goes `along`
+    the speed [w, rad/s], which reads as Ke, or along the q current [w, A], which reads as R.
     """
-    if all(c.has("id_a") for c in rows.captures):
+    if all(c.has("id_a") for c in rows.captures) or not np.any(along):
         return 0.0
-    return float(np.sqrt(np.mean(residuals**2) / np.mean(rows.speed_rad_s**2)))
+    return float(np.sqrt(np.mean(residuals**2) / np.mean(along**2)))
 
 
 def _estimates(
@@ -379,9 +381,10 @@ def _unlogged(
         words.append(f"{PLACE[name]} not logged, taken as 25 ± {kelvin:g} K")
     if name == GIVES[0]:
         parts.append(Contribution(HOLD, value * rows.hold_doubt, "B"))
-        if flux := _unlogged_flux(rows, fit.residuals):
-            parts.append(Contribution("assumed:id_a:flux", flux, "B"))
-            words.append("id_a not logged, taken as 0 but for what varies")
+    along = rows.speed_rad_s if name == GIVES[0] else rows.current_a
+    if flux := _unlogged_flux(rows, fit.residuals, along):
+        parts.append(Contribution("assumed:id_a:flux", flux, "B"))
+        words.append("id_a not logged, taken as 0 but for what varies")
     return parts, words
 
 

@@ -76,3 +76,23 @@ def test_scatter_in_proportion_to_torque_is_a_share_of_it_and_two_per_cent_the_l
     assert unlogged_share(0.3 * sign * torque, torque) == pytest.approx(0.3)
     assert unlogged_share(0.001 * sign * torque, torque) == pytest.approx(0.02)
     assert unlogged_share(sign, np.zeros(201)) == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("level", [0.0, 0.3])
+def test_resistance_of_a_log_without_its_d_current(level) -> None:
+    """Flux of a d current goes with the q current by chance: R came out twice too large."""
+    motor = replace(design("servo-ipm"), effects={})
+    plan = tuple((f"drive_{n}", "drive", {"segments": 6, "id_level": level}) for n in range(2))
+    whole = campaign_of(campaign(motor, Bench(), 3, plan))
+    lost = ("id_a", "vd_v")
+    captures = tuple(
+        replace(one, tables=tuple(t.drop(lost, strict=False) for t in one.tables))
+        for one in whole.captures
+    )
+    constants = fit_all(replace(whole, captures=captures), {})[0]
+    r = constants.best("r_phase_ohm")
+    if level:
+        assert r is None
+        assert constants.best("motor_constant_nm_sqrt_w") is None
+    else:
+        assert abs(r.number - motor.r_phase_ohm) < 3.0 * r.u
