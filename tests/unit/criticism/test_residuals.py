@@ -180,22 +180,23 @@ def test_a_quantised_ramp_has_its_rounding_noise():
     assert sensor_noise(np.linspace(0.0, 9.123, 20011), DEFAULT.sensor_noise) < 1e-12
 
 
-def test_a_jump_of_voltage_is_known_to_a_quarter_of_a_sample():
+@pytest.mark.parametrize("signal", ["vq_v", "torque_shaft_nm"])
+def test_a_jump_is_known_to_a_quarter_of_a_sample(signal):
     """The weak sample of a step at k is its height times what stands behind k; a sample earlier or
     later changes that by height times the test function at k, of which a quarter is allowed.
     """
     model, segment = Model(machine(), ()), log()
     calm = reading_error(segment, model, BASE)
     weak, jump, at = segment.weak, 5.0, 4000
-    volts = segment.recorded["vq_v"].copy()
-    volts[at:] += jump
-    stepped = replace(segment, recorded={**segment.recorded, "vq_v": volts})
-    allowed = reading_error(stepped, model, BASE)[1, :, 0]
+    jumping, place = segment.recorded[signal].copy(), segment.channels.index(signal)
+    jumping[at:] += jump
+    stepped = replace(segment, recorded={**segment.recorded, signal: jumping})
+    allowed = reading_error(stepped, model, BASE)[place, :, 0]
     over = (weak.starts <= at - 1) & (at - 1 < weak.starts + weak.length)
     told = np.zeros(weak.starts.size)
     told[over] = 0.25 * jump * weak.functions[0, 0][at - weak.starts[over]]
     assert over.sum() >= 2
-    near = np.sqrt(np.maximum(allowed**2 - calm[1, :, 0] ** 2, 0.0))
+    near = np.sqrt(np.maximum(allowed**2 - calm[place, :, 0] ** 2, 0.0))
     assert near[over] == pytest.approx(np.abs(told[over]), rel=0.05, abs=0.02 * told.max())
     assert near[~over].max() < 0.1 * told.max(), "of the reading itself"
 
