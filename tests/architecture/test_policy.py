@@ -70,7 +70,7 @@ ARITHMETIC = {
     },
     "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight
     "design/experiments.py": {"_SEED"},
-    "equations/holding.py": {"_CRAWL"},  # beside zero and not at it
+    "equations/holding.py": {"_CRAWL", "_ROUNDS"},  # beside zero and not at it; of a fixed point
     "equations/lcr.py": {"_PROBE"},  # differences
     "equations/load.py": {"EQUATION"},  # an order of equations
     "equations/motion.py": {"EQUATION"},  # an order of equations
