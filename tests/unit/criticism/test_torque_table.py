@@ -109,14 +109,16 @@ def test_a_sweep_without_levels_is_held_out_in_parts():
 
 
 def test_diagnose_reads_it_beside_a_coast():
-    """A coast says nothing of the magnet: that there is enough comes of the table."""
+    """A coast says nothing of the magnet: its torque is the table's."""
     plan = (("spin_down", "spin_down", {}), ("torque_table", "torque_table", {}))
     both = recorded(plan, 3, bench=EXACTLY)[0]
     model = ModelSpec("standard", ())
     start = Constants()
-    assert diagnose(with_pole_pairs(both), model, start).ladder
+    assert "torque_shaft_nm" in diagnose(with_pole_pairs(both), model, start).ladder[0].signals
     alone = replace(both, captures=tuple(c for c in both.captures if c.meta.test == "spin_down"))
-    assert not diagnose(with_pole_pairs(alone), model, start).ladder
+    found = diagnose(with_pole_pairs(alone), model, start)
+    assert found.verdict == "insufficient"
+    assert set(found.ladder[0].signals) == {"alpha_mech_rad_s2"}
 
 
 def with_pole_pairs(campaign: Campaign) -> Campaign:
