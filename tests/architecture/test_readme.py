@@ -19,7 +19,7 @@ from pipeline.criticism.effect import Effect
 from pipeline.crosscheck.protocol import Rule
 from pipeline.estimation.protocol import Estimator
 from pipeline.export.protocol import Exporter, Source
-from pipeline.io.maps.source_map import parse_source_map
+from pipeline.io.maps.map_file import parse_source_file
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Datasheet
@@ -126,7 +126,7 @@ def test_example_effect() -> None:
 
 def test_example_source_map_is_read() -> None:
     (source,) = blocks("yaml")
-    found = parse_source_map(source.encode(), "hall")
+    found = parse_source_file(source.encode(), "hall")["hall"]
     assert found.recognises("x.csv", "Time;RPM;Iq;Vbus\n0;1;2;3\n", ())
     assert {part.column for part in found.fields} == {"t_s", "omega_mech_rad_s", "iq_a", "vdc_v"}
     assert found.metadata_for("x.csv")["test"] == "drive"

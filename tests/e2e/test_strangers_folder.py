@@ -10,7 +10,7 @@ import pytest
 
 import pipeline
 from pipeline.__main__ import main
-from pipeline.io.maps.source_map import load_source_file
+from pipeline.io.maps.map_file import load_source_file
 from pipeline.records.capture import Capture
 
 DEMO = Path(pipeline.__file__).parents[1] / "data" / "demo"

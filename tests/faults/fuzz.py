@@ -26,7 +26,8 @@ from pipeline.contracts.motor import agree
 from pipeline.execution.tasks.captures import ReadTask, usable_captures
 from pipeline.io.ingest.capture_reader import read_capture, survey
 from pipeline.io.ingest.guard import READER_FAILED, ReadLimits
-from pipeline.io.maps.source_map import SourceMap, load_source_maps
+from pipeline.io.maps.map_file import load_source_maps
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.storage.publish import canonical_json
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import CaptureError

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.io.maps.source_map import SourceMap, parse_source_map
+from pipeline.io.maps.map_file import parse_source_file
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.errors import CaptureError, UsageError
 from tests.faults import fuzz, grammar
 
@@ -91,7 +92,7 @@ def _is_read(files: grammar.Folder, folder: Path, maps: Mapping[str, SourceMap])
 @pytest.mark.parametrize("number", range(300))
 def test_a_hostile_source_map_is_a_usage_error(number: int) -> None:
     with suppress(UsageError):
-        parse_source_map(grammar.source_map(number), "bench")
+        parse_source_file(grammar.source_map(number), "bench")["bench"]
 
 
 def test_a_failing_reader_is_noticed_and_its_input_kept(

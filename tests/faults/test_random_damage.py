@@ -10,7 +10,7 @@ from mcap.writer import CompressionType
 
 from pipeline.io.ingest.capture_reader import read_capture, survey
 from pipeline.io.inspection.describe import describe
-from pipeline.io.maps.source_map import load_source_maps
+from pipeline.io.maps.map_file import load_source_maps
 from pipeline.io.mcap.container import scan
 from pipeline.io.mcap.tables import read_tables
 from pipeline.records.errors import CaptureError

@@ -9,7 +9,7 @@ import pytest
 from pipeline.contracts.motor import agree
 from pipeline.contracts.validate import validate
 from pipeline.io.ingest.capture_reader import read_capture, survey
-from pipeline.io.maps.source_map import load_source_maps
+from pipeline.io.maps.map_file import load_source_maps
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding

@@ -26,7 +26,8 @@ from pipeline.io.ingest.metadata import (
     merge,
     sidecar,
 )
-from pipeline.io.maps.source_map import Part, SourceMap, find_maps
+from pipeline.io.maps.map_file import find_maps
+from pipeline.io.maps.source_map import Part, SourceMap
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.messages import count_messages
 from pipeline.io.tables.csv_table import MAX_HEAD_BYTES, PACKED, check_text, split_comments

@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from pipeline.io.maps.source_map import laid_over
+from pipeline.io.maps.map_file import laid_over
 from pipeline.io.storage.plain_yaml import load_plain
 
 _HEAD = "# A source map, of {}; what was answered is under `metadata`. docs/source-maps.md.\n"

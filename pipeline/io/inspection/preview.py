@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.io.ingest.capture_reader import read_capture
 from pipeline.io.ingest.survey import Question, look
-from pipeline.io.maps.source_map import parse_source_file
+from pipeline.io.maps.map_file import parse_source_file
 from pipeline.records.errors import CaptureError
 from pipeline.records.naming import printable
 

@@ -6,7 +6,8 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from pipeline.io.maps.source_map import SourceMap, find_maps, load_source_file, load_source_maps
+from pipeline.io.maps.map_file import find_maps, load_source_file, load_source_maps
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.settings import configuration_folder
 
 AUTO = "auto"

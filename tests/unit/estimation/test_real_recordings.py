@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.estimation.registry import fit_all
 from pipeline.io.ingest.capture_reader import read_capture, survey
-from pipeline.io.maps.source_map import load_source_maps
+from pipeline.io.maps.map_file import load_source_maps
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.settings import configuration_folder

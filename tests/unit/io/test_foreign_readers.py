@@ -11,7 +11,7 @@ import pytest
 
 import pipeline
 from pipeline.io.ingest.capture_reader import read_capture, survey
-from pipeline.io.maps.source_map import load_source_maps
+from pipeline.io.maps.map_file import load_source_maps
 from pipeline.io.readers.moteus_ld import metadata
 from pipeline.io.readers.moteus_ld import read as read_sweep
 from pipeline.io.readers.npz import read as read_archive

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from pipeline.io.ingest.capture_reader import Survey, read_capture, survey
-from pipeline.io.maps.source_map import parse_source_map
+from pipeline.io.maps.map_file import parse_source_file
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError, UsageError
 from tests.unit.io.recordings import META, START_NS, json_messages, mcap_file, small_capture
@@ -335,7 +335,7 @@ def test_blocks_without_t_s_are_refused_unless_a_map_states_the_increment(tmp_pa
     text = "recognise: {topics: ['/s']}\nfields: {w: omega_mech_rad_s}\nmessages: block\n"
     text += "time: {from: log, increment_s: 1e-3}\nmetadata: {motor_id: m, test: spin_down}\n"
     (tmp_path / "a.mcap").write_bytes(mcap_file(rows, metadata={}))
-    found = survey(tmp_path, {"bench": parse_source_map(text.encode(), "bench")})
+    found = survey(tmp_path, {"bench": parse_source_file(text.encode(), "bench")["bench"]})
     (table,) = captures(tmp_path, found)[0].tables
     np.testing.assert_allclose(table["t_s"], np.arange(6) * 1e-3, atol=1e-15)
     assert table["omega_mech_rad_s"].to_list() == [0, 1, 2, 3, 4, 5]
@@ -385,7 +385,7 @@ def test_a_map_recognises_and_another_claim_is_ambiguous(tmp_path: Path) -> None
     text = (
         b"recognise: {files: ['*.csv']}\nfields: {I: ia_a}\nmetadata: {motor_id: m, test: drive}\n"
     )
-    maps = {name: parse_source_map(text, name) for name in ("one", "two")}
+    maps = {name: parse_source_file(text, name)[name] for name in ("one", "two")}
     (tmp_path / "x.csv").write_text("I\n1\n")
     assert survey(tmp_path, {"one": maps["one"]}).entries[0].source == maps["one"]
     (finding,) = survey(tmp_path, maps).findings

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.io.ingest.capture_reader import read_capture, survey
 from pipeline.io.inspection.describe import describe
-from pipeline.io.maps.source_map import load_source_maps, parse_source_map
+from pipeline.io.maps.map_file import load_source_maps, parse_source_file
 from pipeline.records.errors import CaptureError
 from pipeline.settings import configuration_folder
 from pipeline.stages.inspect_file import render
@@ -42,7 +42,7 @@ def test_a_strange_table_is_understood_and_its_starter_map_reads_it(tmp_path: Pa
     assert "holding_current: needs theta_mech_rad" in text
     finished = report.starter.replace("# motor_id: the serial number", "motor_id: m1")
     finished = finished.replace("# test: one of the contract's", "test: spin_down")
-    source = parse_source_map(finished.encode(), "bench")
+    source = parse_source_file(finished.encode(), "bench")["bench"]
     found = survey(tmp_path, {"bench": source})
     (table,) = read_capture(tmp_path, found.entries[0]).tables
     np.testing.assert_allclose(table["t_s"], [0, 1e-3, 2e-3])
@@ -56,7 +56,7 @@ def test_a_table_without_header_gets_numbered_names(tmp_path: Path) -> None:
     path.write_text("0.0\t1.5\n0.1\t1.6\n")
     report = describe(path, {})
     assert [seen.name for seen in report.streams[0].fields] == ["column_1", "column_2"]
-    parse_source_map(report.starter.encode(), "bench")
+    parse_source_file(report.starter.encode(), "bench")["bench"]
 
 
 def test_a_strange_mcap_gets_topics_fields_and_a_map_to_start_from(tmp_path: Path) -> None:
@@ -66,9 +66,9 @@ def test_a_strange_mcap_gets_topics_fields_and_a_map_to_start_from(tmp_path: Pat
     report = describe(path, {})
     assert report.streams[0].rate_hz == pytest.approx(1000)
     text = report.starter.replace("# motor_id: the serial number", "motor_id: m1")
-    source = parse_source_map(
+    source = parse_source_file(
         text.replace("# test: one of the contract's", "test: drive").encode(), "b"
-    )
+    )["b"]
     found = survey(tmp_path, {"b": source})
     (table,) = read_capture(tmp_path, found.entries[0]).tables
     np.testing.assert_allclose(table["omega_mech_rad_s"], 2 * np.pi * np.arange(5.0))
@@ -110,7 +110,7 @@ def test_a_capture_that_run_would_refuse_is_not_called_sound(
     assert "run` refuses it as it stands" in render(report)
     assert "# source: NAME" in report.starter
     path.write_text("# source: bench\n" + text)
-    sources = {"bench": parse_source_map(report.starter.encode(), "bench")}
+    sources = {"bench": parse_source_file(report.starter.encode(), "bench")["bench"]}
     (table,) = read_capture(tmp_path, survey(tmp_path, sources).entries[0]).tables
     assert table["omega_mech_rad_s"].to_list() == [100.5, 99.5]
     assert table["t_s"].to_list() == [0.0, 0.1]
@@ -202,7 +202,7 @@ def test_a_table_in_latin_1_is_read_and_its_map_says_so(tmp_path: Path) -> None:
     finished = finished.replace("# motor_id: the serial number", "motor_id: m1")
     finished = finished.replace("# test: one of the contract's", "test: drive")
     finished = finished.replace("time:\n  from: increment\n  increment_s: 1.0e-3", "#")
-    sources = {"bench": parse_source_map(finished.encode(), "bench")}
+    sources = {"bench": parse_source_file(finished.encode(), "bench")["bench"]}
     (table,) = read_capture(tmp_path, survey(tmp_path, sources).entries[0]).tables
     assert table["t_s"].to_list() == [0.0, 1.0]
 

@@ -16,7 +16,8 @@ from pipeline.io.inspection.file_names import name_patterns
 from pipeline.io.inspection.labels import read_label
 from pipeline.io.inspection.proposals import propose
 from pipeline.io.inspection.starter_map import header_pattern
-from pipeline.io.maps.source_map import SourceMap, parse_source_file, parse_source_map
+from pipeline.io.maps.map_file import parse_source_file
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import UsageError
 
@@ -366,9 +367,9 @@ def test_other_columns_and_a_minus_that_the_name_leaves_out(pattern: str, value:
 
 def test_a_unit_that_the_column_cannot_have_is_refused() -> None:
     with pytest.raises(UsageError, match="'kg' is no unit of omega_mech_rad_s"):
-        parse_source_map(
+        parse_source_file(
             b"file_names: ['(?P<omega_mech_rad_s__kg>.)']\nrecognise: {files: ['*']}", "m"
-        )
+        )["m"]
 
 
 def test_a_channel_number_says_nothing_of_what_it_recorded() -> None:

@@ -12,8 +12,8 @@ import yaml
 
 import pipeline
 from pipeline.io.maps.keys import KEYS, map_schema
+from pipeline.io.maps.map_file import parse_source_file
 from pipeline.io.maps.section import Section
-from pipeline.io.maps.source_map import parse_source_file
 from pipeline.records.errors import UsageError
 from pipeline.stages.schemas import build
 

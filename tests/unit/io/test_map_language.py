@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from pipeline.io.ingest.capture_reader import read_capture, survey
-from pipeline.io.maps.places import source_maps
-from pipeline.io.maps.source_map import (
-    SourceMap,
+from pipeline.io.maps.map_file import (
     find_maps,
     load_source_file,
     parse_source_file,
-    parse_source_map,
 )
+from pipeline.io.maps.places import source_maps
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError, UsageError
 
@@ -190,4 +189,4 @@ def test_maps_lie_anywhere_and_the_nearest_of_a_name_counts(
 )
 def test_what_a_map_cannot_say_is_named(text: str, says: str) -> None:
     with pytest.raises(UsageError, match=says):
-        parse_source_map(text.encode(), "bench")
+        parse_source_file(text.encode(), "bench")["bench"]

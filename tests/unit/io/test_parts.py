@@ -10,7 +10,7 @@ import pytest
 from pipeline.io.ingest.capture_reader import read_capture, survey
 from pipeline.io.inspection.describe import describe
 from pipeline.io.inspection.parts import parts_of
-from pipeline.io.maps.source_map import parse_source_file
+from pipeline.io.maps.map_file import parse_source_file
 
 STEP_S = 0.01
 TIME = np.arange(0.0, 20.0, STEP_S)

@@ -12,7 +12,7 @@ import pytest
 
 from pipeline.io.ingest.capture_reader import read_capture, survey
 from pipeline.io.maps.columns import to_frame
-from pipeline.io.maps.source_map import load_source_maps, parse_source_map
+from pipeline.io.maps.map_file import load_source_maps, parse_source_file
 from pipeline.io.tables import foreign
 from pipeline.io.tables.foreign import find_reader, readers
 from pipeline.io.tables.raw_table import RawTable
@@ -158,9 +158,9 @@ metadata: {{motor_id: M1, test: drive}}
 def test_every_form_gives_the_same_rows(form: str, tmp_path: Path) -> None:
     make, prefix, time, ending = FORMS[form]
     reader = "mat" if form == "mat73" else form
-    source = parse_source_map(
+    source = parse_source_file(
         MAP.format(ending=ending, reader=reader, prefix=prefix, time=time).encode(), "bench"
-    )
+    )["bench"]
     (tmp_path / f"run.{ending}").write_bytes(make())
     found = survey(tmp_path, {"bench": source})
     assert found.findings == ()
@@ -248,7 +248,7 @@ def test_a_tdms_that_lacks_its_end_is_refused_though_its_library_reads_on() -> N
 
 def test_complex_numbers_are_no_column() -> None:
     """Their imaginary part was dropped in silence."""
-    source = parse_source_map(b"fields: {t: t_s, i: iq_a}", "x")
+    source = parse_source_file(b"fields: {t: t_s, i: iq_a}", "x")["x"]
     table = RawTable("npy", {"t": np.arange(3.0), "i": np.array([1j, 2j, 3j])})
     with pytest.raises(CaptureError, match="complex"):
         to_frame(table, source)
@@ -280,7 +280,7 @@ def test_two_motors_in_a_log_are_refused_or_a_capture_each(tmp_path: Path) -> No
     log = wpilog("voltage-left-drive", "voltage-right-drive", ("Volt", "Volt"))
     with pytest.raises(CaptureError, match="2 tables of the file become vq_v"):
         _by_the_sysid_map(tmp_path, log)
-    source = parse_source_map(
+    source = parse_source_file(
         b"""
 recognise: {files: ['*.wpilog']}
 reader: wpilog
@@ -291,7 +291,7 @@ captures:
   - {motor_id: right, fields: {'voltage-right-*': {column: vq_v, unit: row}}}
 """,
         "robot",
-    )
+    )["robot"]
     found = survey(tmp_path, {"robot": source})
     volts = {
         capture.meta.motor_id: capture.arrays("vq_v")["vq_v"]

@@ -13,7 +13,8 @@ from pipeline.api.recordings import Recordings
 from pipeline.contracts.validate import validate
 from pipeline.io.ingest.capture_reader import read_capture, survey
 from pipeline.io.maps.columns import _converted
-from pipeline.io.maps.source_map import FieldMap, load_source_maps, parse_source_map
+from pipeline.io.maps.map_file import load_source_maps, parse_source_file
+from pipeline.io.maps.source_map import FieldMap
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import CaptureError, UsageError
 from tests.unit.io.recordings import SHARED
@@ -174,7 +175,7 @@ def test_monitor_lines_of_simplefoc_need_the_interval(tmp_path: Path) -> None:
         read_capture(tmp_path, entry)
     text = (CONF / "simplefoc.yaml").read_text().replace("from: increment", "{}", 1)
     text = text.replace("  {}", "  from: increment\n  increment_s: 0.01")
-    found = survey(tmp_path, {"mine": parse_source_map(text.encode(), "mine")})
+    found = survey(tmp_path, {"mine": parse_source_file(text.encode(), "mine")["mine"]})
     (table,) = read_capture(tmp_path, found.entries[0]).tables
     np.testing.assert_allclose(table["t_s"], [0.0, 0.01, 0.02])
     np.testing.assert_allclose(table["iq_a"], [0.35, 0.36, 0.37])
@@ -202,7 +203,7 @@ def test_runs_of_voltage_and_speed_alone_say_what_they_do_not_determine() -> Non
     text = (
         CONF / "odrive_characterization.yaml"
     ).read_text() + f"  motor_id: m\ncaptures:\n{parts}"
-    found = survey(folder, {"labmrd": parse_source_map(text.encode(), "labmrd")})
+    found = survey(folder, {"labmrd": parse_source_file(text.encode(), "labmrd")["labmrd"]})
     read = [read_capture(folder, entry) for entry in found.entries]
     assert len(read) == len(LAST_ROWS)
     for capture in read:
@@ -312,7 +313,7 @@ MINIMAL = "recognise: {files: ['*.csv']}\nfields: {I: ia_a}\n"
 )
 def test_a_wrong_or_hostile_map_is_a_usage_error_that_names_the_place(text: str, says: str) -> None:
     with pytest.raises(UsageError) as refused:
-        parse_source_map(text.encode("latin-1"), "bench")
+        parse_source_file(text.encode("latin-1"), "bench")["bench"]
     assert says in str(refused.value)
     assert "bench" in str(refused.value)
 
@@ -328,7 +329,7 @@ def test_signs_scales_and_offsets_apply_in_the_documented_order(tmp_path: Path) 
         "metadata: {motor_id: 000123, test: spin_down}\n"
     )
     (tmp_path / "x.csv").write_text("t,T,M\n0,300,1000\n1,273.15,-500\n")
-    source = parse_source_map(text.encode(), "bench")
+    source = parse_source_file(text.encode(), "bench")["bench"]
     found = survey(tmp_path, {"bench": source})
     capture = read_capture(tmp_path, found.entries[0])
     assert capture.meta.motor_id == "000123"
@@ -342,7 +343,7 @@ def test_an_unknown_unit_refuses_the_capture_and_not_the_run(tmp_path: Path) -> 
     (tmp_path / "x.csv").write_text("I\n1\n")
     text = "recognise: {files: [x.csv]}\nfields: {I: {column: ia_a, unit: furlong}}\n"
     text += "metadata: {motor_id: m, test: drive}\n"
-    found = survey(tmp_path, {"bench": parse_source_map(text.encode(), "bench")})
+    found = survey(tmp_path, {"bench": parse_source_file(text.encode(), "bench")["bench"]})
     with pytest.raises(CaptureError) as refused:
         read_capture(tmp_path, found.entries[0])
     assert refused.value.code == "unknown_unit"

@@ -11,7 +11,7 @@ from pipeline.io.ingest.capture_reader import read_capture, survey
 from pipeline.io.inspection.describe import InspectReport, describe
 from pipeline.io.inspection.labels import read_label
 from pipeline.io.inspection.proposals import propose
-from pipeline.io.maps.source_map import parse_source_file
+from pipeline.io.maps.map_file import parse_source_file
 from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.capture import Capture
 from pipeline.records.errors import UsageError

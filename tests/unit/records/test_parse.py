@@ -110,6 +110,7 @@ GUARDED_FILES = (
     "io/ingest/metadata.py",
     "io/storage/plain_yaml.py",
     "io/maps/source_map.py",
+    "io/maps/map_file.py",
     "io/ingest/survey.py",
     "io/inspection/describe.py",
     "io/inspection/sniff.py",
