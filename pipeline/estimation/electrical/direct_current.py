@@ -190,8 +190,11 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> Ite
 
 
 def _captures(campaign: Campaign) -> tuple[Capture, ...]:
-    """The resistance captures; the current steps where there are none."""
-    return tuple(campaign.of(TEST)) or tuple(campaign.of(STEP))
+    """The resistance captures; where there are none, current steps with measured voltages: of a
+    commanded one, what the inverter drops would be taken for resistance.
+    """
+    steps = (c for c in campaign.of(STEP) if c.meta.voltage_kind != "commanded")
+    return tuple(campaign.of(TEST)) or tuple(steps)
 
 
 def _settled(capture: Capture, i_a: Array) -> Sequence[Plateau]:

@@ -78,3 +78,17 @@ def test_steps_stand_in_for_resistance_captures_alone() -> None:
     both = recorded("gimbal-5208", STEPS + PLATEAUS, 1.0)
     points, _ = direct_current_points(both, ESTIMATOR.options)
     assert {c.meta.test for c in captures_of(both, points)} == {"resistance"}
+
+
+def test_steps_of_a_commanded_voltage_give_none() -> None:
+    """Two tenths of a volt that the inverter drops are not at the winding, and were 11 % of R."""
+    measured = recorded("gimbal-5208", STEPS, 1.0)
+    commanded = replace(measured, captures=tuple(map(of_a_drive, measured.captures)))
+    assert resistance(measured).status == "measured"
+    assert resistance(commanded).status == "not_identifiable"
+
+
+def of_a_drive(one: Capture) -> Capture:
+    drop = 0.2 * (pl.col("ia_a") / 0.05).tanh()
+    tables = tuple(t.with_columns(vab_v=pl.col("vab_v") + drop) for t in one.tables)
+    return replace(one, tables=tables, meta=replace(one.meta, voltage_kind="commanded"))
