@@ -264,7 +264,7 @@ def _as_reported(system: LinearSystem, remainders: Sequence[Remainder]) -> tuple
 
 def _enough(cut_segments: Sequence[Segment]) -> bool:
     """Whether some test turns the machine: coasts alone show drags over an inertia."""
-    return any("turning" in equation_of(segment).use.shows for segment in cut_segments)
+    return any(equation_of(segment).use.turns for segment in cut_segments)
 
 
 def _insufficient(

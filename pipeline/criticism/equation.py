@@ -143,8 +143,8 @@ class Use:
 
     Attributes
     ----------
-    shows
-        Of `current` and `turning`, what such a test is done under; a diagnosis needs the latter.
+    turns
+        Whether the machine turns in it, if only in steps; a diagnosis needs such a test.
     warms
         Hooks whose effects grow in it with a temperature.
     at_rest
@@ -162,7 +162,7 @@ class Use:
 
     """
 
-    shows: frozenset[str] = frozenset()
+    turns: bool = False
     warms: frozenset[str] = frozenset()
     at_rest: bool = False
     free_runs: tuple[str, ...] = ()

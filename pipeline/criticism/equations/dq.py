@@ -314,7 +314,7 @@ EQUATION = Equation(
         frozenset({"voltage_jumps", "torque_jumps", "encoder_lines", "standstill", "pulses"}),
     ),
     use=Use(
-        shows=frozenset({"current", "turning"}),
+        turns=True,
         warms=frozenset({"drop", "flux"}),
         free_runs=("torque_map", "drive"),
         currents=("id_a", "iq_a"),

@@ -222,7 +222,7 @@ EQUATION = Equation(
     recorder=RECORDER,
     sensing=Sensing(errors=frozenset({"voltage_jumps"})),
     use=Use(
-        shows=frozenset({"current", "turning"}),
+        turns=True,
         warms=frozenset({"drop", "flux"}),
         combinations=COMBINATIONS,
     ),

@@ -121,5 +121,5 @@ EQUATION = Equation(
         sensors=frozenset({"current", "voltage"}),
     ),
     # where there are logs to predict it from, a table is held out as a whole
-    use=Use(shows=frozenset({"current", "turning"}), whole_beside=("dq",)),
+    use=Use(turns=True, whole_beside=("dq",)),
 )

@@ -254,5 +254,5 @@ EQUATION = Equation(
         form="affine",
     ),
     recorder=RECORDER,
-    use=Use(shows=frozenset({"turning"}), free_runs=("spin_down",), angle_maps=True),
+    use=Use(turns=True, free_runs=("spin_down",), angle_maps=True),
 )

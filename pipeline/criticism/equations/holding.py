@@ -184,5 +184,5 @@ EQUATION = Equation(
         sensors=frozenset({"current"}),
         form="affine",
     ),
-    use=Use(shows=frozenset({"current", "turning"})),
+    use=Use(turns=True),
 )

@@ -155,7 +155,7 @@ EQUATION = Equation(
     ),
     recorder="log",
     sensing=Sensing(_reading, frozenset({"torque_jumps", "encoder_lines", "standstill", "pulses"})),
-    use=Use(shows=frozenset({"current", "turning"}), warms=frozenset({"flux"}), angle_maps=True),
+    use=Use(turns=True, warms=frozenset({"flux"}), angle_maps=True),
     # behind the voltage of the same log
     rank=1,
 )

@@ -235,5 +235,5 @@ EQUATION = Equation(
     ),
     recorder="open",
     sensing=Sensing(_reading, sensors=LINES_V, sensed=_sensed),
-    use=Use(shows=frozenset({"turning"}), warms=frozenset({"flux"}), angle_maps=True),
+    use=Use(turns=True, warms=frozenset({"flux"}), angle_maps=True),
 )

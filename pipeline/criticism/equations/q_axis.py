@@ -152,5 +152,5 @@ EQUATION = Equation(
     ),
     recorder="log",
     sensing=Sensing(errors=frozenset({"late_speed", "voltage_jumps", "unsampled"})),
-    use=Use(shows=frozenset({"current", "turning"}), warms=frozenset({"drop", "flux"})),
+    use=Use(turns=True, warms=frozenset({"drop", "flux"})),
 )

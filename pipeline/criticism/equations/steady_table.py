@@ -138,5 +138,5 @@ EQUATION = Equation(
         hooks=frozenset({"flux", "drop"}),
         sensors=frozenset({"current", "voltage"}),
     ),
-    use=Use(shows=frozenset({"current", "turning"})),
+    use=Use(turns=True),
 )

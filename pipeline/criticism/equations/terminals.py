@@ -187,5 +187,5 @@ EQUATION = Equation(
         sensors=frozenset({"current", "voltage", "clock"}),
     ),
     recorder="step",
-    use=Use(shows=frozenset({"current"}), warms=frozenset({"drop"}), at_rest=True),
+    use=Use(warms=frozenset({"drop"}), at_rest=True),
 )

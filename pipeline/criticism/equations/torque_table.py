@@ -151,5 +151,5 @@ EQUATION = Equation(
         sensors=frozenset({"current", "load"}),
         torque_in=TORQUE,
     ),
-    use=Use(shows=frozenset({"current"}), whole_beside=("dq",)),
+    use=Use(whole_beside=("dq",)),
 )
