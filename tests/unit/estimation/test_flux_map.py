@@ -15,7 +15,7 @@ from pipeline.estimation.estimators.flux_map import ESTIMATOR
 from pipeline.estimation.policy import DEFAULT
 from pipeline.estimation.registry import fit_all
 from pipeline.io.ingest.capture_reader import read_capture, survey
-from pipeline.io.maps.source_map import load_source_maps
+from pipeline.io.maps.map_file import load_source_maps
 from pipeline.records.capture import UNSTATED_U, Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
