@@ -184,6 +184,8 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> Ite
         temp = float(temps[plateau.rows].mean())
         errors = (_standard_error(v), _standard_error(i))
         rising = _rising_v(columns, plateau.rows) if capture.meta.test == STEP else 0.0
+        if rising is None:
+            continue
         means = (float(v.mean()) - rising, float(i.mean()))
         errors = (math.hypot(errors[0], rising / math.sqrt(3.0)), errors[1])
         yield Point(index, pair, *means, temp, *errors, capture.meta, logged)
@@ -205,8 +207,9 @@ def _settled(capture: Capture, i_a: Array) -> Sequence[Plateau]:
     return (max(plateaus, key=lambda plateau: abs(float(i_a[plateau.rows].mean()))),)
 
 
-def _rising_v(columns: Mapping[str, Array], rows: slice) -> float:
-    """L Δi/Δt [V] over a plateau of a step whose current still rises; all of it where L is unknown.
+def _rising_v(columns: Mapping[str, Array], rows: slice) -> float | None:
+    """L Δi/Δt [V] over a plateau of a step whose current still rises. Where L is unknown, as of a
+    rise within one sample: zero of a current that is level within 3 u, else None.
 
     Iron that saturates has less than the L of the whole step: a uniform doubt, up to all of it.
     """
@@ -214,7 +217,9 @@ def _rising_v(columns: Mapping[str, Array], rows: slice) -> float:
     form = integrated_form(t, v, i)
     ends = linear_fit(np.column_stack([t[rows] - t[rows].mean(), np.ones(t[rows].size)]), i[rows])
     slope_a_s = float(ends.coefficients[0])
-    return abs(form[0]) * slope_a_s if form else float(v[rows].mean())
+    if form is None:
+        return 0.0 if abs(slope_a_s) <= 3.0 * ends.u(0) else None
+    return abs(form[0]) * slope_a_s
 
 
 def uncertainties_of(points: Sequence[Point], captures: Sequence[Capture]) -> dict[str, float]:

@@ -74,6 +74,20 @@ def test_a_slow_rise_is_no_level_of_its_own() -> None:
     assert found.u < 0.02 * found.number
 
 
+@pytest.mark.parametrize("creep", [0.0, 0.2])
+def test_a_rise_within_a_sample_leaves_a_level_end_alone(creep: float) -> None:
+    """Voltage and current are alike there, so that L is unknown: R came out as zero."""
+    t_s = np.arange(400) * 1e-3
+    v_v = np.where(t_s > 0.1, 2.0 * (1.0 + creep * (t_s - 0.1)), 0.0)
+    columns = {"t_s": t_s, "vab_v": v_v, "ia_a": 10.0 * v_v}
+    columns["temp_winding_degc"] = np.full(t_s.size, 25.0)
+    found = resistance(Campaign("m", (capture("current_step", "step", pair="ab", **columns),)))
+    if creep:
+        assert found.status != "measured"
+    else:
+        assert found.number == pytest.approx(0.05, rel=1e-6)
+
+
 def test_steps_stand_in_for_resistance_captures_alone() -> None:
     both = recorded("gimbal-5208", STEPS + PLATEAUS, 1.0)
     points, _ = direct_current_points(both, ESTIMATOR.options)
