@@ -69,6 +69,7 @@ class Control(NamedTuple):
     angle_wobble: float
     angle_wobble_phase: float
     angle_play: float
+    angle_late_s: float
     lsb_angle: float
     speed_lag_s: float
     ambient: float
@@ -631,7 +632,7 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant, later: Plant, ch
     history, newest = np.zeros((HISTORY, 2)), 0
     delay = c.delay_s * c.substeps / c.period_s
     blend = 1.0 - math.exp(-c.period_s / c.speed_lag_s) if c.speed_lag_s > 0.0 else 1.0
-    start = sensed_angle(c.theta, 0.0, c)
+    start = sensed_angle(c.theta - c.angle_late_s * c.omega, 0.0, c)
     volt = command(loop, (0.0, 0.0), c.pole_pairs * start, c.omega, np.zeros(4), c)
     loop[:] = 0.0
     omega, before, carried = c.omega, start, c.theta
@@ -646,7 +647,7 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant, later: Plant, ch
             late = remembered(history, newest, min(delay, max(0.0, newest - 1.001)))
         seen = sensed_current(late, noise[k], c)
         carried = dragged(carried, y[2], 0.5 * c.angle_play)
-        angle = sensed_angle(carried, noise[k, 3], c)
+        angle = sensed_angle(carried - c.angle_late_s * y[3], noise[k, 3], c)
         if k > 0:
             omega += blend * ((angle - before) / c.period_s - omega)
         before = angle

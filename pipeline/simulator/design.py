@@ -176,16 +176,16 @@ class Bench:
     size of a random walk at the end of a capture and of a mains pick-up, in units of the
     channel's noise. `jitter_s` scatters the time stamps only. `temperature_hz` puts thermometers
     of fast captures on a clock of their own. `scope` records the current steps in place of the
-    station's own sensors. Hidden faults of the recorder: its clock is fast or
-    slow by the share `clock_rel` beyond what `u_rel_clock` states (stated where above 0), while the
-    speed that the bench reports goes by a clock of its own; torque and logged dq currents come
-    `late_torque_s` and `late_current_s` late; the encoder's coupling has a play of
-    `encoder_play_rad`; at rated torque the transducer reads `torque_bend_rel` of it too much, by a
-    cubic, and `torque_hysteresis_rel` more on the way down than up. `dyno_hz` is the bandwidth of
-    the dynamometer's speed loop, whose transducer then shows the reaction torque of its stator; 0
-    holds the shaft's far end at its speed, with the transducer in the coupling. With
-    `torque_in_coupling` the transducer of every log stands between the two masses, with
-    `torque_at_stator` it holds the motor's stator.
+    station's own sensors. Hidden faults of the recorder: its clock is fast or slow by the share
+    `clock_rel` beyond what `u_rel_clock` states (stated where above 0), while the speed that the
+    bench reports goes by a clock of its own; torque and logged dq currents come `late_torque_s` and
+    `late_current_s` late; the drive's encoder is read `late_angle_s` behind its currents, and its
+    coupling has a play of `encoder_play_rad`; at rated torque the transducer reads
+    `torque_bend_rel` of it too much, by a cubic, and `torque_hysteresis_rel` more on the way down
+    than up. `dyno_hz` is the bandwidth of the dynamometer's speed loop, whose transducer then shows
+    the reaction torque of its stator; 0 holds the shaft's far end at its speed, with the transducer
+    in the coupling. With `torque_in_coupling` the transducer of every log stands between the two
+    masses, with `torque_at_stator` it holds the motor's stator.
     """
 
     station: str = "sim-1"
@@ -219,6 +219,7 @@ class Bench:
     clock_rel: float = 0.0
     late_torque_s: float = 0.0
     late_current_s: float = 0.0
+    late_angle_s: float = 0.0
     encoder_play_rad: float = 0.0
     torque_bend_rel: float = 0.0
     torque_hysteresis_rel: float = 0.0

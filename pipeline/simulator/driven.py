@@ -147,6 +147,7 @@ def _in_the_loop(session: Session) -> dict[str, float]:
         "angle_wobble": session.fault("angle_eccentricity"),
         "angle_wobble_phase": session.fault("angle_eccentricity", "phase_rad"),
         "angle_play": session.bench.encoder_play_rad,
+        "angle_late_s": session.bench.late_angle_s,
         "lsb_angle": 2.0 * math.pi / 2.0**session.bench.encoder_bits,
         "speed_lag_s": session.bench.speed_lag_s,
     }

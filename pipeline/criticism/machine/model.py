@@ -98,6 +98,7 @@ BASE: tuple[Constant, ...] = (
     Constant("zero_alpha_a", "A", "α offset of the shunts", 0.0, "state", "current_a", "zero_a"),
     Constant("zero_beta_a", "A", "β offset of the shunts", 0.0, "state", "current_a", "zero_a"),
     Constant("zero_angle_rad", "rad", "electrical zero of the drive's encoder", hook="state"),
+    Constant("late_angle_s", "s", "drive's encoder behind its currents", 0.0, "state", "period_s"),
     _gain("gain_current", words="gain of the drive's current sensors"),
     _gain("gain_current_bench", words="gain of the bench's ammeter"),
     _gain("gain_voltage", words="gain of the bench's voltmeters"),

@@ -325,6 +325,11 @@ class Priors:
         1e-3, "rad", "electrical zero of the drive's encoder",
         source="the negligible size of `angle_offset`, which names what is beyond",
     )  # fmt: skip
+    late_angle_s: float = derived(
+        0.02, "sample periods", "lateness of a drive's encoder behind its current sensors",
+        source="the negligible size of `current_delay`, which names what is beyond: conversions, "
+        "filters and serial encoders differ by some microseconds",
+    )  # fmt: skip
     late_speed_s: float = chosen(
         5e-3, "s", "lateness of a speed that no angle is beside",
         why="observers and filters of drives are 1 to 10 ms late",

@@ -55,6 +55,11 @@ class GaussNewton:
         3.0, "1", "reach of a step of an amplitude, over its value or typical size",
         why="effects are found at any size, and a tangent is good for a few of them",
     )  # fmt: skip
+    shape_reach: float = chosen(
+        1.0, "1", "reach of a step of a shape, over its value or typical size",
+        why="a step of a speed, an exponent or a delay by itself is as far as a tangent is good "
+        "for; without one a Stribeck exponent ran to its bound and stayed there",
+    )  # fmt: skip
     short_programme: int = chosen(
         8, "segments", "programme that is begun from either side as well, at the most",
         why="two fits more, which a long programme does not need",

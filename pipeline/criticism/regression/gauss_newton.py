@@ -154,10 +154,8 @@ def _ridge(fit: Fit, columns: Sequence[Column]) -> Array:
         name: max(abs(fit.values[name]), policy.least_reach * scales[name]) for name in PHYSICAL
     }
     for name, (_, p) in fit.model.parameters().items():
-        if p.amplitude:
-            reach[name] = policy.effect_reach * max(
-                abs(fit.values[name]), p.typical * machine.scale(p)
-            )
+        share = policy.effect_reach if p.amplitude else policy.shape_reach
+        reach[name] = share * max(abs(fit.values[name]), p.typical * machine.scale(p))
     spans = np.array([reach.get(column.name, np.inf) for column in columns])
     return np.maximum(spans, 1e-30) ** -2
 

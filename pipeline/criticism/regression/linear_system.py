@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.machine.model import CURVED, Model
+from pipeline.criticism.machine.model import COAST_SHARES, CURVED, Model
 from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.regression import NoiseFloors
@@ -504,11 +504,14 @@ def _reusable_columns(
 def _is_valid(column: Column, made_at: Values, fit: Fit) -> bool:
     """Whether a column is near what it would be at a fit.
 
-    It goes with the constants; that of J with J, since a coasting shaft goes by 1/J; those of
-    sensors and shapes with other effects' parameters, by their typical sizes if these are larger.
+    It goes with the constants; that of J with J, since a coasting shaft goes by 1/J; a coast's
+    friction and its share are a product; those of sensors and shapes go with other effects'
+    parameters, by their typical sizes if these are larger.
     """
     model, now, far = fit.model, fit.values, fit.policy.fit.stale_share
     if any(abs(now[n] - made_at[n]) > far * abs(made_at[n]) for n in _STEADY):
+        return False
+    if column.name in COAST_SHARES or any(abs(now[n] - made_at[n]) > far for n in COAST_SHARES):
         return False
     if column.name == "j_kgm2":
         return abs(now["j_kgm2"] / made_at["j_kgm2"] - 1.0) < far

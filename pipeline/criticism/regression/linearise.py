@@ -494,7 +494,8 @@ def base_columns(machine: Machine, scales: Mapping[str, float]) -> list[Column]:
         Orders of magnitude by name.
 
     """
-    return [Column(c.name, 1e-3 * scales.get(c.name, 1.0)) for c in base_of(machine)]
+    sizes = {c.name: machine.scales.get(c.scale, 1.0) for c in base_of(machine)}
+    return [Column(name, 1e-3 * scales.get(name, size)) for name, size in sizes.items()]
 
 
 def effect_columns(

@@ -257,10 +257,10 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
     """
     if late := segment.fixed.get(LATE_SPEED, 0.0) * values[LATE_SPEED]:
         x = _in_time(segment, x, late)
-    zero = zero_angle(segment, values)
+    zero = zero_angle(segment, values, model.machine.pole_pairs * x.omega_rad_s)
     if not any(effect.angle is not None for effect in model.effects):
-        return _turned_back(x, zero) if zero else x
-    error, policy = np.full(x.theta_rad.size, zero), model.policy.cutting
+        return _turned_back(x, zero) if zero.any() else x
+    error, policy = zero, model.policy.cutting
     for _ in range(policy.angle_rounds):
         nearer = replace(x, theta_rad=x.theta_rad - error / model.machine.pole_pairs)
         error = zero + angle_error(nearer, model, values)
@@ -515,8 +515,9 @@ def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values)
     return recorded.i_a
 
 
-def zero_angle(segment: Segment, values: Values) -> float:
-    """Recorded less true electrical angle where the drive's encoder has its zero.
+def zero_angle(segment: Segment, values: Values, omega_e_rad_s: Array) -> Array:
+    """Recorded less true electrical angle of a drive's encoder that has its zero elsewhere and is
+    read later than the currents.
 
     Parameters
     ----------
@@ -524,14 +525,18 @@ def zero_angle(segment: Segment, values: Values) -> float:
         Any segment.
     values
         Parameters by full name.
+    omega_e_rad_s
+        Electrical speed [n].
 
     Returns
     -------
-    float
+    array [n]
         In rad; 0 unless it is a drive's log of both currents.
 
     """
-    return values["zero_angle_rad"] if _both_axes(segment) else 0.0
+    if not _both_axes(segment):
+        return np.zeros(omega_e_rad_s.size)
+    return values["zero_angle_rad"] - values["late_angle_s"] * omega_e_rad_s
 
 
 def _both_axes(segment: Segment) -> bool:

@@ -102,7 +102,7 @@ def recorded_voltage(
             q = values_of(effect, model.machine, values)
             voltage = effect.voltage(voltage, x, q, segment.instrument.name)
     if in_frame:
-        error: Array | float = zero_angle(segment, values)
+        error = zero_angle(segment, values, x.machine.pole_pairs * x.omega_rad_s)
         if any(effect.angle is not None for effect in model.effects):
             error = error + angle_error(x, model, values)
         voltage = voltage * np.exp(-1j * error)

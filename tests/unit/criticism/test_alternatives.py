@@ -35,7 +35,7 @@ def test_a_rival_is_told_where_the_captures_cannot_part_them():
 def test_a_rival_is_told_whatever_size_it_comes_out_at():
     """That it would be too small to matter does not part it from what it is confused with."""
     twin = replace(asking_for(0.1)["windage"], name="brake")
-    segments = (with_drag(curved(0.03)), with_drag(curved(0.03), 6))
+    segments = (with_drag(curved(0.035)), with_drag(curved(0.035), 6))
     fit = search(fitted(segments), LIBRARY)[-1].fit
     assert [effect.name for effect in fit.model.effects] == ["windage"]
     offered = candidates({**LIBRARY, "brake": twin}, fit.model)
@@ -79,13 +79,13 @@ def test_what_noise_in_a_speed_loop_looks_like_needs_a_remainder_that_is_reporte
     """
 
     def look(wholes, q):
-        return Discrimination("windage", {"drag_nm": (0.029, 0.001)})
+        return Discrimination("windage", {"drag_nm": (0.034, 0.001)})
 
     windage = LIBRARY["windage"]
     library = {"windage": replace(windage, discriminator=look) if coupling else windage}
 
     def drag(omega, _):
-        return 0.03 * omega * np.abs(omega) / 250.0**2
+        return 0.035 * omega * np.abs(omega) / 250.0**2
 
     fit = fitted((with_drag(drag), with_drag(drag, 6)))
     assert not significant_groups(search(fit, {})[0].system).any()

@@ -163,12 +163,12 @@ def test_an_effect_that_ties_with_one_too_small_to_matter_is_not_named():
 
 def test_windage_is_found_with_its_size():
     def drag(omega, _):
-        return 0.03 * omega * np.abs(omega) / 250.0**2
+        return 0.035 * omega * np.abs(omega) / 250.0**2
 
     segments = (with_drag(drag), with_drag(drag, 6))
     steps = search(fitted(segments), LIBRARY)
     assert steps[-1].added == ("windage",)
-    assert steps[-1].fit.values["windage.drag_nm"] == pytest.approx(0.03, rel=0.05)
+    assert steps[-1].fit.values["windage.drag_nm"] == pytest.approx(0.035, rel=0.05)
 
 
 def test_the_fit_is_looked_at_anew_whatever_joins(monkeypatch):
@@ -202,7 +202,7 @@ def test_beside_an_effect_of_its_kind_another_must_stand_for_more_than_its_error
     """A twentieth of what windage does, window by window, joins the floor for a drag only."""
 
     def drag(omega, _):
-        return 0.03 * omega * np.abs(omega) / 250.0**2
+        return 0.035 * omega * np.abs(omega) / 250.0**2
 
     segments = (with_drag(drag), with_drag(drag, 6))
     last = search(fitted(segments), LIBRARY)[-1]

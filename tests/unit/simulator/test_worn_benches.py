@@ -79,3 +79,12 @@ def test_a_compensated_dead_time_is_gone_but_near_zero_current():
     assert lost(left, large) < 0.02 * lost(whole, large)
     assert 0.5 * lost(whole, small) < lost(left, small) < lost(whole, small)
     assert math.isclose(lost(whole, large), 4.0 / 3.0 * volt, rel_tol=0.15)
+
+
+def test_an_encoder_that_is_read_late_shows_where_the_rotor_was():
+    how = {"speed": 0.5, "id_levels": (0.0,), "iq_levels": (0.3,), "dwell_s": 0.2}
+    late_s = 4e-6
+    true = logged(test="torque_map", **how)
+    seen = logged(replace(QUIET, late_angle_s=late_s), test="torque_map", **how)
+    behind = true["theta_mech_rad"] - seen["theta_mech_rad"]
+    assert behind == pytest.approx(late_s * true["omega_mech_rad_s"], rel=1e-3)
