@@ -11,7 +11,7 @@ from scipy.special import gammainc, gammaincinv
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.library.equations import equation_of
-from pipeline.criticism.machine.model import BASE, PHYSICAL, Model, base_of
+from pipeline.criticism.machine.model import BASE, PHYSICAL, STATE, Model, base_of
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.regression import GaussNewton
 from pipeline.criticism.regression.bounds import limits_of
@@ -364,7 +364,8 @@ def _or_stated(parameter: ModelParameter, stated: tuple[float, float] | None) ->
 
 
 def against_stated(system: LinearSystem, held_out: HeldOut) -> tuple[str, ...]:
-    """Notes of the stated constants that the captures, fitted without them, contradict.
+    """Notes of the stated constants, and of usual sizes of an instrument's state, that the captures,
+    fitted without them, contradict.
 
     Parameters
     ----------
@@ -384,21 +385,23 @@ def against_stated(system: LinearSystem, held_out: HeldOut) -> tuple[str, ...]:
     θ/u² − s/u_s², and data and prior agree within √(u_data² + u_s²).
 
     """
-    stated, sure_of, notes = system.fit.model.stated(), _reported(system, held_out), []
-    policy = system.policy.fit
+    stated, priors = system.fit.model.stated(), system.fit.model.priors()
+    usual = {c.name: c for c in BASE if c.name in STATE}
+    sure_of, notes, policy = _reported(system, held_out), [], system.policy.fit
     for place, column in enumerate(system.columns[: system.model_columns.size]):
-        if column.name not in stated:
+        if column.name not in {*stated, *usual}:
             continue
-        (stated_value, u_stated), u = stated[column.name], float(sure_of.u[place])
+        (stated_value, u_stated), u = priors[column.name], float(sure_of.u[place])
         u_alone = _beyond(np.array([u]), np.array([u_stated**-2.0]), policy)[0]
         if not math.isfinite(u_alone):
             continue
         value = u_alone**2 * (system.fit.values[column.name] / u**2 - stated_value / u_stated**2)
         if abs(value - stated_value) > policy.contradicted * math.hypot(u_alone, u_stated):
-            notes.append(
-                f"{column.name} is stated as {stated_value:.4g} ± {u_stated:.2g}, and without that "
-                f"these captures say {value:.4g} ± {u_alone:.2g}"
-            )
+            known = usual.get(column.name)
+            said = f"is stated as {stated_value:.4g} ± {u_stated:.2g}, and without that"
+            if known is not None:
+                said = f"({known.words}) is usually within {u_stated:.2g} {known.unit}, and"
+            notes.append(f"{column.name} {said} these captures say {value:.4g} ± {u_alone:.2g}")
     return tuple(notes)
 
 

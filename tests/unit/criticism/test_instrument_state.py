@@ -7,12 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.score_test import candidates, score_all, widened
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.simulator.bench import CAMPAIGN, campaign
+from pipeline.simulator.design import Bench
+from tests.simulated import campaign_of, design
 from tests.unit.criticism.machines import BASE, log, machine
 
 ALPHA_A, BETA_A, ZERO_RAD, LATE_S = 0.006, -0.009, 0.0012, 3e-6
@@ -61,3 +67,26 @@ def test_a_usual_offset_is_a_nuisance_and_a_large_one_a_name(times, named):
         assert fit.values["zero_beta_a"] == pytest.approx(BETA_A, rel=0.2)
         assert fit.values["zero_angle_rad"] == pytest.approx(ZERO_RAD, rel=0.3)
         assert fit.values["late_angle_s"] == pytest.approx(LATE_S, rel=0.3)
+
+
+@pytest.mark.parametrize(("late_s", "told"), [(4e-6, False), (2e-5, True)])
+def test_an_encoder_that_is_read_late_is_no_name_and_told_where_it_is_far_off(late_s, told):
+    motor = replace(design("gimbal-5208"), effects={})
+    plan = tuple(step for step in CAMPAIGN if step[0] in ("torque_map_fast", "drive_0"))
+    recorded = campaign(motor, Bench(late_angle_s=late_s), 6, plan)
+    found = diagnose(campaign_of(recorded), ModelSpec(), Constants())
+    assert (found.verdict in ("adequate", "insufficient"), found.missing) == (True, ())
+    notes = [note for note in found.notes if note.startswith("late_angle_s")]
+    assert len(notes) == told
+    for note in notes:
+        said, _, u = note.split("say ")[1].split()
+        assert float(said) == pytest.approx(late_s, abs=3.0 * float(u))
+
+
+def test_without_the_nuisance_it_would_be_a_name():
+    """What the nuisance is for: with a prior of nothing the same captures name two delays."""
+    motor = replace(design("gimbal-5208"), effects={})
+    plan = tuple(step for step in CAMPAIGN if step[0] in ("torque_map_fast", "drive_0"))
+    recorded = campaign(motor, Bench(late_angle_s=4e-6), 6, plan)
+    spec = ModelSpec(policy=(("priors.late_angle_s", 1e-6),))
+    assert diagnose(campaign_of(recorded), spec, Constants()).missing
