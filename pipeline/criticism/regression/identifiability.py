@@ -364,8 +364,8 @@ def _or_stated(parameter: ModelParameter, stated: tuple[float, float] | None) ->
 
 
 def against_stated(system: LinearSystem, held_out: HeldOut) -> tuple[str, ...]:
-    """Notes of the stated constants, and of usual sizes of an instrument's state, that the captures,
-    fitted without them, contradict.
+    """Notes of the stated constants, and the usual sizes of an instrument's state, that captures
+    contradict when they are fitted without them.
 
     Parameters
     ----------
