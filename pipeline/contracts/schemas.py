@@ -240,15 +240,11 @@ def _remedy(test: str, filled: frozenset[str]) -> str:
             "drag by the balance of power, or the phase current that the controller knows (iq_a)"
         )
     if test in ("drive", "torque_map") and len(filled & {"ia_a", "ib_a", "ic_a"}) >= 2:
-        if "theta_elec_rad" in filled:
-            return (
-                "line currents are id_a and iq_a by the angle from the magnet's flux: let the "
-                "drive log these, or turn them by theta_elec_rad yourself where its zero is known"
-            )
         return (
-            "of line currents without an angle follow their size and the electrical speed, and "
-            "nothing of the motor: log id_a and iq_a, which the drive knows, with theta_mech_rad "
-            "or omega_mech_rad_s; turned without current, line voltages alone give psi_pm_wb"
+            "of line currents without an electrical angle follow their size and the electrical "
+            "speed, and nothing of the motor: log theta_elec_rad, 0 with the magnet on phase a, on "
+            "the same clock, or id_a and iq_a, which the drive knows, with theta_mech_rad or "
+            "omega_mech_rad_s; turned without current, line voltages alone give psi_pm_wb"
         )
     return "record what is missing, or map it in conf/source"
 

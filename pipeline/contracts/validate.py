@@ -12,6 +12,7 @@ import polars.selectors as cs
 from pipeline.contracts.gates import missing_values
 from pipeline.contracts.protocol import warning, with_time
 from pipeline.contracts.registry import gates
+from pipeline.contracts.rotor_frame import in_rotor_frame
 from pipeline.contracts.schemas import check_columns, check_metadata, check_tables
 from pipeline.numerics.alike import same_but_for_noise
 from pipeline.records.capture import Capture, Mask
@@ -37,9 +38,9 @@ def validate(
     Returns
     -------
     capture
-        With the masks of the gates, without columns that hold no value, and without a torque that
-        is the current in other units; slow streams that were
-        written into a fast table have a table of their own.
+        With the masks of the gates, with dq columns that the electrical angle makes of the phases',
+        without columns that hold no value, and without a torque that is the current in other units;
+        slow streams that were written into a fast table have a table of their own.
     findings
         Warnings.
 
@@ -57,6 +58,7 @@ def validate(
 
     """
     check_metadata(capture.meta)
+    capture, turned = in_rotor_frame(capture)
     check_columns(capture)
     masks: list[Mask] = []
     capture, unfilled = _filled_rows(capture)
@@ -64,7 +66,7 @@ def validate(
     check_tables(capture)
     capture, findings = _without_blanks(capture)
     capture, computed = _without_computed_torque(capture)
-    findings = [*unfilled, *twice, *findings, *computed]
+    findings = [*turned, *unfilled, *twice, *findings, *computed]
     refusals: dict[str, CaptureError] = {}
     broken: list[CaptureError] = []
     for gate in gates():

@@ -1,0 +1,82 @@
+"""Phase currents and voltages of a log become dq columns by its electrical angle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.contracts.validate import validate
+from pipeline.records.capture import Capture, CaptureMeta
+from pipeline.records.errors import CaptureError
+
+THIRD = 2.0 * math.pi / 3.0
+N = 4000
+T_S = 1e-3 * np.arange(N)
+EPS = 30.0 * T_S + 4.0 * np.sin(3.0 * T_S) + 0.7
+DQ = {
+    "id_a": -1.5 + 0.5 * np.sin(2.0 * T_S),
+    "iq_a": 4.0 * np.cos(3.0 * T_S),
+    "vd_v": 0.8 * np.sin(4.0 * T_S),
+    "vq_v": 6.0 + 2.0 * np.cos(T_S),
+}
+
+
+def phases(d: np.ndarray, q: np.ndarray) -> list[np.ndarray]:
+    """Phases a, b, c, each by the projection of the vector on its axis."""
+    return [d * np.cos(EPS - k * THIRD) - q * np.sin(EPS - k * THIRD) for k in range(3)]
+
+
+def log(*without: str, test: str = "drive", **more: np.ndarray) -> Capture:
+    """What a scope and an encoder record of `DQ`, with what voltages have in common."""
+    columns = {"t_s": T_S, "theta_elec_rad": EPS, "theta_mech_rad": EPS / 7.0}
+    for letter, current, volts in zip(
+        "abc", phases(DQ["id_a"], DQ["iq_a"]), phases(DQ["vd_v"], DQ["vq_v"]), strict=True
+    ):
+        columns |= {f"i{letter}_a": current, f"v{letter}_v": volts + 3.0}
+    v = [columns[f"v{x}_v"] for x in "abc"]
+    columns |= {"vab_v": v[0] - v[1], "vbc_v": v[1] - v[2], "vca_v": v[2] - v[0]} | more
+    table = pl.DataFrame({n: x for n, x in columns.items() if n not in without})
+    meta = CaptureMeta("m", test, pole_pairs=7)
+    return Capture("log.csv", "0" * 64, "verified", meta, (table,))
+
+
+LINES, STAR = ("vab_v", "vbc_v", "vca_v"), ("va_v", "vb_v", "vc_v")
+
+
+@pytest.mark.parametrize(
+    "without", [LINES, STAR, (*STAR, "vbc_v"), ("ic_a", *LINES), ("ia_a", *STAR, "vca_v")]
+)
+def test_any_two_of_three_give_the_rotor_frame(without: tuple[str, ...]) -> None:
+    capture, findings = validate(log(*without), {})
+    turned = capture.arrays(*DQ)
+    for name, true in DQ.items():
+        assert turned[name] == pytest.approx(true, abs=1e-9), name
+    (said,) = [f for f in findings if f.code == "rotor_frame"]
+    assert "id_a, iq_a, vd_v, vq_v" in said.message
+
+
+def test_currents_alone_are_turned_without_voltages() -> None:
+    capture, _ = validate(log(*LINES, *STAR), {})
+    assert capture.has("id_a", "iq_a")
+    assert not capture.has("vq_v")
+
+
+def test_what_the_drive_logs_itself_stays() -> None:
+    own = {"iq_a": DQ["iq_a"] + 0.1}
+    capture, findings = validate(log(**own), {})
+    assert capture.arrays("iq_a")["iq_a"] == pytest.approx(own["iq_a"])
+    assert not capture.has("id_a")
+    assert "rotor_frame" not in {f.code for f in findings}
+
+
+def test_without_an_electrical_angle_the_refusal_asks_for_one() -> None:
+    with pytest.raises(CaptureError, match="theta_elec_rad, 0 with the magnet on phase a"):
+        validate(log("theta_elec_rad"), {})
+
+
+def test_a_test_that_holds_no_dq_is_left_alone() -> None:
+    capture, _ = validate(log("ia_a", "ib_a", "ic_a", test="open_circuit"), {})
+    assert not capture.has("vq_v")
