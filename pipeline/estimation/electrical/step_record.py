@@ -90,13 +90,15 @@ def rotor_angle_rad(capture: Capture) -> float | None:
     return None
 
 
-def read_step(capture: Capture) -> StepRecord | None:
+def read_step(capture: Capture, unknown_rad: float | None = None) -> StepRecord | None:
     """The record of a capture, or None where it holds no step to speak of.
 
     Parameters
     ----------
     capture
         A voltage step on a locked rotor.
+    unknown_rad
+        Rotor angle to go by where the capture has none [rad, electrical].
 
     Returns
     -------
@@ -110,6 +112,7 @@ def read_step(capture: Capture) -> StepRecord | None:
 
     """
     pair, angle = pair_of(capture), rotor_angle_rad(capture)
+    angle = unknown_rad if angle is None else angle
     if pair is None or angle is None:
         raise KeyError(f"{capture.path}: pair or theta_elec_deg is not stated")
     columns = pair_signals(capture, pair)

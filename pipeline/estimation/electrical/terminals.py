@@ -7,6 +7,11 @@ import numpy as np
 from pipeline.records.capture import Array, Capture
 
 PAIRS = ("ab", "bc", "ca")
+UNALIGNED = (
+    "rotor angle unknown: the low inductance is taken as d, as with interior magnets; a back-EMF "
+    "or an alignment would show it"
+)
+"""What is said of both inductances where three pairs at one unknown angle gave them."""
 
 
 def pair_of(capture: Capture) -> str | None:

@@ -33,12 +33,19 @@ from pipeline.estimation.electrical.step_model import (
     StepModel,
     drive_of,
 )
-from pipeline.estimation.electrical.step_record import StepRecord, disagreement, read_step
+from pipeline.estimation.electrical.step_record import (
+    StepRecord,
+    disagreement,
+    read_step,
+    rotor_angle_rad,
+)
+from pipeline.estimation.electrical.terminals import PAIRS, UNALIGNED
 from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import unstated_note
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import decimated
+from pipeline.physics.conventions import unaligned_inductances_h
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
@@ -48,7 +55,7 @@ METHOD = Method("current_step")
 GIVES = ("ld_h", "lq_h")
 EXPERIMENT = (
     "record current_step captures with the rotor locked on d and on q (pair ab: theta_elec_deg -30 "
-    "and 60), both senses of current, two or more amplitudes"
+    "and 60), both senses of current, two or more amplitudes; or pairs ab, bc and ca at one angle"
 )
 
 
@@ -169,11 +176,33 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
 
 
 def _records(captures: Sequence[Capture]) -> tuple[list[StepRecord], list[str]]:
+    """Records of steps, with notes of those that are of no use.
+
+    An angle that no capture knows is found of all three pairs. They lie 120° apart, so one that is
+    off by δ makes the saliency small by 2 δ² of itself and no more.
+    """
+    angles = {capture.path: rotor_angle_rad(capture) for capture in captures}
+    if any(angle is not None for angle in angles.values()):
+        return _read(captures, None)
+    records, notes = _read(captures, 0.0)
+    mean_h = {
+        pair: float(np.mean([r.l_start_h for r in records if r.pair == pair] or [math.nan]))
+        for pair in PAIRS
+    }
+    if not all(map(math.isfinite, mean_h.values())):
+        return _read(captures, None)
+    place = unaligned_inductances_h(*mean_h.values()).theta_low_rad
+    return [replace(r, axis_rad=r.axis_rad - place) for r in records], [*notes, UNALIGNED]
+
+
+def _read(
+    captures: Sequence[Capture], unknown_rad: float | None
+) -> tuple[list[StepRecord], list[str]]:
     records: list[StepRecord] = []
     notes: list[str] = []
     for capture in captures:
         try:
-            record = read_step(capture)
+            record = read_step(capture, unknown_rad)
         except KeyError as error:
             notes.append(str(error.args[0]))
             continue

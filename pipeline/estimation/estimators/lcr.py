@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.estimation.electrical.terminals import PAIRS
+from pipeline.estimation.electrical.terminals import PAIRS, UNALIGNED
 from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -232,10 +232,7 @@ def _at_unknown_angle(table: Table) -> Found | None:
     if unparted:
         note = "the three pairs differ by noise alone: Ld and Lq cannot be distinguished"
     elif not all(has_angle):
-        note = (
-            "rotor angle unknown: the low inductance is taken as d, as with interior magnets; "
-            "a back-EMF or an alignment would show it"
-        )
+        note = UNALIGNED
     if len(first) == 1:
         note = "; ".join(n for n in (note, "one position: scatter unknown") if n)
     return Found(values, note, None)
