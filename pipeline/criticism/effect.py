@@ -159,12 +159,13 @@ class Evidence:
     `tests` those that excite it, the best first, and `experiment` the one to record.
 
     `alternatives`: other effects, each with the test or calibration that discriminates it from
-    this.
+    this. `rare`: benches seldom have it, so that of two that tie the other is named.
     """
 
     tests: tuple[str, ...]
     experiment: str
     signals: tuple[str, ...] = ()
+    rare: bool = False
     alternatives: Mapping[str, str] = field(default_factory=dict)
 
 

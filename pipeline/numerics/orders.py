@@ -243,9 +243,15 @@ def _points(turn: Turn, highest: int) -> tuple[Array, Array]:
 
 
 def _transform(angle: Array, value: Array, highest: int) -> ComplexArray:
-    """Means of value exp(-j k angle) over a turn for k = 0..highest."""
+    """Means of value exp(-j k angle) over a turn for k = 0..highest.
+
+    The mean is taken off first: angles that are rounded beat with the rows, and what the weights
+    leave of a constant at an order grows with it.
+    """
     after = np.diff(np.append(angle, angle[0] + TURN_RAD))
-    weighted = value * (after + np.roll(after, 1)) / (2.0 * TURN_RAD)
+    weight = (after + np.roll(after, 1)) / (2.0 * TURN_RAD)
+    mean = float(weight @ value)
+    weighted = weight * (value - mean)
     cells = int(2 ** np.ceil(np.log2(16 * max(highest, 4))))
     nearest = np.round(angle * (cells / TURN_RAD))
     off: Array = angle - nearest * (TURN_RAD / cells)
@@ -257,6 +263,7 @@ def _transform(angle: Array, value: Array, highest: int) -> ComplexArray:
         moment = np.bincount(index, weights=weighted * off**power, minlength=cells)
         total += factor * np.fft.rfft(moment)[: highest + 1]
         factor = np.asarray(factor * (-1j * orders) / (power + 1.0), dtype=np.complex128)
+    total[0] += mean
     return total
 
 

@@ -38,4 +38,5 @@ EFFECT = Effect(
         "voltage_scale": "resistance on the same voltmeter",
     },
     clock=_clock,
+    rare=True,
 )

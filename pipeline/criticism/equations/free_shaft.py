@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of, slow_orders
+from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.data.traces import (
     decimated,
     even_clock,
@@ -24,6 +25,7 @@ from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import COAST_SHARES, Model, Pieces, clock_gain
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
+from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.signals.shaft import (
     net_torque,
     sensed_torque,
@@ -69,7 +71,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if capture.meta.test == "cogging":
         return _slow_turn(capture, machine, period, columns, keep, channel)
     window = window_of(period, keep.size, policy)
-    keep = keep & _coasts(columns["theta_mech_rad"], window, policy.driven_share)
+    keep = keep & _coasts(columns["theta_mech_rad"], window, machine.policy)
     sensors = prepared(columns, period, machine.policy, speed_noise)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     columns, starts = thinned(columns, keep, window, policy.windows)
@@ -79,14 +81,17 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     )
 
 
-def _coasts(theta: Array, window: int, driven_share: float) -> NDArray[np.bool_]:
+def _coasts(theta: Array, window: int, policy: Policy) -> NDArray[np.bool_]:
     """Samples [n] in which a shaft coasts.
 
     A shaft at rest does not: friction holds it, and what is left of its recorded speed is of the
-    sensor. What is before a coast counts, unless the shaft was driven or held there for more than
-    a share of some coast. A shaft that never turns has no coast, and all of it counts.
+    sensor, or of the rows before that it is smoothed over. What is before a coast counts, unless
+    the shaft was driven or held there for more than a share of some coast. A shaft that never turns
+    has no coast, and all of it counts.
     """
-    speed = smoothed(np.gradient(theta), 2 * (window // 2) + 1)
+    half, driven_share = window // 2, policy.cutting.driven_share
+    least = policy.cutting.rest_sigmas * sensor_noise(theta, policy.sensor_noise, steady=True)
+    speed = smoothed(np.gradient(theta), 2 * half + 1)
     runs = sorted(((rows.start, rows.stop) for rows, _ in coasting_rows(speed)))
     if not runs:
         return np.ones(theta.size, dtype=bool)
@@ -98,7 +103,9 @@ def _coasts(theta: Array, window: int, driven_share: float) -> NDArray[np.bool_]
     free = np.zeros(theta.size, dtype=bool)
     free[: runs[0][0]] = not driven
     for start, stop in runs:
-        free[start:stop] = True
+        # where it is once the last row that the speed is smoothed over has passed
+        ahead = np.abs(theta[min(stop + half, theta.size - 1)] - theta[start:stop])
+        free[start : start + int(np.flatnonzero(ahead > least)[-1:].sum()) + 1] = True
     return free
 
 

@@ -93,6 +93,10 @@ class Cutting:
         0.05, "1", "share of a coast from which on the time before it counts as driven",
         why="the moment of letting go is shorter",
     )  # fmt: skip
+    rest_sigmas: float = derived(
+        4.0, "σ of the angle", "from its place of rest, within which a shaft stands",
+        source="one row in 16,000 of white noise; half an encoder's step is 1.7 of its rounding's",
+    )  # fmt: skip
     steady_share: float = chosen(
         2e-3, "1", "change of speed within a window of an open-circuit spin that is none",
         why="a sample at a kink of the speed belongs to neither side of it",

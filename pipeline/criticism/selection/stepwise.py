@@ -231,8 +231,9 @@ def _refit_best(
         tried = _refitted(begun, score)
         baseline = usual if begun is wide else _Baseline.of(gauss_newton(begun.fit, begun), added)
         base = baseline.wide
-        # of two that tie, the one that some capture here was made to show
-        unsought = policy.tie if set(effect.tests).isdisjoint(tests) else 0.0
+        # of two that tie, the one that benches have and that some capture here was made to show
+        far = effect.rare or set(effect.tests).isdisjoint(tests)
+        unsought = policy.tie if far else 0.0
         cost = tried.deviance - base.deviance + score.penalty + unsought
         if (
             _matters(tried, base, baseline.significant)

@@ -371,3 +371,13 @@ def test_waveform_is_the_sum_of_its_orders() -> None:
     wave = waveform([line(2, 3.0 - 4.0j), line(5, 1j)], theta)
     expected = 3 * np.cos(2 * theta) + 4 * np.sin(2 * theta) - np.sin(5 * theta)
     assert wave == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("rows", [1357, 4001, 20011])
+def test_a_constant_has_no_orders_however_its_angles_are_rounded(rows: int) -> None:
+    """Friction leaked into an order at which an encoder's steps beat with the rows."""
+    step = 2.0 * np.pi / 16384
+    theta = np.round(np.linspace(0.3, 0.3 + 2.0 * np.pi, rows, endpoint=False) / step) * step
+    found = spectrum([Turn(theta, np.full(rows, 0.05), 1)], min(600, rows // 2 - 1))
+    assert np.abs(found.coefficients).max() < 1e-15
+    assert found.means == pytest.approx([0.05])
