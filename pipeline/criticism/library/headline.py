@@ -23,7 +23,8 @@ def headline(effect: Effect, parameters: Mapping[str, ReportedParameter]) -> str
     effect : Effect
         `headline` may name in braces a parameter `{a}`, the length of a vector `{a & b}`, a share
         in percent `{a %}`, what three phases differ by at most `{phases a & b %}`, or `{largest}`,
-        the wave of the largest amplitude.
+        the wave of the largest amplitude. Of several between ` || ` the one is said whose size is
+        over its uncertainty the furthest.
     parameters : mapping of str to (value, u, unit)
         What was fitted, by name.
 
@@ -36,22 +37,37 @@ def headline(effect: Effect, parameters: Mapping[str, ReportedParameter]) -> str
     if not effect.headline:
         sizes = ", ".join(f"{name} {number_text(*one)}" for name, one in parameters.items())
         return f"{effect.name} ({sizes})" if sizes else effect.name
-    return _SIZE.sub(lambda match: _size(match[1], parameters), effect.headline)
+    said = max(effect.headline.split(" || "), key=lambda words: _clearness(words, parameters))
+    return _SIZE.sub(lambda match: _text(match[1], parameters), said)
 
 
-def _size(parameter: str, parameters: Mapping[str, ReportedParameter]) -> str:
+def _clearness(words: str, parameters: Mapping[str, ReportedParameter]) -> float:
+    """How many standard uncertainties the first size of a headline is; 0 where it is not known."""
+    first = _SIZE.search(words)
+    value, u, _ = _size(first[1], parameters) if first else (None, None, "1")
+    return abs(value) / max(u or 0.0, 1e-300) if value is not None else 0.0
+
+
+def _text(parameter: str, parameters: Mapping[str, ReportedParameter]) -> str:
+    """A size in braces as a reading."""
     if parameter == "largest":
         return _largest(parameters)
-    names, percent = parameter.removesuffix("%"), parameter.endswith("%")
+    value, u, unit = _size(parameter, parameters)
+    if value is None or u is None:
+        return UNKNOWN_SIZE
+    if parameter.endswith("%"):
+        return number_text(100.0 * value, 100.0 * u, "%")
+    return number_text(value, u, unit)
+
+
+def _size(parameter: str, parameters: Mapping[str, ReportedParameter]) -> ReportedParameter:
+    names = parameter.removesuffix("%")
     nothing = ReportedParameter(None, None, "1")
     of_phases = names.startswith("phases ")
     parts = [
         parameters.get(name.strip(), nothing) for name in names.removeprefix("phases ").split("&")
     ]
-    value, u, unit = largest_difference(*parts) if of_phases else amplitude(parts)
-    if value is None or u is None:
-        return UNKNOWN_SIZE
-    return number_text(100.0 * value, 100.0 * u, "%") if percent else number_text(value, u, unit)
+    return largest_difference(*parts) if of_phases else amplitude(parts)
 
 
 def amplitude(parts: Sequence[ReportedParameter]) -> ReportedParameter:

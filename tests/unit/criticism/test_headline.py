@@ -39,6 +39,20 @@ def test_an_amplitude_is_the_length_of_its_vector() -> None:
     assert amplitude([ReportedParameter(-3.0, 0.1, "V")]) == ReportedParameter(-3.0, 0.1, "V")
 
 
+def test_of_two_parts_the_clearer_one_is_told() -> None:
+    """An angle off twice a turn was told as a disc off-centre by 1.2 ± 8.2 µrad."""
+    reported = {
+        "sine_rad": ReportedParameter(1e-6, 4e-6, "rad"),
+        "cosine_rad": ReportedParameter(-1e-6, 4e-6, "rad"),
+        "sine2_rad": ReportedParameter(0.0012, 5e-6, "rad"),
+        "cosine2_rad": ReportedParameter(-0.0009, 5e-6, "rad"),
+    }
+    words = "encoder's angle off twice a turn, by 1.500 ± 0.010 mrad"
+    assert headline(ECCENTRIC, reported) == words
+    reported["sine_rad"] = ReportedParameter(0.009, 4e-6, "rad")
+    assert headline(ECCENTRIC, reported).startswith("encoder disc off-centre by 9.00")
+
+
 def test_the_largest_wave_is_told_with_its_order() -> None:
     reported = {
         "sin_84_nm": ReportedParameter(0.003, 1e-5, "N·m"),
