@@ -343,6 +343,7 @@ def _estimates(
 
     gains = instrument_uncertainties(rows.captures, ("voltage", "current", "temperature"))
     type_b = contributions(values, gains)
+    instant = _of_instant(rows, fit, magnet, chosen)
     per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
     paths = sorted(c.path for c in rows.captures)
     words = [
@@ -360,6 +361,7 @@ def _estimates(
         parts = [METHOD.scatter(name, u, dof), *type_b[i]]
         parts += propagate([(float(per_alpha[i]), magnet_parts)])
         parts.append(Contribution(f"assumed:{METHOD.name}:nuisances", float(moved[i]), "B"))
+        parts.append(Contribution("assumed:voltage_instant", float(instant[i]), "B"))
         doubt = doubts[i]
         parts += [] if doubt is None else [doubt.part(f"{METHOD.name}:{name}", value)]
         remarks = [] if doubt is None else [doubt.words("the value")]
@@ -411,6 +413,21 @@ def _moved(
         without = linear_fit(design, rows.voltage_v).coefficients[: len(GIVES)]
         moved = np.maximum(moved, np.abs(without - values[: len(GIVES)]))
     return moved
+
+
+def _of_instant(rows: VoltageRows, fit: LinearFit, magnet: float, chosen: Sequence[str]) -> Array:
+    """Standard uncertainties of Ke and R [2] for the instant that a commanded voltage is of.
+
+    On a free shaft R i and Ke tau dw/dt are nearly one column. A label says where in its hold a
+    voltage is meant, and no label fits a log that keeps every n-th row: within half a hold either
+    way (rectangular, GUM 4.3.7).
+    """
+    if LATE in chosen or all(c.meta.voltage_kind == "measured" for c in rows.captures):
+        return np.zeros(len(GIVES))
+    held_s = max(hold_s(c.meta, rows.period_s, 0.0) for c in rows.captures)
+    late_v_s = float(fit.coefficients[0]) * 0.5 * held_s / np.sqrt(3.0)
+    along = linear_fit(q_voltage(rows, magnet, chosen, {}), rows.columns[LATE])
+    return late_v_s * along.coefficients[: len(GIVES)]
 
 
 def _evidence(rows: VoltageRows, fit: LinearFit) -> tuple[Evidence, ...]:
