@@ -62,7 +62,7 @@ def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> fl
     third = np.diff(signal, 3)
     if third.size == 0:
         return 0.0
-    width = min(policy.block, third.size)
+    width = min(policy.block, max(third.size // policy.blocks, policy.shortest_block), third.size)
     blocks = third[: third.size // width * width].reshape(-1, width)
     # Wilson and Hilferty's quantile of chi-square with the samples that third differences leave
     spread = 2.0 / (9.0 * width / 2.2)

@@ -56,7 +56,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         keep[1:] &= ~edges
         window = max(min(round(policy.step_window_s / period), keep.size // 4), policy.least_window)
     else:
-        window = window_of(period, keep.size, policy)
+        # two windows in the longest level, where a multimeter took few rows of each
+        jumps = np.abs(np.diff(amps)) > policy.change_u * sensors.noise["i_pair_a"]
+        longest = int(np.diff(np.flatnonzero(np.concatenate([[True], jumps, [True]]))).max())
+        window = min(window_of(period, keep.size, policy), longest // 2)
+        window = max(window, policy.least_window)
     weak = projection(np.zeros(keep.size), window_starts(keep, window), window, ())
     if not stepped:
         weak = _settled(weak, amps, policy.change_u * sensors.noise["i_pair_a"])

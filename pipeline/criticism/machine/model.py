@@ -104,6 +104,7 @@ BASE: tuple[Constant, ...] = (
     _gain("gain_voltage", words="gain of the bench's voltmeters"),
     _gain("gain_commanded", words="gain of a drive's own voltage"),
     _gain("gain_torque", words="gain of the torque transducer"),
+    Constant("late_torque_s", "s", "lag of the torque transducer", 0.0, "gain", "period_s"),
     _gain("gain_lcr", words="gain of the LCR meter"),
     Constant("gain_clock", "1", "recorded time over true time, less one", hook="gain"),
     Constant("offset_temp_k", "K", "offset of the thermometers", hook="gain", curved=True),
@@ -121,6 +122,8 @@ BASE: tuple[Constant, ...] = (
 )
 UNLOGGED_AT_REST = "unlogged_rest_k"
 """That of the winding in tests at rest: they warm it little, and show nothing of one that turns."""
+LATE_TORQUE = "late_torque_s"
+"""Nuisance of every transducer: its filter."""
 LATE_SPEED = "late_speed_s"
 """Nuisance of a log whose motion is known by an observer's or a tachometer's speed alone."""
 LATE_VOLTAGE = "late_voltage_s"

@@ -15,6 +15,14 @@ class SensorNoise:
         48, "samples", "length of a block of third differences",
         why="shorter ones scatter more, longer ones are seldom free of steps and bursts",
     )  # fmt: skip
+    blocks: int = chosen(
+        12, "1", "blocks of a short record at the least",
+        why="some are free of steps where a multimeter took twenty rows of each level",
+    )  # fmt: skip
+    shortest_block: int = derived(
+        8, "samples", "length of its blocks at the least",
+        source="a mean square of the 3.6 degrees of freedom of eight third differences",
+    )  # fmt: skip
     quiet: tuple[float, ...] = chosen(
         (0.3, -0.5244), "1", "quantile over the blocks, and the normal variable's value there",
         why="a low one, since steps and bursts only add",

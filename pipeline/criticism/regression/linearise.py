@@ -17,6 +17,7 @@ from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import (
     CURVED,
+    LATE_TORQUE,
     STATE,
     Model,
     Pieces,
@@ -376,6 +377,7 @@ class _Sampler:
         """Along a gain of the station: of the prediction, or what it does to current and heat."""
         observed = {
             "gain_torque": observes_sensor(self.segment, "load"),
+            LATE_TORQUE: observes_sensor(self.segment, "load"),
             "gain_lcr": observes_sensor(self.segment, "lcr"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
             "gain_clock": observes_sensor(self.segment, "clock"),
@@ -387,7 +389,8 @@ class _Sampler:
         if column.name == "gain_clock":
             return self._along_time(column.step)
         moved = {**self.values, column.name: self.values[column.name] + column.step}
-        if column.name == self.segment.instrument.ammeter or column.name.startswith(CURVED):
+        of_signal = self.segment.instrument.ammeter, LATE_TORQUE
+        if column.name in of_signal or column.name.startswith(CURVED):
             return (self._residual(self.model, moved) - self.base_residual) / column.step
         after = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(after - self.start) / column.step

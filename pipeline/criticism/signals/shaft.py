@@ -7,7 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.machine.model import Model, Pieces, air_gap_torque, ripple, values_of
+from pipeline.criticism.machine.model import (
+    LATE_TORQUE,
+    Model,
+    Pieces,
+    air_gap_torque,
+    ripple,
+    values_of,
+)
 from pipeline.criticism.operating import Array, Complex, Operating, Recorded, Signals, Values
 from pipeline.criticism.signals.true_state import ahead_in
 from pipeline.criticism.signals.voltage import central
@@ -237,6 +244,8 @@ def true_load(
     """
     hooks = [e for e in model.effects if e.load is not None]
     torque = signals["torque_shaft_nm"]
+    if late_s := values[LATE_TORQUE]:
+        torque = torque + late_s * np.gradient(torque, segment.ts_s)
     if not hooks:
         return torque
     zero = np.zeros(torque.size)

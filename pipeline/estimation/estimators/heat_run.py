@@ -259,8 +259,9 @@ ESTIMATOR = Estimator(
     uses=("temp_coeff_magnet_1_k", *TURNING, *REFERENCE),
     options={
         "least_span_k": 5.0,
-        # A bead of half a millimetre in the winding follows within a tenth of a second.
-        "u_lag_s": 0.05,
+        # A bead of half a millimetre in the winding follows within a tenth of a second, one in a
+        # sleeve within one.
+        "u_lag_s": 0.5,
         "drop_measured_v": 0.0005,
         "drop_commanded_v": 0.3,
     },

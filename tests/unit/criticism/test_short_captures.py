@@ -72,3 +72,16 @@ def test_a_column_that_no_row_of_the_capture_s_clock_holds_is_as_good_as_not_the
 def test_a_capture_that_tells_all_it_says_is_not_copied():
     one = capture("torque_map", 400, 1e-3 * np.arange(400), 0.03 * np.arange(400))
     assert with_values(one) is one
+
+
+def test_levels_of_few_rows_have_windows_of_their_own():
+    """A multimeter's resistance test, 23 rows a level at 20 Hz, was not used at all."""
+    levels, rows, rng = (-1.6, -0.8, 0.8, 1.6), 23, np.random.default_rng(2)
+    amps = np.repeat(levels, rows) + 1e-4 * rng.normal(size=4 * rows)
+    volts = 1.84 * amps + 1e-4 * rng.normal(size=amps.size)
+    table = pl.DataFrame({"t_s": 0.05 * np.arange(amps.size), "vab_v": volts, "ia_a": amps})
+    meta = CaptureMeta("m", "resistance", pole_pairs=4, pair="ab")
+    (segment,) = made_of(Capture("r.csv", "0", "verified", meta, (table,)))
+    weak, current = segment.weak, segment.recorded["i_pair_a"]
+    seen = {round(float(np.mean(current[s : s + weak.length])), 1) for s in weak.starts}
+    assert seen == set(levels)

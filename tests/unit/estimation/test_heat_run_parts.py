@@ -72,7 +72,7 @@ def test_alpha_and_r25_of_one_run_and_what_they_rest_on() -> None:
     parts = {p.source: p.u for p in alpha.budget}
     assert abs(parts.get("voltage@s", 0.0)) < 1e-12
     assert parts["temperature@s"] == pytest.approx(value**2 * 0.5)
-    assert parts["assumed:thermometer_lag"] == pytest.approx(value * line.rise_rate_1_s * 0.05)
+    assert parts["assumed:thermometer_lag"] == pytest.approx(value * line.rise_rate_1_s * 0.5)
     v, (a, b) = line.covariance, (-value / line.r25_ohm, 1.0 / line.r25_ohm)
     u = math.sqrt(a * a * v[0, 0] + b * b * v[1, 1] + 2.0 * a * b * v[0, 1])
     assert alpha.u_a == pytest.approx(u)
