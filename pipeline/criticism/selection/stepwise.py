@@ -274,7 +274,8 @@ class _Baseline:
         without = predicted_chi2(wide, one) * self.shrunk
         after = predicted_chi2(tried, other) * _floor_factors(tried)
         holds = _improves_held_out(wide, without, tried, after, promised, doubts)
-        return holds and not spoils(tried, without, after)
+        relief = float(wide.prior_costs().sum() - tried.prior_costs().sum())
+        return holds and not spoils(tried, without, after, relief)
 
 
 def _reweighted(wide: LinearSystem, score: Score) -> LinearSystem:
@@ -399,7 +400,7 @@ def _improves_held_out(
     return fall > least[0] and (helps or below_floor > least[1])
 
 
-def spoils(tried: LinearSystem, before: Array, after: Array) -> bool:
+def spoils(tried: LinearSystem, before: Array, after: Array, relief: float = 0.0) -> bool:
     """Whether the newest effect adds more power than it removes, of what other captures predict.
 
     Parameters
@@ -410,6 +411,8 @@ def spoils(tried: LinearSystem, before: Array, after: Array) -> bool:
         χ²/n predicted without it [G].
     after
         χ²/n predicted with it [G].
+    relief
+        Fall of the priors' χ²: a lag of 24 usual ones was as good as the effect that names it.
 
     Returns
     -------
@@ -424,7 +427,7 @@ def spoils(tried: LinearSystem, before: Array, after: Array) -> bool:
     acts = np.bincount(tried.group, np.any(tried.matrix[:, columns], axis=1), len(tried.labels)) > 0
     change = np.maximum(after, 1.0) - np.maximum(before, 1.0)
     counts = acts & (np.abs(change) > tried.policy.selection.least_share * np.maximum(before, 1.0))
-    return float((tried.counts * change)[counts].sum()) > 0.0
+    return float((tried.counts * change)[counts].sum()) > relief
 
 
 def _floor_factors(tried: LinearSystem) -> Array:

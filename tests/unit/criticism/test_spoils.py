@@ -39,3 +39,10 @@ def test_what_it_does_not_act_on_or_moves_a_little_does_not_count():
 
 def test_below_the_floor_nothing_is_spoilt():
     assert not spoils(after_refit([0, 1, 2]), np.full(3, 0.2), np.full(3, 0.9))
+
+
+def test_what_a_prior_is_relieved_of_counts_too() -> None:
+    before, after = np.array([1.0, 1.2, 1.0]), np.array([1.0, 1.5, 1.0])
+    added = float(after_refit([0, 1, 2]).counts[1] * 0.3)
+    assert spoils(after_refit([0, 1, 2]), before, after, 0.9 * added)
+    assert not spoils(after_refit([0, 1, 2]), before, after, 1.1 * added)
