@@ -14,6 +14,7 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.score_test import candidates, score_all, widened
+from pipeline.criticism.selection.stepwise import search
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
@@ -90,3 +91,33 @@ def test_without_the_nuisance_it_would_be_a_name():
     recorded = campaign(motor, Bench(late_angle_s=4e-6), 6, plan)
     spec = ModelSpec(policy=(("priors.late_angle_s", 1e-6),))
     assert diagnose(campaign_of(recorded), spec, Constants()).missing
+
+
+def test_the_filter_of_a_transducer_is_undone():
+    late_s, segment = 2e-5, log()
+    torque = segment.recorded["torque_shaft_nm"]
+    behind = torque - late_s * np.gradient(torque, segment.ts_s)
+    lagging = replace(segment, recorded={**segment.recorded, "torque_shaft_nm": behind})
+    plain = Model(machine(), ())
+    clean = residual(segment, plain, BASE)[-1, 5:-5]
+    off = np.abs(residual(lagging, plain, BASE)[-1, 5:-5] - clean).max()
+    undone = residual(lagging, plain, {**BASE, "late_torque_s": late_s})[-1, 5:-5]
+    assert off > 1e-4
+    assert np.abs(undone - clean).max() < 1e-3 * off
+
+
+@pytest.mark.parametrize(("late_s", "named"), [(2e-5, set()), (2e-3, {"torque_lag"})])
+def test_a_usual_filter_is_a_nuisance_and_a_long_one_a_name(late_s, named):
+    def filtered(seed):
+        segment = log(seed=seed, noise=1.0)
+        torque = segment.recorded["torque_shaft_nm"]
+        slope = np.gradient(log().recorded["torque_shaft_nm"], segment.ts_s)
+        return replace(
+            segment, recorded={**segment.recorded, "torque_shaft_nm": torque - late_s * slope}
+        )
+
+    segments, model = (filtered(5), filtered(6)), Model(machine(), ())
+    start = Fit(segments, model, dict(BASE), floors(segments, model, BASE), BASE)
+    fit = gauss_newton(start).fit
+    library = {n: effects()[n] for n in ("torque_lag", "compliance", "windage")}
+    assert {*search(fit, library)[-1].added} == named
