@@ -511,7 +511,7 @@ def _is_valid(column: Column, made_at: Values, fit: Fit) -> bool:
     model, now, far = fit.model, fit.values, fit.policy.fit.stale_share
     if any(abs(now[n] - made_at[n]) > far * abs(made_at[n]) for n in _STEADY):
         return False
-    if any(abs(now[n] - made_at[n]) > far for n in COAST_SHARES):
+    if column.name in COAST_SHARES or any(abs(now[n] - made_at[n]) > far for n in COAST_SHARES):
         return False
     if column.name == "j_kgm2":
         return abs(now["j_kgm2"] / made_at["j_kgm2"] - 1.0) < far
