@@ -155,7 +155,8 @@ def _may_join(score: Score, inside: Set[object], couplings: bool) -> bool:
 def _floored_anew(fit: Fit) -> Fit:
     """The fit by noise floors made anew, now that another effect is in.
 
-    If no floor changes by half and nothing is left over them, the fit stays as it is. If a rough
+    The tolerance for its form is new, so it is refitted in any case: the next effect is judged
+    against this deviance. If some floor changes by half, or something is left over them, and a rough
     fit finds another inertia, a fit is begun there as well and the better one stays. Undoing a
     sensor's lag adds noise, so does a twist derived from an angle, and so do the edges of a
     dead time. An encoder off its centre drives J to next to nothing, an unbalance to six times what
@@ -164,13 +165,12 @@ def _floored_anew(fit: Fit) -> Fit:
     policy = fit.policy.selection
     floor = floors(fit.segments, fit.model, fit.values)
     ratio = np.concatenate(floor) / np.concatenate(fit.sigma)
-    if np.abs(np.log(ratio)).max() >= math.log(policy.floor_ratio):
+    changed = np.abs(np.log(ratio)).max() >= math.log(policy.floor_ratio)
+    if changed:
         fit = replace(fit, sigma=floor, near=fit.values)
-        refitted = gauss_newton(fit)
-    else:
-        refitted = linear_system(fit)
-        if not significant_groups(refitted).any():
-            return fit
+    refitted = gauss_newton(fit)
+    if not changed and not significant_groups(refitted).any():
+        return refitted.fit
     rough = rough_anew(fit)
     lighter, heavier = sorted(fit.values["j_kgm2"] for fit in (rough, fit))
     if heavier < policy.inertia_ratio * lighter:

@@ -14,6 +14,7 @@ from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
+from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.stepwise import (
     _floored_anew,
@@ -41,6 +42,15 @@ def test_a_sound_machine_is_left_alone():
     steps = search(fitted(segments), LIBRARY)
     assert [step.added for step in steps] == [()]
     assert steps[0].fit.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
+
+
+def test_the_next_effect_is_judged_against_a_fit_that_has_converged():
+    """A tolerance of form has come in, no floor has changed by half and nothing is left over one."""
+    fit = fitted((log(noise=1.0), log(noise=1.0, seed=6)))
+    moved = replace(fit, values={**fit.values, "psi_wb": (1.0 + 2e-4) * fit.values["psi_wb"]})
+    found = _floored_anew(moved)
+    assert linear_system(moved).deviance > linear_system(found).deviance + 1.0
+    assert found.values["psi_wb"] == pytest.approx(fit.values["psi_wb"], rel=2e-5)
 
 
 def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none():
