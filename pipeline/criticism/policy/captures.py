@@ -335,9 +335,9 @@ class Priors:
         "filters and serial encoders differ by some microseconds",
     )  # fmt: skip
     late_torque_s: float = derived(
-        0.5, "sample periods", "lag of a torque transducer",
-        source="the negligible size of `torque_lag`, which names what is beyond: amplifiers filter "
-        "at 1 kHz and above",
+        0.25, "sample periods", "lag of a torque transducer",
+        source="half the negligible size of `torque_lag`, which names what is well beyond two of "
+        "these: amplifiers filter at 1 kHz and above",
     )  # fmt: skip
     late_speed_s: float = chosen(
         5e-3, "s", "lateness of a speed that no angle is beside",
