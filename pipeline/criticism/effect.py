@@ -140,7 +140,7 @@ class Description:
     """The description of an effect for people.
 
     `words` is its formula in a line, `signature` what it looks like, `headline` what a person says
-    of it, with sizes in braces (`criticism.library.headline`); name and parameters without one.
+    of it, with sizes in braces, or several (`criticism.library.headline`); its name without one.
     `touches`: constants of a datasheet that mean something else where it acts, and what.
     `in_friction`: whether tests without voltages or d current count its drag as friction.
     """
@@ -148,7 +148,7 @@ class Description:
     words: str
     signature: str
     reference: str
-    headline: str = ""
+    headline: str | tuple[str, ...] = ""
     touches: Mapping[str, str] = field(default_factory=dict)
     in_friction: bool = False
 

@@ -24,8 +24,10 @@ EFFECT = Effect(
     signature="first order a turn in v_d proportional to speed, in torque proportional to i_d",
     tests=("torque_map", "drive"),
     experiment="a constant speed of several turns, in both senses",
-    headline="encoder disc off-centre by {sine_rad & cosine_rad} || encoder's angle off twice a "
-    "turn, by {sine2_rad & cosine2_rad}",
+    headline=(
+        "encoder disc off-centre by {sine_rad & cosine_rad}",
+        "encoder's angle off twice a turn, by {sine2_rad & cosine2_rad}",
+    ),
     reference="Hanselman, IEEE Trans. Ind. Electron. 37 (1990), resolver signal requirements",
     parameters=(
         Parameter("sine_rad", "rad", 0.003, 0.0002, low=-0.2, high=0.2, order=1.0),

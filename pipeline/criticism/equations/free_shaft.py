@@ -105,7 +105,8 @@ def _coasts(theta: Array, window: int, policy: Policy) -> NDArray[np.bool_]:
     for start, stop in runs:
         # where it is once the last row that the speed is smoothed over has passed
         ahead = np.abs(theta[min(stop + half, theta.size - 1)] - theta[start:stop])
-        free[start : start + int(np.flatnonzero(ahead > least)[-1:].sum()) + 1] = True
+        last = int(np.flatnonzero(ahead > least).max(initial=0))
+        free[start : start + last + 1] = True
     return free
 
 

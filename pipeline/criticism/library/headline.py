@@ -23,8 +23,8 @@ def headline(effect: Effect, parameters: Mapping[str, ReportedParameter]) -> str
     effect : Effect
         `headline` may name in braces a parameter `{a}`, the length of a vector `{a & b}`, a share
         in percent `{a %}`, what three phases differ by at most `{phases a & b %}`, or `{largest}`,
-        the wave of the largest amplitude. Of several between ` || ` the one is said whose size is
-        over its uncertainty the furthest.
+        the wave of the largest amplitude. Of several headlines the one is said whose size is over
+        its uncertainty the furthest.
     parameters : mapping of str to (value, u, unit)
         What was fitted, by name.
 
@@ -37,7 +37,8 @@ def headline(effect: Effect, parameters: Mapping[str, ReportedParameter]) -> str
     if not effect.headline:
         sizes = ", ".join(f"{name} {number_text(*one)}" for name, one in parameters.items())
         return f"{effect.name} ({sizes})" if sizes else effect.name
-    said = max(effect.headline.split(" || "), key=lambda words: _clearness(words, parameters))
+    known = (effect.headline,) if isinstance(effect.headline, str) else effect.headline
+    said = max(known, key=lambda words: _clearness(words, parameters))
     return _SIZE.sub(lambda match: _text(match[1], parameters), said)
 
 

@@ -397,11 +397,12 @@ def against_stated(system: LinearSystem, held_out: HeldOut) -> tuple[str, ...]:
             continue
         value = u_alone**2 * (system.fit.values[column.name] / u**2 - stated_value / u_stated**2)
         if abs(value - stated_value) > policy.contradicted * math.hypot(u_alone, u_stated):
-            known = usual.get(column.name)
+            known, found = usual.get(column.name), f"{value:.4g} ± {u_alone:.2g}"
             said = f"is stated as {stated_value:.4g} ± {u_stated:.2g}, and without that"
             if known is not None:
                 said = f"({known.words}) is usually within {u_stated:.2g} {known.unit}, and"
-            notes.append(f"{column.name} {said} these captures say {value:.4g} ± {u_alone:.2g}")
+                found = f"{found} {known.unit}"
+            notes.append(f"{column.name} {said} these captures say {found}")
     return tuple(notes)
 
 
