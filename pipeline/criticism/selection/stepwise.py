@@ -156,11 +156,11 @@ def _floored_anew(fit: Fit) -> Fit:
     """The fit by noise floors made anew, now that another effect is in.
 
     The tolerance for its form is new, so it is refitted in any case: the next effect is judged
-    against this deviance. If some floor changes by half, or something is left over them, and a rough
-    fit finds another inertia, a fit is begun there as well and the better one stays. Undoing a
-    sensor's lag adds noise, so does a twist derived from an angle, and so do the edges of a
-    dead time. An encoder off its centre drives J to next to nothing, an unbalance to six times what
-    it is, and the floors were made with that J.
+    against this deviance. If some floor changes by half, or something is left over them, and a
+    rough fit finds another inertia, a fit is begun there as well and the better one stays. Undoing
+    a sensor's lag adds noise, so does a twist derived from an angle, and so do the edges of a dead
+    time. An encoder off its centre drives J to next to nothing, an unbalance to six times what it
+    is, and the floors were made with that J.
     """
     policy = fit.policy.selection
     floor = floors(fit.segments, fit.model, fit.values)

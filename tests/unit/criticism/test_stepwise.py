@@ -45,7 +45,7 @@ def test_a_sound_machine_is_left_alone():
 
 
 def test_the_next_effect_is_judged_against_a_fit_that_has_converged():
-    """A tolerance of form has come in, no floor has changed by half and nothing is left over one."""
+    """A tolerance of form is new, no floor has changed by half and nothing is left over one."""
     fit = fitted((log(noise=1.0), log(noise=1.0, seed=6)))
     moved = replace(fit, values={**fit.values, "psi_wb": (1.0 + 2e-4) * fit.values["psi_wb"]})
     found = _floored_anew(moved)
