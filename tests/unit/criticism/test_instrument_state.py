@@ -80,8 +80,8 @@ def test_an_encoder_that_is_read_late_is_no_name_and_told_where_it_is_far_off(la
     notes = [note for note in found.notes if note.startswith("late_angle_s")]
     assert len(notes) == told
     for note in notes:
-        said, _, u = note.split("say ")[1].split()
-        assert float(said) == pytest.approx(late_s, abs=3.0 * float(u))
+        said, _, u, unit = note.split("say ")[1].split()
+        assert (float(said), unit) == (pytest.approx(late_s, abs=3.0 * float(u)), "s")
 
 
 def test_without_the_nuisance_it_would_be_a_name():
