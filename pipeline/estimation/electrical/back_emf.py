@@ -20,8 +20,8 @@ from pipeline.estimation.policy import policy
 from pipeline.numerics.harmonics import hermite, whole_cycles
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import true_runs, white_noise_sigma
-from pipeline.physics.conventions import PAIR_AXES_RAD
 from pipeline.physics.units import TURN_RAD
+from pipeline.physics.windings import PAIR_AXES_RAD
 from pipeline.records.capture import Array, Capture
 
 Complex = NDArray[np.complex128]

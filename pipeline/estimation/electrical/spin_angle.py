@@ -15,7 +15,7 @@ from pipeline.estimation.electrical.back_emf import (
     electrical_per_mechanical,
 )
 from pipeline.estimation.method import Method
-from pipeline.physics.conventions import pole_pairs_from
+from pipeline.physics.pole_pairs import pole_pairs_from
 from pipeline.records.capture import Capture
 from pipeline.records.estimate import Estimate
 

@@ -45,7 +45,7 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import unstated_note
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import decimated
-from pipeline.physics.conventions import unaligned_inductances_h
+from pipeline.physics.windings import unaligned_inductances_h
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

@@ -27,7 +27,7 @@ from pipeline.estimation.uncertainty.instruments import (
     voltage_source,
 )
 from pipeline.numerics.plateaus import decimated
-from pipeline.physics.conventions import POLE_PAIRS_TOLERANCE, pole_pairs_from
+from pipeline.physics.pole_pairs import POLE_PAIRS_TOLERANCE, pole_pairs_from
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

@@ -27,7 +27,7 @@ from pipeline.estimation.uncertainty.instruments import (
     voltage_source,
 )
 from pipeline.numerics.least_squares import LinearFit, linear_fit
-from pipeline.physics.conventions import COUPLINGS, CouplingName, coupling_as
+from pipeline.physics.coupling import COUPLINGS, CouplingName, coupling_as
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
@@ -87,7 +87,7 @@ def flux_linkage(temp_degc: Array) -> Array:
     -----
     ψ = |v| / ω_e of the fundamental, and ψ(T) = ψ25 + s (T - 25) = ψ25 (1 + α (T - 25)), so that
     α = s / ψ25. Ke and Kv in every convention are p ψ25 times that convention's factor
-    (`conventions.coupling_as`).
+    (`coupling.coupling_as`).
 
     References
     ----------

@@ -31,7 +31,7 @@ from pipeline.estimation.mechanical.drag import (
 )
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from tests.unit.estimation.signals import capture, estimates
