@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pipeline.estimation.electrical.back_emf import flux_of, read_spin, steady_stretches
+from pipeline.estimation.electrical.back_emf import flux_of
 from pipeline.estimation.electrical.magnet_temperature import (
     assumed_temperature,
     magnet_column,
@@ -15,7 +15,9 @@ from pipeline.estimation.electrical.magnet_temperature import (
     magnet_uncertainties,
     unlogged_note,
 )
+from pipeline.estimation.electrical.spin import read_spin
 from pipeline.estimation.electrical.spin_angle import Group, angle_offset, count_pole_pairs
+from pipeline.estimation.electrical.steady_speed import steady_stretches
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import DEFAULT, policy
 from pipeline.estimation.protocol import Estimator, Fit
