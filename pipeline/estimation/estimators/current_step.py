@@ -23,14 +23,14 @@ from pipeline.estimation.electrical.step_fit import (
     offers_of,
     solve,
 )
-from pipeline.estimation.electrical.step_model import (
+from pipeline.estimation.electrical.step_model import StepModel
+from pipeline.estimation.electrical.step_parameters import (
     LD,
     LQ,
     SHARED,
     SPACE,
     TERMS,
     Drive,
-    StepModel,
     drive_of,
 )
 from pipeline.estimation.electrical.step_record import (
