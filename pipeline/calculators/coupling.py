@@ -5,16 +5,23 @@ from __future__ import annotations
 from typing import get_args
 
 from pipeline.calculators.quantities import Answer, Calculator, Given, Key, Line, agreed
-from pipeline.physics import conventions as c
+from pipeline.physics.coupling import (
+    COUPLINGS,
+    CouplingName,
+    coupling_as,
+    coupling_from,
+    motor_constant_nm_sqrt_w,
+)
+from pipeline.physics.units import RAD_S_PER_RPM
 from pipeline.records.errors import UsageError
 
-NAMES: tuple[c.CouplingName, ...] = get_args(c.CouplingName)
-KE_READINGS: dict[str, c.CouplingName] = {
+NAMES: tuple[CouplingName, ...] = get_args(CouplingName)
+KE_READINGS: dict[str, CouplingName] = {
     "phase_peak": "ke_phase_peak_v_s_rad",
     "ll_peak": "ke_ll_peak_v_s_rad",
     "ll_rms": "ke_ll_rms_v_s_rad",
 }
-KV_READINGS: dict[str, c.CouplingName] = {
+KV_READINGS: dict[str, CouplingName] = {
     "ll_peak": "kv_ll_peak_rpm_v",
     "six_step": "kv_six_step_rpm_v",
 }
@@ -24,10 +31,10 @@ DC_WORDS = (
     "for a sine back-EMF say what the volts were with reading="
 )
 SINE_WORDS = "sine back-EMF, amplitude-invariant frame, k = p·psi; Kt_peak = (√3/2)·Ke_ll_peak"
-RPM_PER_RAD_S = 1.0 / c.RAD_S_PER_RPM
+RPM_PER_RAD_S = 1.0 / RAD_S_PER_RPM
 
 SINE_KEYS = (
-    *(Key(name, c.COUPLINGS[name].unit, c.COUPLINGS[name].words) for name in NAMES),
+    *(Key(name, COUPLINGS[name].unit, COUPLINGS[name].words) for name in NAMES),
     Key("psi_pm_wb", "Wb", "magnet flux linkage, phase peak; needs pole_pairs", ("psi",)),
     Key("pole_pairs", "1", "pole pairs", ("p",)),
     Key("r_phase_ohm", "ohm", "phase resistance, for the motor constant"),
@@ -39,7 +46,7 @@ def _sine_couplings(given: Given) -> dict[str, float]:
     implied: dict[str, float] = {}
     for name in NAMES:
         if given.has(name):
-            implied[name] = c.coupling_from(name, given.one(name))
+            implied[name] = coupling_from(name, given.one(name))
     if given.has("psi_pm_wb", "pole_pairs"):
         implied["psi_pm_wb"] = given.one("pole_pairs") * given.one("psi_pm_wb")
     return implied
@@ -48,15 +55,15 @@ def _sine_couplings(given: Given) -> dict[str, float]:
 def _sine_lines(given: Given, k_v_s_rad: float) -> list[Line]:
     """The coupling in every convention, and what else the given keys allow."""
     lines = [
-        Line(name, c.coupling_as(name, k_v_s_rad), form.unit, form.formula, form.words)
-        for name, form in c.COUPLINGS.items()
+        Line(name, coupling_as(name, k_v_s_rad), form.unit, form.formula, form.words)
+        for name, form in COUPLINGS.items()
     ]
     if given.has("pole_pairs"):
         psi = k_v_s_rad / given.one("pole_pairs")
         lines.append(Line("psi_pm_wb", psi, "Wb", "k/p", "magnet flux linkage, phase peak"))
     if given.has("r_phase_ohm"):
-        kt = c.coupling_as("kt_peak_nm_a", k_v_s_rad)
-        constant = c.motor_constant_nm_sqrt_w(kt, given.one("r_phase_ohm"))
+        kt = coupling_as("kt_peak_nm_a", k_v_s_rad)
+        constant = motor_constant_nm_sqrt_w(kt, given.one("r_phase_ohm"))
         words = "torque per root of copper loss, the same in every convention"
         lines.append(
             Line("motor_constant_nm_sqrt_w", constant, "N·m/sqrt(W)", "Kt_peak/√(1.5·R)", words)
@@ -65,7 +72,7 @@ def _sine_lines(given: Given, k_v_s_rad: float) -> list[Line]:
 
 
 def _in_one_convention(
-    given: Given, plain: dict[str, float], readings: dict[str, c.CouplingName], reading: str
+    given: Given, plain: dict[str, float], readings: dict[str, CouplingName], reading: str
 ) -> dict[str, float]:
     """The sine couplings, with the plain quantities counted as `reading` says."""
     implied = _sine_couplings(given)
@@ -78,7 +85,7 @@ def _in_one_convention(
             )
         return {}
     for name, value in plain.items():
-        implied[name] = c.coupling_from(readings[reading], value)
+        implied[name] = coupling_from(readings[reading], value)
     return implied
 
 
@@ -115,13 +122,13 @@ def _dc_lines(ke: float) -> list[Line]:
     lines = [
         Line("ke_v_s_rad", ke, "V·s/rad", "v/ω = Kt", "back-EMF per rad/s"),
         Line("kt_nm_a", ke, "N·m/A", "Ke", "torque per ampere: P = Ke·ω·I"),
-        Line("ke_v_krpm", ke * 1e3 * c.RAD_S_PER_RPM, "V/krpm", "Ke·1000·2π/60", "per 1000 rpm"),
+        Line("ke_v_krpm", ke * 1e3 * RAD_S_PER_RPM, "V/krpm", "Ke·1000·2π/60", "per 1000 rpm"),
         Line("kv_rpm_v", RPM_PER_RAD_S / ke, "rpm/V", "60/(2π·Ke)", "speed per volt"),
     ]
     for reading, name in KE_READINGS.items():
-        kt = c.coupling_as("kt_peak_nm_a", c.coupling_from(name, ke))
-        formula = f"1.5·Ke/{c.COUPLINGS[name].formula.removesuffix('·k').replace('k', '1')}"
-        words = f"per peak ampere, if those volts were the {c.COUPLINGS[name].words.split(', ')[1]}"
+        kt = coupling_as("kt_peak_nm_a", coupling_from(name, ke))
+        formula = f"1.5·Ke/{COUPLINGS[name].formula.removesuffix('·k').replace('k', '1')}"
+        words = f"per peak ampere, if those volts were the {COUPLINGS[name].words.split(', ')[1]}"
         lines.append(Line(f"kt_peak_nm_a ({reading})", kt, "N·m/A", formula, words))
     return lines
 
@@ -152,7 +159,7 @@ def _kv(given: Given) -> Answer | None:
     implied = _in_one_convention(given, plain, KV_READINGS, reading)
     if implied:
         k = agreed(given, implied)
-        kv, words = c.coupling_as("kv_ll_peak_rpm_v", k), SINE_WORDS
+        kv, words = coupling_as("kv_ll_peak_rpm_v", k), SINE_WORDS
         lines = _sine_lines(given, k)
         dc_kt, dc_words = RPM_PER_RAD_S / kv, "the DC form of the same KV: 15.5 % above Kt_peak"
         lines.append(Line("kt_dc_nm_a", dc_kt, "N·m/A", "9.549/KV", dc_words))
@@ -167,7 +174,7 @@ def _kv(given: Given) -> Answer | None:
 
 def _no_load_lines(given: Given, kv_rpm_v: float) -> list[Line]:
     if given.has("v_v") and not given.has("omega_mech_rad_s"):
-        omega = kv_rpm_v * given.one("v_v") * c.RAD_S_PER_RPM
+        omega = kv_rpm_v * given.one("v_v") * RAD_S_PER_RPM
         words = "ideal no-load speed at that voltage"
         return [
             Line("omega_mech_rad_s", omega, "rad/s", "KV·v·2π/60", words),

@@ -5,7 +5,27 @@ from __future__ import annotations
 import math
 
 from pipeline.calculators.quantities import Answer, Calculator, Given, Key, Line, agreed
-from pipeline.physics import conventions as c
+from pipeline.physics.copper import (
+    COPPER_COEFFICIENT_25_1_K,
+    COPPER_ZERO_K,
+    coefficient_at_1_k,
+    copper_resistance_ohm,
+    copper_temperature_degc,
+    linear_resistance_ohm,
+)
+from pipeline.physics.windings import (
+    Phases,
+    delta_from_wye,
+    delta_windings_ohm,
+    line_from_phase,
+    line_resistances_ohm,
+    phase_from_line,
+    phase_resistances_ohm,
+    saliency_words,
+    terminal_inductance_h,
+    unaligned_inductances_h,
+    wye_from_delta,
+)
 from pipeline.records.errors import UsageError
 
 WYE = "wye equivalent: what a drive sees a phase, published for wye and delta alike"
@@ -34,11 +54,11 @@ def _balanced(given: Given, letter: str, unit: str, what: str) -> list[Line]:
     line, phase, delta = (f"{letter}_{x}_{suffix}" for x in ("ll", "phase", "delta"))
     line_values: dict[str, float] = {}
     if given.has(line):
-        line_values[line] = c.phase_from_line(given.one(line))
+        line_values[line] = phase_from_line(given.one(line))
     if given.has(phase):
         line_values[phase] = given.one(phase)
     if given.has(delta):
-        line_values[delta] = c.wye_from_delta(given.one(delta))
+        line_values[delta] = wye_from_delta(given.one(delta))
     if not line_values:
         return []
     value = agreed(given, line_values, "impedance")
@@ -49,8 +69,8 @@ def _balanced(given: Given, letter: str, unit: str, what: str) -> list[Line]:
     )
     return [
         Line(phase, value, unit, phase_formula, f"{what} of the wye equivalent"),
-        Line(line, c.line_from_phase(value), unit, f"2·{big}_phase", "between two terminals"),
-        Line(delta, c.delta_from_wye(value), unit, from_phase, "one winding, if wound in delta"),
+        Line(line, line_from_phase(value), unit, f"2·{big}_phase", "between two terminals"),
+        Line(delta, delta_from_wye(value), unit, from_phase, "one winding, if wound in delta"),
     ]
 
 
@@ -64,7 +84,7 @@ def _unbalanced(given: Given) -> list[Line] | None:
     if len(lines or phases) != 3:
         return None
     if lines:
-        solved = c.phase_resistances_ohm(*(given.one(name) for name in lines))
+        solved = phase_resistances_ohm(*(given.one(name) for name in lines))
         if min(solved) <= 0.0:
             raise UsageError(
                 f"calc {given.kind}: no winding has these three resistances",
@@ -72,14 +92,14 @@ def _unbalanced(given: Given) -> list[Line] | None:
             )
         formulas = ("(R_ab+R_ca−R_bc)/2", "(R_ab+R_bc−R_ca)/2", "(R_bc+R_ca−R_ab)/2")
     else:
-        solved = c.Phases(*(given.one(name) for name in phases))
+        solved = Phases(*(given.one(name) for name in phases))
         formulas = ("given", "given", "given")
     rows = [
         Line(f"r_{phase}_ohm", value, "ohm", formula, "wye equivalent")
         for phase, value, formula in zip("abc", solved, formulas, strict=True)
     ]
-    read = c.line_resistances_ohm(*solved)
-    wound = c.delta_windings_ohm(*solved)
+    read = line_resistances_ohm(*solved)
+    wound = delta_windings_ohm(*solved)
     for index, pair in enumerate(PAIRS):
         formula = f"R_{pair[0]}+R_{pair[1]}"
         rows.append(Line(f"r_{pair}_ohm", read[index], "ohm", formula, "between terminals"))
@@ -125,7 +145,7 @@ def _copper(given: Given) -> Answer | None:
         return _copper_at(given)
     if given.has("alpha_1_k", "to_degc"):
         alpha, start, to = (given.one(n) for n in ("alpha_1_k", "alpha_at_degc", "to_degc"))
-        moved = c.coefficient_at_1_k(alpha, start, to)
+        moved = coefficient_at_1_k(alpha, start, to)
         words = f"the same winding's coefficient, referred to {to:g} degC"
         line = Line("alpha_1_k", moved, "1/K", "α/(1 + α·(T' − T))", words)
         return Answer((line,), "every coefficient names its reference temperature")
@@ -137,11 +157,11 @@ def _copper_at(given: Given) -> Answer:
     words = f"at {to:g} degC"
     if given.has("alpha_1_k"):
         alpha, at = given.one("alpha_1_k"), given.one("alpha_at_degc")
-        hot = c.linear_resistance_ohm(r, start, to, alpha, at)
+        hot = linear_resistance_ohm(r, start, to, alpha, at)
         formula = "R0·(1 + α·(T − Tα))/(1 + α·(T0 − Tα))"
         convention = f"linear, α = {alpha:g} 1/K referred to {at:g} degC"
     else:
-        hot = float(c.copper_resistance_ohm(r, to, start))
+        hot = float(copper_resistance_ohm(r, to, start))
         formula = "R0·(234.5 + T)/(234.5 + T0)"
         convention = "annealed copper; α is 1/259.5 = 0.003854 1/K at 25 degC, 0.00393 at 20 degC"
     return Answer((Line("r_ohm", hot, "ohm", formula, words),), convention)
@@ -152,11 +172,11 @@ def _copper_from_two(given: Given) -> Answer:
     r, start, hot = (given.one(name) for name in ("r_ohm", "from_degc", "r_hot_ohm"))
     if given.has("to_degc"):
         alpha = (hot / r - 1.0) / (given.one("to_degc") - start)
-        copper = c.coefficient_at_1_k(c.COPPER_COEFFICIENT_25_1_K, 25.0, start)
+        copper = coefficient_at_1_k(COPPER_COEFFICIENT_25_1_K, 25.0, start)
         words = f"referred to {start:g} degC; copper has {copper:.6f} there"
         line = Line("alpha_1_k", alpha, "1/K", "(R/R0 − 1)/(T − T0)", words)
         return Answer((line,), "a coefficient names its reference temperature")
-    temp = c.copper_temperature_degc(hot, r, start)
+    temp = copper_temperature_degc(hot, r, start)
     line = Line(
         "to_degc", temp, "degC", "R/R0·(234.5 + T0) − 234.5", "winding, mean over its length"
     )
@@ -167,8 +187,8 @@ COPPER = Calculator(
     "resistance of copper and its temperature",
     (
         Key("r_ohm", "ohm", "known resistance", ("r0",)),
-        Key("from_degc", "degC", "temperature at which it is known", ("t0",), low=-c.COPPER_ZERO_K),
-        Key("to_degc", "degC", "other temperature", ("t",), low=-c.COPPER_ZERO_K),
+        Key("from_degc", "degC", "temperature at which it is known", ("t0",), low=-COPPER_ZERO_K),
+        Key("to_degc", "degC", "other temperature", ("t",), low=-COPPER_ZERO_K),
         Key("r_hot_ohm", "ohm", "resistance at the other temperature"),
         Key("alpha_1_k", "1/K", "linear coefficient, in place of copper's law"),
         Key("alpha_at_degc", "degC", "temperature the coefficient is referred to", low=-273.15),
@@ -200,21 +220,21 @@ def _saliency(given: Given) -> Answer | None:
             given, {"saliency_ratio": given.one("saliency_ratio"), "lq_h/ld_h": ratio}, "impedance"
         )
     lines = [
-        Line("saliency_ratio", ratio, "1", "L_q/L_d", c.saliency_words(ratio)),
+        Line("saliency_ratio", ratio, "1", "L_q/L_d", saliency_words(ratio)),
         Line("ld_h", ld, "H", "half of L_ab at −30°", "on the magnet's axis"),
         Line("lq_h", lq, "H", "half of L_ab at 60°", "90° electrical away"),
     ]
     if given.has("theta_elec_deg"):
         theta = math.radians(given.one("theta_elec_deg"))
         for pair, shift in zip(PAIRS, ("+ 60°", "− 180°", "− 60°"), strict=True):
-            read = float(c.terminal_inductance_h(ld, lq, theta, pair))
+            read = float(terminal_inductance_h(ld, lq, theta, pair))
             formula = f"(L_d+L_q) + (L_d−L_q)·cos(2θ {shift})"
             lines.append(Line(f"l{pair}_h", read, "H", formula, f"between terminals {pair}"))
     return Answer(tuple(lines), f"{PHASE}; a meter across two terminals reads twice as much")
 
 
 def _from_three_pairs(given: Given, pairs: tuple[str, ...]) -> Answer:
-    inductances = c.unaligned_inductances_h(*(given.one(name) for name in pairs))
+    inductances = unaligned_inductances_h(*(given.one(name) for name in pairs))
     if inductances.low_h <= 0.0:
         raise UsageError(
             f"calc {given.kind}: these three readings are of no three-phase winding",
@@ -226,7 +246,7 @@ def _from_three_pairs(given: Given, pairs: tuple[str, ...]) -> Answer:
     lines = [
         Line("l_low_h", inductances.low_h, "H", "(m − A)/2, m mean, A = √(⅔·Σ(L−m)²)", words),
         Line("l_high_h", inductances.high_h, "H", "(m + A)/2", "L_q with interior magnets"),
-        Line("saliency_ratio", ratio, "1", "high/low", c.saliency_words(ratio)),
+        Line("saliency_ratio", ratio, "1", "high/low", saliency_words(ratio)),
     ]
     if ratio - 1.0 > EQUAL:
         place = "electrical angle of the low axis, up to 180°"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.calculators.quantities import Answer, Calculator, Given, Key, Line, agreed
-from pipeline.physics.conventions import pole_pairs_from
+from pipeline.physics.pole_pairs import pole_pairs_from
 from pipeline.records.errors import UsageError
 
 

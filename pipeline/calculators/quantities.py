@@ -9,9 +9,9 @@ import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from pipeline.physics.conventions import RAD_S_PER_RPM
 from pipeline.physics.glossary import suffix_of
 from pipeline.physics.suspects import Quantity, convention_suspect
+from pipeline.physics.units import RAD_S_PER_RPM
 from pipeline.records.errors import UsageError
 
 AGREEMENT = 5e-3

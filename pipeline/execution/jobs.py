@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self
 
+from pipeline.io.ingest.entry import Entry
 from pipeline.io.ingest.guard import ReadLimits
-from pipeline.io.ingest.survey import Entry
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate

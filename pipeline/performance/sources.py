@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.performance.draws import joint_draws, uniform_draws
 from pipeline.performance.heat import Heat
 from pipeline.performance.machine import Machine
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K, Array
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K, Array
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.estimate import Estimate
 from pipeline.records.performance import Blank

@@ -1,6 +1,6 @@
 """By what numbers conventions differ, and which of them a measured ratio lands on.
 
-Reference: JCGM 100:2008 (GUM), 6.2 (expanded uncertainty). The numbers: `conventions.COUPLINGS`.
+Reference: JCGM 100:2008 (GUM), 6.2 (expanded uncertainty). The numbers: `coupling.COUPLINGS`.
 """
 
 from __future__ import annotations

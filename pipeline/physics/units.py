@@ -6,6 +6,8 @@ import math
 
 TURN_RAD = 2.0 * math.pi
 """One turn."""
+RAD_S_PER_RPM = 2.0 * math.pi / 60.0
+"""One revolution a minute."""
 REFERENCE_DEGC = 25.0
 """The temperature that constants are given at."""
 SUFFIX_UNITS: dict[str, str] = {

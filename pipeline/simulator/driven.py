@@ -13,7 +13,7 @@ from pipeline.simulator.design import Recording
 from pipeline.simulator.sensors import Array, Session, grid, late, to_grid
 
 if TYPE_CHECKING:
-    from pipeline.simulator.converter import Control
+    from pipeline.simulator.control import Control
 
 TIMINGS = ("centred", "held", "instant")
 
@@ -104,7 +104,7 @@ def control(
         Fields of `Control` that differ from those of the nameplate.
 
     """
-    from pipeline.simulator.converter import Control
+    from pipeline.simulator.control import Control
 
     m = session.motor
     steps = substeps(session, period_s, max(abs(omega), m.speed_rated_rad_s))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pipeline.simulator.plant import Plant
 
 Array = NDArray[np.float64]
+Pair = tuple[float, float]
 
 SQRT3 = math.sqrt(3.0)
 

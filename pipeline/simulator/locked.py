@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from pipeline.simulator.converter import resistance_rise
-from pipeline.simulator.field import Array, current, magnet, stiffness
-from pipeline.simulator.motion import Pair
+from pipeline.simulator.circuit import resistance_rise
+from pipeline.simulator.field import Array, Pair, current, magnet, stiffness
 from pipeline.simulator.plant import Plant
 
 Circuit = tuple[float, float, float]

@@ -324,7 +324,7 @@ class Session:
             Mechanical angle [n, rad].
 
         """
-        from pipeline.simulator.motion import played
+        from pipeline.simulator.followers import played
 
         bench = self.bench
         if bench.encoder_play_rad > 0.0:
@@ -348,7 +348,7 @@ class Session:
             Rate of the samples [Hz].
 
         """
-        from pipeline.simulator.motion import lagged
+        from pipeline.simulator.followers import lagged
 
         rated = self.motor.speed_rated_rad_s
         lag = self.bench.speed_lag_s
@@ -383,7 +383,7 @@ class Session:
 
         The hysteresis is that of one play operator of a quarter of rated torque to either side.
         """
-        from pipeline.simulator.motion import played
+        from pipeline.simulator.followers import played
 
         bench, rated = self.bench, self.motor.torque_rated_nm
         bent = torque + bench.torque_bend_rel * torque**3 / rated**2

@@ -69,7 +69,7 @@ def resistance(session: Session, how: protocols.Resistance) -> Recording:
 
     """
     from pipeline.simulator.field import inductances
-    from pipeline.simulator.motion import warmed
+    from pipeline.simulator.heat import warmed
 
     motor = session.motor
     each = max(2, round(how.dwell_s * how.rate_hz))
@@ -260,7 +260,7 @@ def heat_run(session: Session, how: protocols.HeatRun) -> Recording:
         The level and its length.
 
     """
-    from pipeline.simulator.motion import warmed
+    from pipeline.simulator.heat import warmed
 
     motor, plant = session.motor, session.plant
     tau = motor.cth_winding_j_k / (1.0 / motor.rth_wa_k_w + 1.0 / motor.rth_wm_k_w)
@@ -294,7 +294,7 @@ def _dq_log(
     session: Session, i_phase: Array, v_phase: Array, eps: float, heat: Array, t_s: Array
 ) -> dict[str, Array]:
     """Rotor-frame log of a locked motor from phase currents [3] and voltages [n, 3]."""
-    from pipeline.simulator.motion import extra_volts
+    from pipeline.simulator.extra_terms import extra_volts
 
     turn = np.exp(-1j * eps) * 2.0 / 3.0 * np.exp(2j * math.pi * np.arange(3) / 3.0)
     n = t_s.size

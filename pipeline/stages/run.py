@@ -39,7 +39,8 @@ from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.files import input_folder, size_bytes
 from pipeline.io.ingest.guard import ReadLimits
-from pipeline.io.ingest.survey import Answer, Question, Survey, settled, survey
+from pipeline.io.ingest.identification import Answer, Question, identify_by_head
+from pipeline.io.ingest.survey import Survey, survey
 from pipeline.io.maps.places import source_maps
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.registry.store import Registry
@@ -300,7 +301,10 @@ def _answers(
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     answers = cache.known_answers(questions, sources, limits, recover=settings.recover)
     for number, question in enumerate(questions):
-        if number not in answers and (answer := settled(folder, question, sources)) is not None:
+        if (
+            number not in answers
+            and (answer := identify_by_head(folder, question, sources)) is not None
+        ):
             answers[number] = answer
     open_ = [number for number in range(len(questions)) if number not in answers]
     unanswered = [questions[number] for number in open_]

@@ -17,8 +17,8 @@ from tests.faults.bombs import MB, chunk, file_of, record, text
 
 pytestmark = pytest.mark.workers
 PARSERS = (
-    ("pipeline.io.ingest.survey", "scan"),
-    ("pipeline.io.ingest.survey", "split_comments"),
+    ("pipeline.io.ingest.identification", "scan"),
+    ("pipeline.io.ingest.identification", "split_comments"),
     ("pipeline.io.ingest.capture_reader", "read_csv"),
     ("pipeline.io.ingest.capture_reader", "scan"),
     ("pipeline.io.inspection.describe", "describe"),

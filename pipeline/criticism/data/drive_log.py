@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Sensors
-from pipeline.criticism.data.traces import SMOOTHED, even_clock, prepared, shaft_angle
+from pipeline.criticism.data.sensors import TEMPERATURES, prepared
+from pipeline.criticism.data.shaft_angle import shaft_angle
+from pipeline.criticism.data.traces import even_clock
 from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Machine
 from pipeline.records.capture import Capture
@@ -19,7 +21,7 @@ are like their neighbours."""
 _STALE, _LATE = 12, 1.5
 """Samples given up before a reading that came late, and twice as many from it on; periods from
 which on it did. By judgement: what a host reads after a hold-up is of before."""
-_ELECTRICAL = ("vq_v", "id_a", "iq_a", *SMOOTHED)
+_ELECTRICAL = ("vq_v", "id_a", "iq_a", *TEMPERATURES)
 _MOTION = ("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad")
 
 

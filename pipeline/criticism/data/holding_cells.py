@@ -12,7 +12,7 @@ from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.policy.policy import Policy
-from pipeline.numerics.orders import passes
+from pipeline.numerics.turns import passes
 from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Capture
 

@@ -16,7 +16,7 @@ from pipeline.criticism.data.traces import LINES_V, with_values
 from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.policy.policy import DEFAULT, Policy
-from pipeline.physics.conventions import COUPLINGS, coupling_from
+from pipeline.physics.coupling import COUPLINGS, coupling_from
 from pipeline.physics.frames import vector_of_lines
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.physics.units import TURN_RAD

@@ -1,8 +1,7 @@
-"""Columns of a capture as even, smoothed, decimated or thinned signals."""
+"""Columns of a capture as signals: on an even clock, smoothed, decimated, cut to windows."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -11,13 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.clocks import counted, sampled_unevenly
-from pipeline.criticism.data.segment import UNSMOOTHED, Sensors
-from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
 from pipeline.criticism.operating import Array
-from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Cutting
-from pipeline.criticism.policy.policy import Policy
-from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.numerics.projection import window_starts
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Capture
@@ -25,9 +19,7 @@ from pipeline.records.capture import Capture
 if TYPE_CHECKING:
     import polars as pl
 
-ANGLES = frozenset({"theta_mech_rad", "theta_elec_rad"})
 LINES_V = ("vab_v", "vbc_v", "vca_v")
-SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
 PAD = 24
 """Samples kept on either side of a window that is cut out: what differences and smoothing of a
 speed reach over."""
@@ -188,81 +180,6 @@ def decimated(signal: Array, factor: int) -> Array:
     return signal[:n].reshape(-1, factor).mean(axis=1)
 
 
-def reversals(theta: Array, slack: float) -> NDArray[np.int64]:
-    """First samples of the runs after each reversal of an angle.
-
-    Parameters
-    ----------
-    theta
-        Unwrapped angle [n, rad].
-    slack
-        What its noise may do [rad].
-
-    Returns
-    -------
-    array
-        Extremes that the angle then leaves by more than `slack`.
-
-    Examples
-    --------
-    >>> reversals(np.array([0.0, 1.0, 2.0, 1.9, 2.0, 1.0, 0.0]), 0.5).tolist()
-    [4]
-
-    """
-    step = np.diff(theta)
-    moving = np.flatnonzero(step)
-    sense = step[moving] > 0
-    extremes = moving[1:][sense[1:] != sense[:-1]]
-    places: list[int] = []
-    going, best = 0, 0
-    values = theta[extremes].tolist()
-    at = [0, *extremes.tolist(), theta.size - 1]
-    lowest = highest = (float(theta[0]), 0)
-    for place, value in zip(at, [float(theta[0]), *values, float(theta[-1])], strict=True):
-        lowest, highest = min(lowest, (value, place)), max(highest, (value, place))
-        if going <= 0 and value > lowest[0] + slack:
-            best = lowest[1]
-        elif going >= 0 and value < highest[0] - slack:
-            best = highest[1]
-        else:
-            continue
-        if going:
-            places.append(best)
-        going = 1 if value > theta[best] else -1
-        lowest = highest = (value, place)
-    return np.array(places, dtype=np.int64)
-
-
-def travel(theta: Array, slack: float) -> tuple[Array, Array, Array]:
-    """Angle turned since the last reversal.
-
-    Parameters
-    ----------
-    theta
-        Unwrapped angle [n, rad].
-    slack
-        What its noise may do [rad].
-
-    Returns
-    -------
-    since
-        [n, rad], infinite before the first reversal.
-    run
-        Number of the run of each sample [n].
-    turned
-        Angle turned in each run [runs, rad], negative backwards; that of the first is infinite.
-
-    """
-    starts = np.concatenate([[0], reversals(theta, slack)])
-    run = np.searchsorted(starts, np.arange(theta.size), side="right") - 1
-    since = np.abs(theta - theta[starts[run]])
-    since[run == 0] = np.inf
-    ends = np.concatenate([starts[1:], [theta.size - 1]])
-    turned = theta[ends] - theta[starts]
-    turned[0] = math.copysign(math.inf, turned[0])
-    return since, run.astype(float), turned
-
-
 def thinned(
     columns: Mapping[str, Array], keep: NDArray[np.bool_], length: int, most: int, pad: int = PAD
 ) -> tuple[dict[str, Array], NDArray[np.int64]]:
@@ -302,29 +219,6 @@ def thinned(
     return cut, pad + (length + 2 * pad) * np.arange(starts.size)
 
 
-def whole_log(columns: Mapping[str, Array], period: float, policy: Cutting) -> dict[str, Array]:
-    """The signals of a log that an instrument may record late, of all samples.
-
-    Parameters
-    ----------
-    columns
-        Columns [N].
-    period
-        Sample period [s].
-    policy
-        Smoothing of the speed.
-
-    Returns
-    -------
-    dict of array [N]
-        Currents, torque, and the smoothed angle.
-
-    """
-    names = ("id_a", "iq_a", "torque_shaft_nm")
-    turned = smoothed(columns["theta_mech_rad"], 2 * round(policy.speed_s / period / 2) + 1)
-    return {"theta_mech_rad": turned, **{name: columns[name] for name in names if name in columns}}
-
-
 def window_of(period: float, size: int, policy: Cutting) -> int:
     """Samples a window.
 
@@ -346,270 +240,6 @@ def window_of(period: float, size: int, policy: Cutting) -> int:
     """
     samples = max(round(policy.window_s / period), policy.window_samples)
     return max(min(samples, size // 4), policy.least_window)
-
-
-def with_angle(capture: Capture, names: list[str]) -> list[str]:
-    """Some columns and the first column that gives the angle.
-
-    Parameters
-    ----------
-    capture
-        Any capture.
-    names
-        Columns.
-
-    Returns
-    -------
-    list of str
-        `names` alone where there is no angle or speed.
-
-    """
-    for name in ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s"):
-        if capture.has(name):
-            return [*names, name]
-    return names
-
-
-def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> float | None:
-    """Adds the shaft angle to columns, from whatever gives it.
-
-    Parameters
-    ----------
-    columns
-        Columns [n]; `theta_mech_rad` is put in, an electrical angle or a speed taken out. Without
-        any of them the angle is 0.
-    period
-        Sample period [s].
-    machine
-        Pole pairs and policy.
-
-    Returns
-    -------
-    float or None
-        Standard deviation of the noise of a speed that was integrated [rad/s]; None of an angle.
-
-    """
-    if "theta_mech_rad" in columns:
-        return None
-    if "theta_elec_rad" in columns:
-        columns["theta_mech_rad"] = columns.pop("theta_elec_rad") / machine.pole_pairs
-    elif "omega_mech_rad_s" in columns:
-        speed = columns.pop("omega_mech_rad_s")
-        columns["theta_mech_rad"] = np.concatenate(
-            [[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * period]
-        )
-        return sensor_noise(speed, machine.policy.sensor_noise)
-    else:
-        columns["theta_mech_rad"] = np.zeros(next(iter(columns.values())).size)
-    return None
-
-
-def prepared(
-    columns: dict[str, Array],
-    period: float,
-    policy: Policy,
-    speed_noise_rad_s: float | None = None,
-) -> Sensors:
-    """Noise, coarse steps and runs of columns.
-
-    Parameters
-    ----------
-    columns
-        Columns [n]; temperatures are smoothed in place; `travel_rad`, `run` and `behind_nm` are
-        added.
-    period
-        Sample period [s].
-    policy
-        Constants of judgement.
-    speed_noise_rad_s
-        Of a speed whose integral is the angle (`shaft_angle`).
-
-    Returns
-    -------
-    Sensors
-        For `segment_of`.
-
-    """
-    noise, steps = noise_and_steps(columns, policy.sensor_noise)
-    width = max(2 * round(policy.cutting.temperature_s / period) + 1, 51)
-    for name in SMOOTHED:
-        if name in columns:
-            columns[name] = smoothed(columns[name], width)
-            noise[name] /= math.sqrt(width)
-    runs = np.array([math.inf])
-    if "theta_mech_rad" in columns:
-        runs = with_travel(columns, noise, policy.cutting)
-    if "torque_shaft_nm" in columns:
-        columns["behind_nm"] = behind(columns["torque_shaft_nm"], policy.cutting.play_share)
-    return Sensors(noise, steps, runs, speed_noise_rad_s=speed_noise_rad_s)
-
-
-def behind(signal: Array, share: float) -> Array:
-    """What a signal is over one that follows it with a play: its past, of hysteresis.
-
-    Parameters
-    ----------
-    signal
-        Samples [n, any unit].
-    share
-        Half of the play, of the largest size of the signal [1].
-
-    Returns
-    -------
-    array [n]
-        Same unit, at most half of the play; that where it rises, less that where it falls.
-
-    References
-    ----------
-    Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer, 1989 (play operator).
-
-    """
-    half = share * float(np.abs(signal).max(initial=0.0))
-    lagged, follows = np.empty(signal.size), float(signal[0]) if signal.size else 0.0
-    for n, value in enumerate(signal.tolist()):
-        follows = min(max(follows, value - half), value + half)
-        lagged[n] = value - follows
-    return lagged
-
-
-def noise_and_steps(
-    columns: Mapping[str, Array], policy: SensorNoise
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Noise of columns, and steps of those that are rounded too coarsely for it.
-
-    Parameters
-    ----------
-    columns
-        Columns [n].
-    policy
-        Constants of judgement.
-
-    Returns
-    -------
-    tuple of dict
-        Standard deviations and steps by name; an angle has no step here.
-
-    """
-    angles = {name: name.startswith("theta") for name in columns}
-    noise = {n: sensor_noise(column, policy, angles[n]) for n, column in columns.items()}
-    steps = {n: coarse_step(c, noise[n], policy) for n, c in columns.items() if not angles[n]}
-    return noise, {name: step for name, step in steps.items() if step > 0.0}
-
-
-def even_angle(
-    columns: dict[str, Array], noise: dict[str, float], window: int, policy: Cutting
-) -> int:
-    """Takes an angle as its local parabola, as long a one as the motion of the shaft allows.
-
-    Parameters
-    ----------
-    columns
-        Columns; `theta_mech_rad` [n] is replaced, and stays as `UNSMOOTHED`.
-    noise
-        Of each column; that of the angle is lowered to what the parabola leaves [rad].
-    window
-        Samples of a weak window; a parabola has as many.
-    policy
-        Constants of judgement.
-
-    Returns
-    -------
-    int
-        Samples of the parabola; 1 where the shaft itself moves.
-
-    Notes
-    -----
-    A dynamometer that holds its speed leaves only the encoder's rounding to difference twice; times
-    J that would be a torque, and a model that takes inertia away would seem to explain it. Where
-    the speed gives way for a moment, at a step of the load, a long parabola would take that
-    acceleration away: the width is halved until no stretch of one width scatters by more than the
-    angle's noise does. An acceleration that hides in that noise may still be more than the noise of
-    the torque: what the smoothing changes in an equation is part of its noise floor.
-
-    References
-    ----------
-    Savitzky and Golay, Anal. Chem. 36(8), 1964, 1627, doi:10.1021/ac60214a047.
-
-    """
-    theta, half = columns["theta_mech_rad"], window // 2
-    if theta.size < 3 * (2 * half + 1) or noise["theta_mech_rad"] <= 0.0:
-        return 1
-    while (width := 2 * half + 1) >= policy.narrowest:
-        run = parabolas(theta, width)
-        power = np.convolve((theta - run) ** 2, np.full(width, 1.0 / width), mode="valid")
-        if float(power.max()) <= (policy.motion_u * noise["theta_mech_rad"]) ** 2:
-            columns |= {"theta_mech_rad": run, UNSMOOTHED: theta}
-            # variance of a parabola's middle by least squares
-            noise["theta_mech_rad"] *= math.sqrt(2.25 / width)
-            return width
-        half //= 2
-    return 1
-
-
-def evened(
-    capture: Capture, columns: dict[str, Array], sensors: Sensors, machine: Machine, window: int
-) -> Sensors:
-    """The sensors of a log once the angle of a torque map is smoothed by `even_angle`.
-
-    Parameters
-    ----------
-    capture
-        Any capture; only a torque map is changed, since a dynamometer turns it evenly.
-    columns
-        Columns [n]; the angle is replaced in place.
-    sensors
-        Noise of the columns.
-    machine
-        Step of its encoder, which drive logs show; an even speed hides it.
-    window
-        Samples a window.
-
-    Returns
-    -------
-    Sensors
-        With the noise of the smoothed angle.
-
-    """
-    if capture.meta.test != "torque_map":
-        return sensors
-    noise = dict(sensors.noise)
-    noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
-    width = even_angle(columns, noise, window, machine.policy.cutting)
-    return replace(sensors, noise=noise, parabola=width)
-
-
-def held_speed(
-    theta_rad: Array, noise_rad: float, window: int, policy: Cutting
-) -> NDArray[np.bool_]:
-    """Samples around which a recorded speed does not change beyond its noise.
-
-    Parameters
-    ----------
-    theta_rad
-        Integral of the speed [n].
-    noise_rad
-        Standard deviation of the speed's noise, times the sample period.
-    window
-        Samples of a weak window.
-    policy
-        Constants of judgement.
-
-    Returns
-    -------
-    array [n] of bool
-        Where the speed scatters no more than its noise in a window, and the means of the window
-        before and of the one behind agree; none in a record of less than three windows.
-
-    """
-    travel, width = np.diff(theta_rad), 2 * (window // 2) + 1
-    if travel.size < 3 * width:
-        return np.zeros(theta_rad.size, dtype=bool)
-    mean = smoothed(travel, width)
-    apart = np.zeros(travel.size)
-    apart[width:-width] = mean[2 * width :] - mean[: -2 * width]
-    level = np.abs(apart) <= policy.change_u * noise_rad * math.sqrt(2.0 / width)
-    quiet = smoothed((travel - mean) ** 2, width) <= (policy.motion_u * noise_rad) ** 2
-    return np.append(level & quiet, False)
 
 
 def parabolas(signal: Array, width: int) -> Array:
@@ -642,26 +272,3 @@ def parabolas(signal: Array, width: int) -> Array:
     middle = np.convolve(signal, weights[0][::-1], mode="valid")
     first, last = basis @ (weights @ start), basis @ (weights @ end)
     return np.concatenate([first[:half], middle, last[half + 1 :]])
-
-
-def with_travel(columns: dict[str, Array], noise: Mapping[str, float], policy: Cutting) -> Array:
-    """Adds travel since the last reversal and number of the run to columns.
-
-    Parameters
-    ----------
-    columns
-        Columns [n]; `travel_rad` and `run` are put in.
-    noise
-        Standard deviation of `theta_mech_rad`.
-    policy
-        How far beyond the noise a reversal must go.
-
-    Returns
-    -------
-    array [runs]
-        Angle turned in each run [rad]; the first is infinite.
-
-    """
-    slack = policy.reversal_u * noise["theta_mech_rad"]
-    columns["travel_rad"], columns["run"], runs = travel(columns["theta_mech_rad"], slack)
-    return runs

@@ -9,19 +9,16 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment, Unthinned, electrical_orders, segment_of
-from pipeline.criticism.data.traces import (
+from pipeline.criticism.data.sensors import TEMPERATURES, prepared
+from pipeline.criticism.data.shaft_angle import (
     ANGLES,
-    SMOOTHED,
-    even_clock,
-    evened,
     held_speed,
-    prepared,
     shaft_angle,
-    thinned,
     whole_log,
-    window_of,
     with_angle,
+    with_smooth_angle,
 )
+from pipeline.criticism.data.traces import even_clock, thinned, window_of
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
@@ -65,7 +62,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         None without a record of the motion, except for a heat run, which is at rest.
 
     """
-    temperatures = [name for name in SMOOTHED if capture.has(name)]
+    temperatures = [name for name in TEMPERATURES if capture.has(name)]
     names = with_angle(capture, ["vd_v", "vq_v", "id_a", "iq_a", *temperatures])
     turning = len(names) > 4 and any("theta" in n or "omega" in n for n in names)
     if not turning and capture.meta.test != "heat_run":
@@ -81,7 +78,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     size = columns["vd_v"].size
     window = window_of(period, size, policy)
     orders = electrical_orders(machine) if angle and turned > policy.turning_rad else ()
-    sensors = evened(
+    sensors = with_smooth_angle(
         capture, columns, prepared(columns, period, machine.policy, speed_noise), machine, window
     )
     if held and torque:

@@ -7,20 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.data.hysteresis import with_travel
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of, slow_orders
 from pipeline.criticism.data.sensor_noise import sensor_noise
-from pipeline.criticism.data.traces import (
-    decimated,
-    even_clock,
-    noise_and_steps,
-    prepared,
-    shaft_angle,
-    smoothed,
-    thinned,
-    window_of,
-    with_angle,
-    with_travel,
-)
+from pipeline.criticism.data.sensors import noise_and_steps, prepared
+from pipeline.criticism.data.shaft_angle import shaft_angle, with_angle
+from pipeline.criticism.data.traces import decimated, even_clock, smoothed, thinned, window_of
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import COAST_SHARES, Model, Pieces, clock_gain
 from pipeline.criticism.operating import Array, Operating, Signals, Values

@@ -6,16 +6,9 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import in_time
 from pipeline.criticism.data.segment import Segment, electrical_orders, segment_of
-from pipeline.criticism.data.traces import (
-    SMOOTHED,
-    even_clock,
-    evened,
-    prepared,
-    shaft_angle,
-    thinned,
-    window_of,
-    with_angle,
-)
+from pipeline.criticism.data.sensors import TEMPERATURES, prepared
+from pipeline.criticism.data.shaft_angle import shaft_angle, with_angle, with_smooth_angle
+from pipeline.criticism.data.traces import even_clock, thinned, window_of
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Signals, Values
@@ -50,13 +43,13 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     angle = with_angle(capture, [])
     if capture.has(*_BOTH_AXES) or not angle:
         return None
-    further = [name for name in ("id_a", *SMOOTHED) if capture.has(name)]
+    further = [name for name in ("id_a", *TEMPERATURES) if capture.has(name)]
     policy = machine.policy.cutting
     period, columns, keep = even_clock(capture, ("iq_a", TORQUE, *further, *angle), policy)
     speed_noise = shaft_angle(columns, period, machine)
     size = keep.size
     window = window_of(period, size, policy)
-    sensors = evened(
+    sensors = with_smooth_angle(
         capture, columns, prepared(columns, period, machine.policy, speed_noise), machine, window
     )
     columns["t_s"] = period * np.arange(size, dtype=np.float64)

@@ -10,17 +10,9 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import PAIR_RAD, Segment, electrical_orders, segment_of
 from pipeline.criticism.data.sensor_noise import sensor_noise
-from pipeline.criticism.data.traces import (
-    ANGLES,
-    LINES_V,
-    even_clock,
-    prepared,
-    shaft_angle,
-    smoothed,
-    thinned,
-    window_of,
-    with_angle,
-)
+from pipeline.criticism.data.sensors import prepared
+from pipeline.criticism.data.shaft_angle import ANGLES, shaft_angle, with_angle
+from pipeline.criticism.data.traces import LINES_V, even_clock, smoothed, thinned, window_of
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import OPEN_FLUX, Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Signals, Values

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import PAIR_RAD, Segment, segment_of
-from pipeline.criticism.data.traces import even_clock, prepared, window_of
+from pipeline.criticism.data.sensors import prepared
+from pipeline.criticism.data.traces import even_clock, window_of
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Recorded, Signals, Values

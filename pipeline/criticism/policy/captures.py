@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pipeline.physics.conventions import UNLOGGED_D_SHARE, UNLOGGED_U_K
+from pipeline.physics.unlogged import UNLOGGED_D_SHARE, UNLOGGED_U_K
 from pipeline.records.policy import calibrated, chosen, derived
 
 COST = "a bound of the cost, which goes with them"

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.numerics.weak_rows import smooth_speed
-from pipeline.physics.conventions import copper_resistance_ohm
+from pipeline.physics.copper import copper_resistance_ohm
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check

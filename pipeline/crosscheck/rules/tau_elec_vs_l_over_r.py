@@ -12,12 +12,9 @@ from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
-from pipeline.physics.conventions import (
-    COPPER_COEFFICIENT_25_1_K,
-    UNLOGGED_U_K,
-    copper_resistance_ohm,
-    terminal_inductance_h,
-)
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K, copper_resistance_ohm
+from pipeline.physics.unlogged import UNLOGGED_U_K
+from pipeline.physics.windings import terminal_inductance_h
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check

@@ -25,7 +25,7 @@ from pipeline.estimation.uncertainty.instruments import (
 )
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import Plateau, find_plateaus
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import OHMMETER, of_ohmmeter
 from pipeline.records.capture import Array, Campaign, Capture, CaptureMeta
 

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.electrical.back_emf import Channel, Spin
+from pipeline.estimation.electrical.spin import Channel, Spin
 from pipeline.numerics.integrals import REST, cubic
 from pipeline.numerics.least_squares import Array, LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import white_noise_sigma

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.sample_hold import hold_s
 from pipeline.estimation.policy import policy
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.records.capture import Array, Capture
 from pipeline.records.estimate import Estimate
 

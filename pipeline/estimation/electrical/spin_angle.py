@@ -8,14 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.estimation.electrical.back_emf import (
-    Spin,
-    Stretch,
-    StretchFlux,
-    electrical_per_mechanical,
-)
+from pipeline.estimation.electrical.back_emf import StretchFlux, electrical_per_mechanical
+from pipeline.estimation.electrical.spin import Spin
+from pipeline.estimation.electrical.steady_speed import Stretch
 from pipeline.estimation.method import Method
-from pipeline.physics.conventions import pole_pairs_from
+from pipeline.physics.pole_pairs import pole_pairs_from
 from pipeline.records.capture import Capture
 from pipeline.records.estimate import Estimate
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.estimation.electrical.step_fit import AXES, Solution
-from pipeline.estimation.electrical.step_model import LD, LQ, Array, StepModel
+from pipeline.estimation.electrical.step_model import StepModel
+from pipeline.estimation.electrical.step_parameters import LD, LQ, Array
 from pipeline.estimation.electrical.step_record import StepRecord, rotor_angle_rad
 from pipeline.estimation.uncertainty.instruments import (
     current_source,

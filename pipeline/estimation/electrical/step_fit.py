@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.electrical.step_model import LD, LQ, SHARED, TERMS, StepModel, start_of
+from pipeline.estimation.electrical.step_model import StepModel
+from pipeline.estimation.electrical.step_parameters import LD, LQ, SHARED, TERMS, start_of
 from pipeline.estimation.electrical.step_wave import BETWEEN, Noise
 from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import Array, NonlinearFit, autocorrelation_time, gauss_newton
@@ -295,7 +296,7 @@ def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sigmas) -> Solutio
         trial[where] = values
         return model.residuals(trial, weights, free)
 
-    low, high = model.bounds(start)
+    low, high = model.layout.bounds(start)
     fit = gauss_newton(
         residuals_and_jacobian, start[where], low[where], high[where], tolerance=1e-3
     )

@@ -14,7 +14,7 @@ from pipeline.estimation.electrical.terminals import pair_of, pair_signals
 from pipeline.estimation.policy import policy
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import linear_fit
-from pipeline.physics.conventions import PAIR_AXES_RAD
+from pipeline.physics.windings import PAIR_AXES_RAD
 from pipeline.records.capture import Array, Capture
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.physics.conventions import CouplingName, coupling_as
+from pipeline.physics.coupling import CouplingName, coupling_as
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, derived

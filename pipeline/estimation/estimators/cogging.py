@@ -14,19 +14,10 @@ from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, unstated_note
-from pipeline.numerics.orders import (
-    OrderLine,
-    Spectrum,
-    Turn,
-    detection_limit,
-    find_orders,
-    half_peak_to_peak,
-    largest_order,
-    noise_power,
-    phase_modulated,
-    waveform,
-    whole_turns,
-)
+from pipeline.numerics.order_waveform import half_peak_to_peak, waveform
+from pipeline.numerics.orders import OrderLine, detection_limit, find_orders, phase_modulated
+from pipeline.numerics.turn_spectrum import Spectrum, noise_power
+from pipeline.numerics.turns import Turn, largest_order, whole_turns
 from pipeline.physics.mechanics import cogging_order
 from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Campaign, Capture

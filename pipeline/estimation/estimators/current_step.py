@@ -23,14 +23,14 @@ from pipeline.estimation.electrical.step_fit import (
     offers_of,
     solve,
 )
-from pipeline.estimation.electrical.step_model import (
+from pipeline.estimation.electrical.step_model import StepModel
+from pipeline.estimation.electrical.step_parameters import (
     LD,
     LQ,
     SHARED,
     SPACE,
     TERMS,
     Drive,
-    StepModel,
     drive_of,
 )
 from pipeline.estimation.electrical.step_record import (
@@ -45,7 +45,7 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import unstated_note
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import decimated
-from pipeline.physics.conventions import unaligned_inductances_h
+from pipeline.physics.windings import unaligned_inductances_h
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

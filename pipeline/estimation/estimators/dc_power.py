@@ -34,7 +34,7 @@ from pipeline.estimation.uncertainty.regimes import (
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import block_means, noise_about_cubics
 from pipeline.numerics.selection import needed_columns
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import Term
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.capture import Array, Campaign, Capture

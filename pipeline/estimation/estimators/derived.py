@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pipeline.estimation.formulas import Formula, estimator_of
-from pipeline.physics.conventions import motor_constant_nm_sqrt_w
+from pipeline.physics.coupling import motor_constant_nm_sqrt_w
 
 FORMULAS: dict[str, Formula] = {
     "kt_rms_nm_a": Formula(

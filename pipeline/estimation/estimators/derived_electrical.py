@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.estimation.formulas import Formula, estimator_of
-from pipeline.physics.conventions import coupling_as
+from pipeline.physics.coupling import coupling_as
 
 FORMULAS: dict[str, Formula] = {
     "saliency_ratio": Formula(("lq_h", "ld_h"), (1.0, -1.0), lambda lq, ld: lq / ld, "lq_h / ld_h"),

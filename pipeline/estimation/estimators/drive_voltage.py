@@ -38,7 +38,7 @@ from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, lin
 from pipeline.numerics.selection import needed_columns
 from pipeline.numerics.shaft_log import shaft_log
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pipeline.estimation.electrical.back_emf import read_spin
 from pipeline.estimation.electrical.hand_turns import Turn, turns_of
 from pipeline.estimation.electrical.magnet_temperature import (
     assumed_temperature,
@@ -16,6 +15,7 @@ from pipeline.estimation.electrical.magnet_temperature import (
     magnet_uncertainties,
     unlogged_note,
 )
+from pipeline.estimation.electrical.spin import read_spin
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import DEFAULT
 from pipeline.estimation.protocol import Estimator, Fit
@@ -27,7 +27,7 @@ from pipeline.estimation.uncertainty.instruments import (
     voltage_source,
 )
 from pipeline.numerics.plateaus import decimated
-from pipeline.physics.conventions import POLE_PAIRS_TOLERANCE, pole_pairs_from
+from pipeline.physics.pole_pairs import POLE_PAIRS_TOLERANCE, pole_pairs_from
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

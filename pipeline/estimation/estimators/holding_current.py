@@ -25,18 +25,10 @@ from pipeline.estimation.uncertainty.instruments import (
 from pipeline.numerics.bootstrap import block_bootstrap, block_length
 from pipeline.numerics.harmonics import harmonic_design
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
-from pipeline.numerics.orders import (
-    OrderLine,
-    Spectrum,
-    Turn,
-    detection_limit,
-    even_positions,
-    find_orders,
-    half_peak_to_peak,
-    largest_order,
-    waveform,
-    whole_turns,
-)
+from pipeline.numerics.order_waveform import half_peak_to_peak, waveform
+from pipeline.numerics.orders import OrderLine, detection_limit, find_orders
+from pipeline.numerics.turn_spectrum import Spectrum
+from pipeline.numerics.turns import Turn, even_positions, largest_order, whole_turns
 from pipeline.physics.glossary import Term
 from pipeline.physics.mechanics import cogging_order
 from pipeline.physics.units import TURN_RAD

@@ -10,12 +10,11 @@ import numpy as np
 from pipeline.estimation.electrical.magnet_temperature import magnet_source, magnet_uncertainties
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.electrical.ripple_torque import RIPPLE, winding_of
-from pipeline.estimation.mechanical.drag import (
-    DRAG_FORMS,
-    DragFit,
+from pipeline.estimation.mechanical.drag import drag_of
+from pipeline.estimation.mechanical.drag_fit import DragFit, drag_description
+from pipeline.estimation.mechanical.drag_forms import DRAG_FORMS
+from pipeline.estimation.mechanical.drive_windows import (
     coasts_decide,
-    drag_of,
-    drag_words,
     too_short,
     torque_is_separable,
 )
@@ -424,7 +423,7 @@ def _slopes(
 
 
 def _words(rows: ShaftRows, torque: Torque, drag: DragFit) -> list[str]:
-    words = [torque.words, drag_words(drag)]
+    words = [torque.words, drag_description(drag)]
     words.append("what iron loss there is under the magnet's flux counts as drag")
     words.append(f"{rows.count} windows, {rows.dropped} near standstill left out")
     if _of_a_speed(rows, 1.0):

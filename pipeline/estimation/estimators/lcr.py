@@ -18,8 +18,8 @@ from pipeline.estimation.uncertainty.instruments import (
     unstated_note,
 )
 from pipeline.numerics.least_squares import linear_fit
-from pipeline.physics.conventions import PAIR_AXES_RAD, unaligned_inductances_h
 from pipeline.physics.glossary import Term
+from pipeline.physics.windings import PAIR_AXES_RAD, unaligned_inductances_h
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

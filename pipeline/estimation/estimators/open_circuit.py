@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pipeline.estimation.electrical.back_emf import flux_of, read_spin, steady_stretches
+from pipeline.estimation.electrical.back_emf import flux_of
 from pipeline.estimation.electrical.magnet_temperature import (
     assumed_temperature,
     magnet_column,
@@ -15,7 +15,9 @@ from pipeline.estimation.electrical.magnet_temperature import (
     magnet_uncertainties,
     unlogged_note,
 )
+from pipeline.estimation.electrical.spin import read_spin
 from pipeline.estimation.electrical.spin_angle import Group, angle_offset, count_pole_pairs
+from pipeline.estimation.electrical.steady_speed import steady_stretches
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import DEFAULT, policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -27,7 +29,7 @@ from pipeline.estimation.uncertainty.instruments import (
     voltage_source,
 )
 from pipeline.numerics.least_squares import LinearFit, linear_fit
-from pipeline.physics.conventions import COUPLINGS, CouplingName, coupling_as
+from pipeline.physics.coupling import COUPLINGS, CouplingName, coupling_as
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
@@ -87,7 +89,7 @@ def flux_linkage(temp_degc: Array) -> Array:
     -----
     ψ = |v| / ω_e of the fundamental, and ψ(T) = ψ25 + s (T - 25) = ψ25 (1 + α (T - 25)), so that
     α = s / ψ25. Ke and Kv in every convention are p ψ25 times that convention's factor
-    (`conventions.coupling_as`).
+    (`coupling.coupling_as`).
 
     References
     ----------

@@ -28,12 +28,9 @@ from pipeline.estimation.uncertainty.instruments import (
     voltage_source,
 )
 from pipeline.numerics.least_squares import linear_fit
-from pipeline.physics.conventions import (
-    COPPER_COEFFICIENT_25_1_K,
-    phase_from_line,
-    phase_resistances_ohm,
-)
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import Term
+from pipeline.physics.windings import phase_from_line, phase_resistances_ohm
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Conditions, Estimate
@@ -248,7 +245,7 @@ def _results(columns: Columns, coefficients: Array) -> dict[str, float]:
 def fit_resistance(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """R of each pair by the plateaus of all captures at once, brought to 25 degC by copper's law.
 
-    The published values are linear in the pairs' (conventions.phase_resistances_ohm), and so is
+    The published values are linear in the pairs' (`windings.phase_resistances_ohm`), and so is
     their scatter.
     """
     del known

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.estimation.mechanical.drag import DRAG_FORMS, STRIBECK
+from pipeline.estimation.mechanical.drag_forms import DRAG_FORMS, STRIBECK
 from pipeline.estimation.mechanical.setups import setups_of
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy

@@ -32,7 +32,7 @@ from pipeline.numerics.least_squares import (
     linear_fit,
 )
 from pipeline.numerics.plateaus import white_noise_sigma
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Array, Campaign
 from pipeline.records.constants import Constants

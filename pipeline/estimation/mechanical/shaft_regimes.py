@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.mechanical.drag import DragFit
+from pipeline.estimation.mechanical.drag_fit import DragFit
 from pipeline.estimation.mechanical.shaft_rows import DRIVE, ShaftRows
 from pipeline.estimation.uncertainty.regimes import (
     Disagreement,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.physics.conventions import coupling_as
+from pipeline.physics.coupling import coupling_as
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, derived
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.physics.conventions import UNLOGGED_D_SHARE
+from pipeline.physics.unlogged import UNLOGGED_D_SHARE
 from pipeline.records.policy import calibrated, chosen, derived
 
 TRIED = "the number halved and doubled"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.physics.conventions import UNLOGGED_U_K
+from pipeline.physics.unlogged import UNLOGGED_U_K
 from pipeline.records.policy import chosen, derived
 
 

@@ -17,7 +17,7 @@ from pipeline.estimation.electrical.terminals import (
 from pipeline.estimation.policy import policy
 from pipeline.numerics.integrals import GAP
 from pipeline.numerics.plateaus import block_means, find_plateaus
-from pipeline.physics.conventions import phase_from_line
+from pipeline.physics.windings import phase_from_line
 from pipeline.records.capture import Array, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, derived

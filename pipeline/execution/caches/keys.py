@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 
 from pipeline.execution.jobs import MotorJob
 from pipeline.io.ingest.guard import ReadLimits
-from pipeline.io.ingest.survey import Question, Survey
+from pipeline.io.ingest.identification import Question
+from pipeline.io.ingest.survey import Survey
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec

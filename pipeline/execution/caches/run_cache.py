@@ -16,8 +16,9 @@ from typing import Any
 from pipeline.execution.caches.keys import AnswerParts, AnswersParts, key_of
 from pipeline.execution.caches.versions import SURVEY, tools
 from pipeline.execution.jobs import Files, Finished
+from pipeline.io.ingest.entry import Entry
 from pipeline.io.ingest.guard import ReadLimits
-from pipeline.io.ingest.survey import Answer, Entry, Question
+from pipeline.io.ingest.identification import Answer, Question
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.storage.checksummed import keep_checksummed, read_checksummed
 from pipeline.io.storage.identity import Identities, Identity, notes_folder

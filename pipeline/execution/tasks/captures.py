@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipeline.execution.jobs import OfFiles
+from pipeline.io.ingest.entry import Entry
 from pipeline.io.ingest.files import size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading, refusing
-from pipeline.io.ingest.survey import Entry
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding

@@ -96,9 +96,10 @@ def _refusals(path: Path, sources: Mapping[str, SourceMap]) -> tuple[Finding, ..
     """Why `run` would refuse a file by itself; nothing of one that it leaves alone."""
     from pipeline.contracts.validate import validate
     from pipeline.io.ingest.capture_reader import read_capture
-    from pipeline.io.ingest.survey import look, question_of
+    from pipeline.io.ingest.identification import identify
+    from pipeline.io.ingest.survey import question_of
 
-    answer = look(path.parent, question_of(path), sources)
+    answer = identify(path.parent, question_of(path), sources)
     if answer.entry is None:
         return tuple(one for one in answer.findings if one.severity == "refused")
     try:

@@ -10,7 +10,7 @@ from pipeline.execution.jobs import OfFiles
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.files import size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading
-from pipeline.io.ingest.survey import Answer, Question, look
+from pipeline.io.ingest.identification import Answer, Question, identify
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.errors import CaptureError, MachineError
 from pipeline.records.finding import Finding
@@ -51,7 +51,7 @@ def survey_files(task: SurveyTask) -> tuple[Answer, ...]:
             if question.path in refused:
                 raise died(refused[question.path])
             with reading(question.path, size_bytes(folder / question.path), task.limits):
-                answer = look(folder, question, task.sources, recover=task.recover)
+                answer = identify(folder, question, task.sources, recover=task.recover)
         except CaptureError as fault:
             answer = Answer(question.path, None, None, (Finding.refusal(question.path, fault),))
         answers.append(answer)

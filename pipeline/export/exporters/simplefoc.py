@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 
 from pipeline.export.protocol import Exporter, Options, Source, Values
-from pipeline.physics.conventions import line_from_phase, phase_from_line
+from pipeline.physics.windings import line_from_phase, phase_from_line
 
 CALL = re.compile(r"BLDCMotor\((\d+), ([^,]+), ([^,]+), ([^,]+), ([^)]+)\);")
 

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import polars as pl
 
+from pipeline.io.ingest.entry import Entry
 from pipeline.io.ingest.files import read_whole
 from pipeline.io.ingest.guard import refusing
 from pipeline.io.ingest.metadata import capture_meta
-from pipeline.io.ingest.survey import Entry, Survey, survey
+from pipeline.io.ingest.survey import Survey, survey
 from pipeline.io.maps.columns import foreign_unit, is_field, last_part, to_frame
 from pipeline.io.maps.source_map import Part, SourceMap
 from pipeline.io.mcap.container import scan

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from pipeline.io.ingest.capture_reader import wanted
 from pipeline.io.ingest.files import read_whole
+from pipeline.io.ingest.identification import identify
 from pipeline.io.ingest.metadata import CONTRACT_VERSION, SIDECAR_SUFFIX, capture_meta
-from pipeline.io.ingest.survey import look, question_of
+from pipeline.io.ingest.survey import question_of
 from pipeline.io.inspection.file_names import name_patterns
 from pipeline.io.inspection.parts import parts_of
 from pipeline.io.inspection.proposals import FieldSeen, StreamSeen, propose
@@ -147,7 +148,7 @@ def describe(
 
 def _unused(path: Path, report: InspectReport, sources: Mapping[str, SourceMap]) -> list[str]:
     """Why `run` does not use a file that states no contract, where its faults do not say."""
-    answer = look(path.parent, question_of(path), sources)
+    answer = identify(path.parent, question_of(path), sources)
     if answer.entry is not None:
         return _metadata_faults(answer.entry.stated)
     if answer.findings or report.faults or not report.streams:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.io.ingest.capture_reader import read_capture
-from pipeline.io.ingest.survey import Question, look
+from pipeline.io.ingest.identification import Question, identify
 from pipeline.io.maps.map_file import parse_source_file
 from pipeline.records.errors import CaptureError
 from pipeline.records.naming import printable
@@ -39,7 +39,7 @@ def preview(folder: Path, file: str, map_text: str, rows: int) -> list[str]:
         name: replace(one, metadata=tuple((_UNANSWERED | dict(one.metadata)).items()))
         for name, one in parse_source_file(map_text.encode(), "proposed").items()
     }
-    answer = look(folder, Question(file, None, ()), maps)
+    answer = identify(folder, Question(file, None, ()), maps)
     if answer.entry is None:
         faults = [f"{one.message}; {one.remedy}" for one in answer.findings]
         return [f"{printable(file)}: {one}" for one in faults or ["the map does not recognise it"]]

@@ -6,33 +6,36 @@ A Delta table of events (`table`) that only grows, and a JSON file a version bes
 
 from __future__ import annotations
 
-import hashlib
 import json
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any, Literal
 
-from pipeline.io.registry.exports import Exports, Key, place_of
+from pipeline.io.registry.exports import Exports, Key
+from pipeline.io.registry.rows import (
+    UNNUMBERED,
+    Sheet,
+    appended,
+    publication_rows,
+    sha256_of,
+    sheet_of,
+    utc,
+)
 from pipeline.io.registry.table import EventTable, Row
+from pipeline.io.registry.verification import Verification, verify
 from pipeline.io.storage.datasheets import datasheet_of
-from pipeline.io.storage.publish import canonical_json
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import PipelineError, UsageError
 from pipeline.records.ledger import (
-    START,
     Event,
     Revocation,
     Selection,
     Version,
-    faults,
     histories,
     select,
 )
-
-DIGEST = re.compile("[0-9a-f]{64}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,29 +49,6 @@ class Receipt:
     added: tuple[Event, ...]
     known: tuple[Event, ...]
     conflicts: tuple[Event, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Verification:
-    """What `verify` found: `faults` are mismatches and gaps, `notes` traces of dead writers."""
-
-    versions: int
-    decisions: int
-    faults: tuple[str, ...]
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class _Sheet:
-    """A datasheet document on its way in."""
-
-    document: Mapping[str, Any]
-    content: bytes
-    sha256: str
-
-    @property
-    def key(self) -> Key:
-        return self.document["motor_id"], self.document["version"]
 
 
 class Registry:
@@ -103,7 +83,7 @@ class Registry:
             A document is no datasheet.
 
         """
-        sheets = {sheet.key: sheet for sheet in map(_sheet, documents)}
+        sheets = {sheet.key: sheet for sheet in map(sheet_of, documents)}
         if not sheets:
             return Receipt((), (), ())
         prepared: set[Key] = set()
@@ -114,7 +94,7 @@ class Registry:
             fresh = {sheet.key: sheet.content for sheet in new if sheet.key not in prepared}
             prepared.update(fresh)
             self._exports.prepare_all(fresh)
-            return _rows(events, new, now)
+            return publication_rows(events, new, now)
 
         try:
             before, added = self._table.append(decide)
@@ -131,12 +111,12 @@ class Registry:
                 self._exports.discard(key)
 
     def _settled(
-        self, sheets: Mapping[Key, _Sheet], before: Sequence[Event], added: Sequence[Event]
+        self, sheets: Mapping[Key, Sheet], before: Sequence[Event], added: Sequence[Event]
     ) -> Receipt:
         registered = {e.key: e for e in reversed(before) if e.kind == "publish"}
         known, conflicts = [], []
         settled = {event.key for event in added}
-        for key in sheets.keys() - {event.key for event in added}:
+        for key in sheets.keys() - settled:
             event = registered[key]
             if event.content_sha256 == sheets[key].sha256:
                 settled.add(key)
@@ -147,8 +127,9 @@ class Registry:
         self._exports.settle_all(
             {key: sheet.content for key, sheet in sheets.items() if key in settled}
         )
-        order = sorted(known, key=lambda e: e.sequence), sorted(conflicts, key=lambda e: e.sequence)
-        return Receipt(tuple(added), tuple(order[0]), tuple(order[1]))
+        known.sort(key=lambda event: event.sequence)
+        conflicts.sort(key=lambda event: event.sequence)
+        return Receipt(tuple(added), tuple(known), tuple(conflicts))
 
     def decide(
         self,
@@ -195,10 +176,9 @@ class Registry:
             last = version.decisions[-1] if version.decisions else None
             if last is not None and (last.kind, last.by, last.why) == (kind, by, why):
                 return []
-            number, chain = (events[-1].sequence, events[-1].chain) if events else (0, START)
             revision = version.revision
-            event = Event(number + 1, _utc(now), kind, *version.key, revision, by=by, why=why)
-            return [(event.linked(chain), None)]
+            event = Event(UNNUMBERED, utc(now), kind, *version.key, revision, by=by, why=why)
+            return appended(events, [(event, None)])
 
         if self._table.events() is None:
             raise self._missing()
@@ -239,17 +219,12 @@ class Registry:
 
         def append(events: Sequence[Event]) -> list[Row]:
             tags_of = {v.key: v.tags for history in histories(events).values() for v in history}
-            number, chain = (events[-1].sequence, events[-1].chain) if events else (0, START)
-            rows: list[Row] = []
-            for key, revision in revisions.items():
-                if (name in tags_of[key]) == (kind == "tag"):
-                    continue
-                number += 1
-                event = Event(number, _utc(now), kind, *key, revision, by=by, why=name)
-                event = event.linked(chain)
-                chain = event.chain
-                rows.append((event, None))
-            return rows
+            changed = [
+                Event(UNNUMBERED, utc(now), kind, *key, revision, by=by, why=name)
+                for key, revision in revisions.items()
+                if (name in tags_of[key]) != (kind == "tag")
+            ]
+            return appended(events, [(event, None) for event in changed])
 
         if self._table.events() is None:
             raise self._missing()
@@ -306,7 +281,7 @@ class Registry:
 
         """
         return self._table_is_there() and all(
-            (content := self._exports.read(key)) is not None and _digest(content) == sha256
+            (content := self._exports.read(key)) is not None and sha256_of(content) == sha256
             for key, sha256 in contents
         )
 
@@ -362,49 +337,10 @@ class Registry:
             There is no registry.
 
         """
-        gaps = [f"commit {n} is missing from the log" for n in self._table.missing_commits()]
-        try:
-            events = self.events()
-            published = [event for event in events if event.kind == "publish"]
-            faults_found = [*gaps, *faults(events), *self._content_faults(published)]
-        except UsageError:
-            raise
-        except PipelineError as error:
-            return Verification(0, 0, (*gaps, error.message), ())
-        file_faults, notes = self._file_faults(published)
-        unique = len({event.key for event in published})
-        decisions = len(events) - len(published)
-        return Verification(unique, decisions, (*faults_found, *file_faults), tuple(notes))
-
-    def _content_faults(self, published: Sequence[Event]) -> Iterable[str]:
-        rows = {event.sequence: event for event in published}
-        unread = set(rows)
-        for number, text in self._table.contents(list(rows)):
-            unread.discard(number)
-            event = rows[number]
-            if _digest(text.encode()) != event.content_sha256:
-                yield f"row {number} ({event.motor_id!r}): its datasheet is not what was published"
-            elif not _agrees(event, text):
-                yield f"row {number} ({event.motor_id!r}): says other than its datasheet"
-        yield from (f"row {number}: its datasheet is missing" for number in sorted(unread))
-
-    def _file_faults(self, published: Sequence[Event]) -> tuple[list[str], list[str]]:
-        sentences, notes = [], []
-        for event in {e.key: e for e in reversed(published)}.values():
-            place, sha256 = place_of(event.key), event.content_sha256 or ""
-            content = self._exports.read(event.key)
-            if content is None and self._exports.finish(event.key, sha256):
-                notes.append(f"{place}: finished what an interrupted writer had left pending")
-            elif content is None:
-                sentences.append(f"{place}: the file is missing; publishing the version writes it")
-            elif _digest(content) != sha256:
-                sentences.append(f"{place}: the file is not what was published")
-        if pending := self._exports.pending():
-            notes.append(f"{pending} pending files of writers that were interrupted or still write")
-        rows = {place_of(event.key) for event in published}
-        unlisted = (name for name in self._exports.names() if name not in rows)
-        sentences += [f"{name}: the file has no row; the table lost it" for name in unlisted]
-        return sorted(sentences), sorted(notes)
+        verification = verify(self._table, self._exports)
+        if verification is None:
+            raise self._missing()
+        return verification
 
     def _missing(self) -> UsageError:
         return UsageError(f"no registry at {self.place}", "name the one of a run by registry=")
@@ -450,85 +386,3 @@ def _allowed(kind: str, version: Version) -> None:
         raise UsageError(f"{name} is refused: {reasons}", "no decision changes that; record anew")
     if version.open_points:
         raise UsageError(f"{name} is not ready for approval: {reasons}", "complete it first")
-
-
-def _sheet(given: Mapping[str, Any] | bytes) -> _Sheet:
-    """The document with its bytes; raises UsageError where it is no datasheet."""
-    try:
-        document = json.loads(given) if isinstance(given, bytes) else given
-        motor_id, version = document["motor_id"], document["version"]
-        _event_fields(document)
-    except (LookupError, TypeError, ValueError) as error:
-        raise UsageError(f"no datasheet: {error!r}", "publish what `run` wrote") from error
-    if not isinstance(motor_id, str) or not DIGEST.fullmatch(str(version)):
-        raise UsageError(f"motor {motor_id!r}: version {version!r} is no sha256", "run again")
-    try:
-        content = given if isinstance(given, bytes) else canonical_json(document)
-    except UnicodeEncodeError as error:
-        raise UsageError(f"motor {motor_id!r}: its text is not Unicode", "rename it") from error
-    return _Sheet(document, content, _digest(content))
-
-
-def _rows(events: Sequence[Event], new: Sequence[_Sheet], now: datetime) -> list[Row]:
-    """The rows of new versions after the events so far: numbered, counted and chained."""
-    number, chain = (events[-1].sequence, events[-1].chain) if events else (0, START)
-    revisions: dict[str, int] = {}
-    for event in events:
-        if event.kind == "publish":
-            revisions[event.motor_id] = revisions.get(event.motor_id, 0) + 1
-    rows: list[Row] = []
-    for sheet in new:
-        number += 1
-        motor_id, version = sheet.key
-        revisions[motor_id] = revisions.get(motor_id, 0) + 1
-        event = Event(
-            number,
-            _utc(now),
-            "publish",
-            motor_id,
-            version,
-            revisions[motor_id],
-            content_sha256=sheet.sha256,
-            **_event_fields(sheet.document),
-        ).linked(chain)
-        chain = event.chain
-        rows.append((event, sheet.content.decode()))
-    return rows
-
-
-def _event_fields(document: Mapping[str, Any]) -> dict[str, Any]:
-    """What a row repeats of its datasheet, so that a search needs not read it."""
-    captures = document["provenance"]["captures"]
-    stations = {capture.get("station") for capture in captures} - {None}
-    return {
-        "motor_type": document["motor_type"],
-        "lot": document["lot"],
-        "stations": tuple(sorted(stations)),
-        "status": document["status"],
-        "reasons": tuple(document.get("why", ())),
-    }
-
-
-def _agrees(event: Event, text: str) -> bool:
-    """Whether a row says what its datasheet says."""
-    try:
-        document = json.loads(text)
-        expected = {
-            "motor_id": document["motor_id"],
-            "version": document["version"],
-            **_event_fields(document),
-        }
-    except (ValueError, LookupError, TypeError):
-        return False
-    return all(getattr(event, name) == value for name, value in expected.items())
-
-
-def _utc(moment: datetime) -> datetime:
-    """The moment in UTC, which is what the table keeps; raises ValueError for one without zone."""
-    if moment.tzinfo is None:
-        raise ValueError("a moment without time zone")
-    return moment.astimezone(UTC)
-
-
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

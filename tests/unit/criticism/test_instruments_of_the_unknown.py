@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.traces import behind
+from pipeline.criticism.data.hysteresis import play_lag
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
@@ -60,7 +60,7 @@ def test_a_loose_encoder_is_an_angle_error_that_goes_by_the_direction():
 def test_a_transducer_that_remembers_is_a_curve_of_its_past():
     def made(segment):
         s = dict(segment.recorded)
-        past = behind(s[TORQUE], 0.25)
+        past = play_lag(s[TORQUE], 0.25)
         s["behind_nm"] = past
         s[TORQUE] = s[TORQUE] - 0.1 * past
         return replace(segment, recorded=s)
@@ -74,7 +74,7 @@ def test_a_transducer_that_remembers_is_a_curve_of_its_past():
 def test_the_past_of_a_torque_is_half_a_play_to_the_side_it_came_from():
     up = np.linspace(0.0, 4.0, 50)
     there_and_back = np.concatenate([up, up[::-1]])
-    past = behind(there_and_back, 0.25)
+    past = play_lag(there_and_back, 0.25)
     assert past[0] == 0.0
     assert past[49] == pytest.approx(1.0)
     assert past[-1] == pytest.approx(-1.0)

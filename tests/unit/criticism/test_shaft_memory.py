@@ -9,7 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.traces import PAD, even_angle, reversals, travel
+from pipeline.criticism.data.hysteresis import reversals, travel
+from pipeline.criticism.data.shaft_angle import smooth_angle
+from pipeline.criticism.data.traces import PAD
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine import two_masses
 from pipeline.criticism.operating import ShaftState
@@ -125,7 +127,7 @@ def smoothed(true):
     """What is taken for an angle that an encoder of 17 bits rounds, and its noise [rad]."""
     found = {"theta_mech_rad": np.round(true / STEP_RAD) * STEP_RAD}
     noise = {"theta_mech_rad": STEP_RAD / 12**0.5}
-    even_angle(found, noise, 400, DEFAULT.cutting)
+    smooth_angle(found, noise, 400, DEFAULT.cutting)
     return found["theta_mech_rad"], noise["theta_mech_rad"]
 
 

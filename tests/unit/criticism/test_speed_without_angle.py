@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.criticism.comparison import compare
-from pipeline.criticism.data.traces import held_speed
+from pipeline.criticism.data.shaft_angle import held_speed
 from pipeline.criticism.equations.dq import cut
 from pipeline.criticism.equations.free_shaft import cut as cut_coast
 from pipeline.criticism.library.registry import effects

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from pipeline.estimation.registry import fit_all
-from pipeline.physics.conventions import coupling_as
+from pipeline.physics.coupling import coupling_as
 from pipeline.records.capture import Campaign
 from pipeline.simulator.truth import truth
 from tests.simulated import design

@@ -7,22 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.estimation.electrical import back_emf
-from pipeline.estimation.electrical.back_emf import (
-    Channel,
-    Spin,
+from pipeline.estimation.electrical import steady_speed
+from pipeline.estimation.electrical.back_emf import electrical_per_mechanical, flux_of
+from pipeline.estimation.electrical.spin import Channel, Spin, read_spin
+from pipeline.estimation.electrical.spin_angle import Group, angle_offset, count_pole_pairs
+from pipeline.estimation.electrical.steady_speed import (
     Stretch,
     _one_way,
     _smooth_phase,
     _split,
     _steady_core,
     _unbroken,
-    electrical_per_mechanical,
-    flux_of,
-    read_spin,
     steady_stretches,
 )
-from pipeline.estimation.electrical.spin_angle import Group, angle_offset, count_pole_pairs
 from pipeline.estimation.estimators.open_circuit import METHOD
 from pipeline.numerics.least_squares import autocorrelation_time
 from tests.unit.estimation.signals import capture
@@ -362,7 +359,7 @@ def test_below_six_of_the_noise_the_rotor_stands(sigmas: float, there: bool) -> 
     vector = spin.vector_v()
     size = np.abs(vector[6000:])
     seen = float(np.mean(size > 6.0 * sigma))
-    found, spinning = back_emf._stretches(spin, 0.02)
+    found, spinning = steady_speed._stretches(spin, 0.02)
     assert spinning == pytest.approx(5000 + 15000 * seen, rel=0.03)
     assert bool([s for s in found if s.speed_rad_s < 2.0 * slow]) is there
 

@@ -9,15 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.estimation.estimators.inertia import acceleration
-from pipeline.estimation.mechanical.drag import (
-    CURVE,
-    DRAG_FORMS,
-    KNOTS,
-    SHAPES,
-    STRIBECK,
-    DragFit,
-    drag_of,
-)
+from pipeline.estimation.mechanical.drag import drag_of
+from pipeline.estimation.mechanical.drag_fit import DragFit
+from pipeline.estimation.mechanical.drag_forms import CURVE, DRAG_FORMS, KNOTS, SHAPES, STRIBECK
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.numerics.least_squares import linear_fit
 

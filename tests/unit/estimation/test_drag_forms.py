@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.estimation.mechanical.drag import BUMPS, KNOTS, SHAPES
+from pipeline.estimation.mechanical.drag_forms import BUMPS, KNOTS, SHAPES
 from pipeline.estimation.policy import DEFAULT
 
 

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.estimation.electrical.back_emf import Channel, Spin
 from pipeline.estimation.electrical.hand_turns import (
     _amplitude,
     _at_rest,
@@ -26,6 +25,7 @@ from pipeline.estimation.electrical.hand_turns import (
     _steps_fit,
     turns_of,
 )
+from pipeline.estimation.electrical.spin import Channel, Spin
 from pipeline.numerics.integrals import REST
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import white_noise_sigma

@@ -158,7 +158,7 @@ def test_inertia_of_a_short_drive_is_right_or_refused(length_s: float) -> None:
 
 
 def test_torque_that_is_friction_in_disguise_is_not_parted() -> None:
-    from pipeline.estimation.mechanical.drag import torque_is_separable
+    from pipeline.estimation.mechanical.drive_windows import torque_is_separable
 
     sense, speed = np.ones(40), np.linspace(1.0, 3.0, 40)
     rest = [sense, speed]

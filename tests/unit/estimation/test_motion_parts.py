@@ -13,25 +13,24 @@ from pipeline.estimation.estimators import drive_voltage, feedforward, lcr, spin
 from pipeline.estimation.estimators.drive_voltage import VoltageRows, q_voltage
 from pipeline.estimation.mechanical import drag
 from pipeline.estimation.mechanical.drag import (
+    _drag_part,
+    _form_allowance,
+    _row_sigma,
+    _without_negative_excess,
+)
+from pipeline.estimation.mechanical.drag_fit import Design, DragFit
+from pipeline.estimation.mechanical.drag_forms import (
     CURVE,
     DRAG_FORMS,
     KNOTS,
     STRIBECK,
-    Design,
-    DragFit,
-    _balanced,
-    _drag_part,
-    _form,
     _hat,
-    _low_end,
-    _without_dip,
-    freedom,
-    too_short,
-    torque_is_separable,
+    low_end,
 )
+from pipeline.estimation.mechanical.drive_windows import freedom, too_short, torque_is_separable
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from tests.unit.estimation.signals import capture, estimates
@@ -109,10 +108,10 @@ def test_each_kind_of_row_has_the_noise_that_it_leaves() -> None:
     x = rng.standard_normal(4000)
     noise = np.concatenate([0.5 * rng.standard_normal(2000), 0.02 * rng.standard_normal(2000)])
     rows = rows_of((2000, 2000))
-    sigma = _balanced(rows, x[:, None], 3.0 * x + noise)
+    sigma = _row_sigma(rows, x[:, None], 3.0 * x + noise)
     assert sigma[:2000] == pytest.approx(0.5, rel=0.05)
     assert sigma[2000:] == pytest.approx(0.02, rel=0.05)
-    exact = _balanced(rows, x[:, None], 3.0 * x)
+    exact = _row_sigma(rows, x[:, None], 3.0 * x)
     assert exact == pytest.approx(1e-6 * float(np.std(3.0 * x)))
 
 
@@ -162,7 +161,7 @@ def test_constants_from_coefficients() -> None:
     free = fit_of([4.0, *curve], True)
     assert free.constants(free.coefficients) == pytest.approx([0.25, 0.75, 0.025])
     bent = curve + 1e-4 * knots**2
-    level, slope = _low_end(bent, 200.0)
+    level, slope = low_end(bent, 200.0)
     assert level == pytest.approx(float(np.polyfit(knots[:3], bent[:3], 1)[1]))
     assert slope == pytest.approx(float(np.polyfit(knots, bent, 1)[0]))
     # the factor's square is the covariance by the gradient: 1/g, a/g, b/g
@@ -179,16 +178,16 @@ def test_the_allowance_for_a_form_that_is_free() -> None:
     knots = np.array(KNOTS) * 200.0
     curve = 3.0 + 0.1 * knots
     curve[0] += 0.6
-    allowance, reasons = _form(np.array([4.0, *curve]), True, rows)
+    allowance, reasons = _form_allowance(np.array([4.0, *curve]), True, rows)
     torque = curve / 4.0
-    level = _low_end(torque, 200.0)[0]
+    level = low_end(torque, 200.0)[0]
     beyond = torque[1] - (torque[2] - torque[1]) * KNOTS[1] / (KNOTS[2] - KNOTS[1])
     assert beyond == pytest.approx(0.75)
     spread = max(abs(torque[0] - level), abs(beyond - level))
     assert allowance == pytest.approx([0.0, spread, 0.0])
     slopes = np.diff(torque) / np.diff(knots)
     assert f"from {slopes.min():.2g} to {slopes.max():.2g} N·m·s/rad" in reasons[2]
-    assert _form(np.array([4.0, 1.0, 1.0]), False, rows)[1] == ("", "", "")
+    assert _form_allowance(np.array([4.0, 1.0, 1.0]), False, rows)[1] == ("", "", "")
 
 
 def test_an_excess_below_coulomb_friction_is_left_out() -> None:
@@ -199,7 +198,7 @@ def test_an_excess_below_coulomb_friction_is_left_out() -> None:
     candidates = {bump: -DRAG_FORMS[bump](x), "offset": np.ones(300)}
     for size, kept in ((0.5, [bump, "offset"]), (-0.5, ["offset"])):
         y = base @ np.array([2.0, 3.0, 1.0]) + size * candidates[bump] + 0.1
-        assert _without_dip([bump, "offset"], base, candidates, y, np.ones(300)) == kept
+        assert _without_negative_excess([bump, "offset"], base, candidates, y, np.ones(300)) == kept
 
 
 def test_the_drag_of_a_fit_in_torque() -> None:
@@ -219,14 +218,14 @@ def test_the_doubt_of_a_shape_is_half_of_what_the_next_best_moves() -> None:
     y = base @ np.array([2.0, 3.0, 1.0]) + 0.8 * candidates[used]
     sigma = np.ones(400)
     own = linear_fit(np.column_stack([base, candidates[used]]), y, sigma).coefficients
-    found = drag._shape_doubt(base, candidates, [used], own, y, sigma)
+    found = drag._shape_allowance(base, candidates, [used], own, y, sigma)
     others = [linear_fit(np.column_stack([base, candidates[n]]), y, sigma)
               for n in STRIBECK if n.split()[1] != used.split()[1]]  # fmt: skip
     best = min(others, key=lambda one: float(one.residuals @ one.residuals)).coefficients
     expected = [0.0] + [abs(best[k] / best[0] - own[k] / own[0]) / 2.0 for k in (1, 2)]
     assert found == pytest.approx(expected)
     assert found[1] > 0.0
-    assert drag._shape_doubt(base, candidates, [], own, y, sigma).tolist() == [0.0, 0.0, 0.0]
+    assert drag._shape_allowance(base, candidates, [], own, y, sigma).tolist() == [0.0, 0.0, 0.0]
 
 
 # Rows of motion

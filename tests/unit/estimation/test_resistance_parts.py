@@ -18,7 +18,7 @@ from pipeline.estimation.estimators.resistance import (
     fit_direct_current,
     terminal_voltage,
 )
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from tests.unit.estimation.points import MAP
 
 

@@ -23,13 +23,12 @@ from pipeline.estimation.electrical.step_fit import (
     row_variance,
     solve,
 )
-from pipeline.estimation.electrical.step_model import (
+from pipeline.estimation.electrical.step_model import StepModel, _covered, _steps
+from pipeline.estimation.electrical.step_parameters import (
     LD,
     LQ,
     SHARED,
-    StepModel,
-    _covered,
-    _steps,
+    difference_widths,
     drive_of,
     slots_of,
     start_of,
@@ -395,7 +394,7 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
     (first,) = model.predict_both([values[None, :]])
     rows = model.records[0].i_a.size
     assert residuals[:rows] == pytest.approx(3.0 * (first[0][:, 0] - model.records[0].i_a))
-    widths = model._widths(values)
+    widths = difference_widths(model.records, model.layout, values)
     for place in range(values.size):
         ends = []
         for side in (-1.0, 1.0):
@@ -410,7 +409,7 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
 def test_bounds_keep_resistances_positive_and_edges_near() -> None:
     model = model_of(step(noise=1e-3, source=0.2))
     start = start_of(model.records, model.layout)
-    low, high = model.bounds(start)
+    low, high = model.layout.bounds(start)
     at, own = model.layout.starts[0], model.layout.slots[0]
     assert low[[LD, LQ]] == pytest.approx(1e-3 * start[[LD, LQ]])
     assert low[at] == pytest.approx(0.6 * start[at])

@@ -17,7 +17,7 @@ from pipeline.estimation.estimators.inertia import (
     _torque,
     driving_torque,
 )
-from pipeline.estimation.mechanical.drag import DragFit
+from pipeline.estimation.mechanical.drag_fit import DragFit
 from pipeline.estimation.mechanical.locked_rotor import angle_doubt, ripple_share, standstill_words
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.estimation.uncertainty.agreement import judges, reconciled

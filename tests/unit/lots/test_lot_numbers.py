@@ -19,7 +19,7 @@ from pipeline.lots.lot_test import detectable, power
 from pipeline.lots.sample import Value, _to_reference, independent, lots_in_order, values_of
 from pipeline.lots.traits import Shown, _orders, _verdict, compare_traits, effects_shown
 from pipeline.lots.verdict import Answers, Judged, _changed, _not_failed, _p, judge, overall
-from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import Term
 from pipeline.records.diagnosis_summary import DiagnosisSummary
 from pipeline.records.limits import Amount, ConstantLimits

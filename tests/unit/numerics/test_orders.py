@@ -7,25 +7,17 @@ import pytest
 from scipy.special import jv
 from scipy.stats import f
 
+from pipeline.numerics.order_waveform import half_peak_to_peak, waveform
 from pipeline.numerics.orders import (
     MOST_LINES,
     OrderLine,
-    Spectrum,
-    Turn,
     detection_limit,
-    even_positions,
     find_orders,
-    half_peak_to_peak,
-    held_out_gain,
-    largest_order,
-    noise_power,
     orders_present,
-    passes,
     phase_modulated,
-    spectrum,
-    waveform,
-    whole_turns,
 )
+from pipeline.numerics.turn_spectrum import Spectrum, held_out_gain, noise_power, spectrum
+from pipeline.numerics.turns import Turn, even_positions, largest_order, passes, whole_turns
 
 
 def turns(

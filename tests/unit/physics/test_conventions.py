@@ -10,12 +10,38 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.physics import conventions as c
+from pipeline.physics.copper import (
+    COPPER_COEFFICIENT_25_1_K,
+    coefficient_at_1_k,
+    copper_resistance_ohm,
+    copper_temperature_degc,
+    linear_resistance_ohm,
+)
+from pipeline.physics.coupling import (
+    COUPLINGS,
+    CouplingName,
+    coupling_as,
+    coupling_from,
+    motor_constant_nm_sqrt_w,
+)
+from pipeline.physics.pole_pairs import pole_pairs_from
 from pipeline.physics.suspects import CONVENTIONS, convention_suspect
+from pipeline.physics.windings import (
+    delta_from_wye,
+    delta_windings_ohm,
+    line_from_phase,
+    line_resistances_ohm,
+    phase_from_line,
+    phase_resistances_ohm,
+    saliency_words,
+    terminal_inductance_h,
+    unaligned_inductances_h,
+    wye_from_delta,
+)
 
 # The worked example: 7 pole pairs, 304 rpm/V of line-line peak back-EMF.
 K_EXAMPLE = 0.018136
-EXAMPLE: dict[c.CouplingName, float] = {
+EXAMPLE: dict[CouplingName, float] = {
     "ke_phase_peak_v_s_rad": 0.018136,
     "ke_ll_peak_v_s_rad": 0.031412,
     "ke_ll_peak_v_krpm": 3.289,
@@ -33,19 +59,19 @@ ANGLE = st.floats(-10.0, 10.0)
 
 
 def test_every_convention_has_a_worked_value() -> None:
-    assert set(EXAMPLE) == set(c.COUPLINGS)
+    assert set(EXAMPLE) == set(COUPLINGS)
 
 
 @pytest.mark.parametrize(("name", "value"), EXAMPLE.items())
-def test_coupling_example(name: c.CouplingName, value: float) -> None:
-    assert c.coupling_as(name, K_EXAMPLE) == pytest.approx(value, rel=2e-4)
-    assert c.coupling_from(name, value) == pytest.approx(K_EXAMPLE, rel=2e-4)
+def test_coupling_example(name: CouplingName, value: float) -> None:
+    assert coupling_as(name, K_EXAMPLE) == pytest.approx(value, rel=2e-4)
+    assert coupling_from(name, value) == pytest.approx(K_EXAMPLE, rel=2e-4)
 
 
 @given(k=POSITIVE)
 def test_couplings_invert(k: float) -> None:
-    for name in c.COUPLINGS:
-        assert c.coupling_from(name, c.coupling_as(name, k)) == pytest.approx(k, rel=1e-12)
+    for name in COUPLINGS:
+        assert coupling_from(name, coupling_as(name, k)) == pytest.approx(k, rel=1e-12)
 
 
 def test_couplings_from_the_waveforms_themselves() -> None:
@@ -54,71 +80,71 @@ def test_couplings_from_the_waveforms_themselves() -> None:
     turn = np.arange(6000) * 2.0 * np.pi / 6000.0
     phases = [-k * omega * np.sin(turn - shift) for shift in (0.0, 2 * np.pi / 3, -2 * np.pi / 3)]
     line = phases[0] - phases[1]
-    assert c.coupling_as("ke_ll_peak_v_s_rad", k) == pytest.approx(line.max() / omega, rel=1e-6)
+    assert coupling_as("ke_ll_peak_v_s_rad", k) == pytest.approx(line.max() / omega, rel=1e-6)
     rms = math.sqrt(float(np.mean(line**2)))
-    assert c.coupling_as("ke_ll_rms_v_s_rad", k) == pytest.approx(rms / omega, rel=1e-9)
+    assert coupling_as("ke_ll_rms_v_s_rad", k) == pytest.approx(rms / omega, rel=1e-9)
     # One ampere (peak) in phase with the back-EMF: torque is the air-gap power over the speed.
     power = sum(e * (-np.sin(turn - s)) for e, s in zip(phases, (0, 2.0944, -2.0944), strict=True))
-    assert c.coupling_as("kt_peak_nm_a", k) == pytest.approx(power.mean() / omega, rel=1e-5)
+    assert coupling_as("kt_peak_nm_a", k) == pytest.approx(power.mean() / omega, rel=1e-5)
     # Six-step: the DC ampere runs through the two phases of the highest line-line voltage.
     envelope = np.max([abs(phases[i] - phases[j]) for i, j in ((0, 1), (1, 2), (2, 0))], axis=0)
-    assert c.coupling_as("kt_six_step_nm_a", k) == pytest.approx(envelope.mean() / omega, rel=1e-5)
+    assert coupling_as("kt_six_step_nm_a", k) == pytest.approx(envelope.mean() / omega, rel=1e-5)
     krpm_rad_s = 1000.0 * 2.0 * math.pi / 60.0
-    assert c.coupling_as("ke_ll_peak_v_krpm", k) == pytest.approx(math.sqrt(3) * k * krpm_rad_s)
+    assert coupling_as("ke_ll_peak_v_krpm", k) == pytest.approx(math.sqrt(3) * k * krpm_rad_s)
     volts_per_rpm = line.max() / (omega * 60.0 / (2.0 * math.pi))
-    assert c.coupling_as("kv_ll_peak_rpm_v", k) == pytest.approx(1.0 / volts_per_rpm, rel=1e-6)
+    assert coupling_as("kv_ll_peak_rpm_v", k) == pytest.approx(1.0 / volts_per_rpm, rel=1e-6)
 
 
 def test_motor_constant_is_torque_over_root_of_loss() -> None:
     kt, r, i_peak = 0.3, 0.7, 2.0
     loss_w = 3.0 * (i_peak / math.sqrt(2.0)) ** 2 * r
-    assert c.motor_constant_nm_sqrt_w(kt, r) == pytest.approx(kt * i_peak / math.sqrt(loss_w))
+    assert motor_constant_nm_sqrt_w(kt, r) == pytest.approx(kt * i_peak / math.sqrt(loss_w))
 
 
 def test_one_ohm_line_to_line_is_half_an_ohm_a_phase() -> None:
-    assert c.phase_from_line(1.0) == 0.5
-    assert c.line_from_phase(0.5) == 1.0
+    assert phase_from_line(1.0) == 0.5
+    assert line_from_phase(0.5) == 1.0
     # The delta winding of 1.5 ohm reads 1.5 against 3 in parallel: 1 ohm.
-    winding = c.delta_from_wye(0.5)
+    winding = delta_from_wye(0.5)
     assert winding == 1.5
     assert 1.0 / (1.0 / winding + 1.0 / (2.0 * winding)) == pytest.approx(1.0)
-    assert c.wye_from_delta(winding) == 0.5
+    assert wye_from_delta(winding) == 0.5
 
 
 @given(ra=POSITIVE, rb=POSITIVE, rc=POSITIVE)
 def test_unbalanced_resistances(ra: float, rb: float, rc: float) -> None:
     """Round trip, and the delta of the same terminals read pair by pair."""
-    lines = c.line_resistances_ohm(ra, rb, rc)
-    assert c.phase_resistances_ohm(*lines) == pytest.approx(
+    lines = line_resistances_ohm(ra, rb, rc)
+    assert phase_resistances_ohm(*lines) == pytest.approx(
         (ra, rb, rc), rel=1e-9, abs=1e-12 * max(ra, rb, rc)
     )
-    ab, bc, ca = c.delta_windings_ohm(ra, rb, rc)
+    ab, bc, ca = delta_windings_ohm(ra, rb, rc)
     assert 1.0 / (1.0 / ab + 1.0 / (bc + ca)) == pytest.approx(lines[0], rel=1e-9)
     assert 1.0 / (1.0 / bc + 1.0 / (ca + ab)) == pytest.approx(lines[1], rel=1e-9)
     assert 1.0 / (1.0 / ca + 1.0 / (ab + bc)) == pytest.approx(lines[2], rel=1e-9)
 
 
 def test_copper_half_an_ohm_at_70_degc() -> None:
-    assert float(c.copper_resistance_ohm(0.5, 70.0, 20.0)) == pytest.approx(0.598, abs=5e-4)
-    by_coefficient = c.linear_resistance_ohm(0.5, 20.0, 70.0, 0.00393, 20.0)
+    assert float(copper_resistance_ohm(0.5, 70.0, 20.0)) == pytest.approx(0.598, abs=5e-4)
+    by_coefficient = linear_resistance_ohm(0.5, 20.0, 70.0, 0.00393, 20.0)
     assert by_coefficient == pytest.approx(0.5 * (1.0 + 0.00393 * 50.0), rel=1e-12)
-    many = c.copper_resistance_ohm(0.5, np.array([20.0, 70.0]), 20.0)
+    many = copper_resistance_ohm(0.5, np.array([20.0, 70.0]), 20.0)
     assert many == pytest.approx([0.5, 0.5 * 304.5 / 254.5])
 
 
 @given(r=POSITIVE, temp=st.floats(-60.0, 250.0), reference=st.floats(-60.0, 250.0))
 def test_copper_forms_agree_and_invert(r: float, temp: float, reference: float) -> None:
-    hot = float(c.copper_resistance_ohm(r, temp, reference))
-    assert float(c.copper_resistance_ohm(hot, reference, temp)) == pytest.approx(r, rel=1e-12)
-    assert c.copper_temperature_degc(hot, r, reference) == pytest.approx(temp, abs=1e-9)
-    alpha = c.coefficient_at_1_k(c.COPPER_COEFFICIENT_25_1_K, 25.0, 80.0)
-    linear = c.linear_resistance_ohm(r, reference, temp, alpha, 80.0)
+    hot = float(copper_resistance_ohm(r, temp, reference))
+    assert float(copper_resistance_ohm(hot, reference, temp)) == pytest.approx(r, rel=1e-12)
+    assert copper_temperature_degc(hot, r, reference) == pytest.approx(temp, abs=1e-9)
+    alpha = coefficient_at_1_k(COPPER_COEFFICIENT_25_1_K, 25.0, 80.0)
+    linear = linear_resistance_ohm(r, reference, temp, alpha, 80.0)
     assert linear == pytest.approx(hot, rel=1e-9)
 
 
 def test_copper_coefficient_at_20_and_25_degc() -> None:
-    assert pytest.approx(0.003854, abs=5e-7) == c.COPPER_COEFFICIENT_25_1_K
-    at_20 = c.coefficient_at_1_k(c.COPPER_COEFFICIENT_25_1_K, 25.0, 20.0)
+    assert pytest.approx(0.003854, abs=5e-7) == COPPER_COEFFICIENT_25_1_K
+    at_20 = coefficient_at_1_k(COPPER_COEFFICIENT_25_1_K, 25.0, 20.0)
     assert at_20 == pytest.approx(0.00393, abs=1e-6)
 
 
@@ -135,20 +161,20 @@ def _terminal_inductance_h(ld: float, lq: float, theta: float, pair: str) -> flo
 def test_terminal_inductance_of_each_pair(ld: float, lq: float, theta: float) -> None:
     for pair in ("ab", "bc", "ca"):
         expected = _terminal_inductance_h(ld, lq, theta, pair)
-        got = float(c.terminal_inductance_h(ld, lq, theta, pair))
+        got = float(terminal_inductance_h(ld, lq, theta, pair))
         assert got == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 def test_terminal_inductance_at_the_axes() -> None:
     at = np.deg2rad([-30.0, 150.0, 60.0, 240.0])
-    assert c.terminal_inductance_h(1.0, 3.0, at, "ab") == pytest.approx([2.0, 2.0, 6.0, 6.0])
-    assert float(c.terminal_inductance_h(1.0, 3.0, 0.5 * math.pi, "bc")) == pytest.approx(2.0)
+    assert terminal_inductance_h(1.0, 3.0, at, "ab") == pytest.approx([2.0, 2.0, 6.0, 6.0])
+    assert float(terminal_inductance_h(1.0, 3.0, 0.5 * math.pi, "bc")) == pytest.approx(2.0)
 
 
 @given(low=st.floats(1e-5, 1.0), ratio=st.floats(1.01, 5.0), theta=st.floats(0.0, math.pi))
 def test_three_pairs_at_an_unknown_angle(low: float, ratio: float, theta: float) -> None:
-    read = [float(c.terminal_inductance_h(low, low * ratio, theta, p)) for p in ("ab", "bc", "ca")]
-    found = c.unaligned_inductances_h(*read)
+    read = [float(terminal_inductance_h(low, low * ratio, theta, p)) for p in ("ab", "bc", "ca")]
+    found = unaligned_inductances_h(*read)
     assert found.low_h == pytest.approx(low, rel=1e-9)
     assert found.high_h == pytest.approx(low * ratio, rel=1e-9)
     off = (found.theta_low_rad - theta + math.pi / 2.0) % math.pi - math.pi / 2.0
@@ -159,10 +185,10 @@ def test_three_pairs_at_an_unknown_angle(low: float, ratio: float, theta: float)
 
 
 def test_saliency_words() -> None:
-    assert c.saliency_words(3.6 / 1.8) == "interior magnets, salient"
-    assert c.saliency_words(1.04) == "surface magnets, not salient"
-    assert c.saliency_words(1.2, u=0.2) == "surface magnets, not salient"
-    assert "exchanged" in c.saliency_words(0.5)
+    assert saliency_words(3.6 / 1.8) == "interior magnets, salient"
+    assert saliency_words(1.04) == "surface magnets, not salient"
+    assert saliency_words(1.2, u=0.2) == "surface magnets, not salient"
+    assert "exchanged" in saliency_words(0.5)
 
 
 @pytest.mark.parametrize(
@@ -170,7 +196,7 @@ def test_saliency_words() -> None:
     [(7.0, 1.0, 7), (-70.1, 10.0, 7), (7.03, 1.0, None), (0.01, 1.0, None), (50.0, 25.0, 2)],
 )
 def test_pole_pairs(electrical: float, mechanical: float, expected: int | None) -> None:
-    found = c.pole_pairs_from(electrical, mechanical)
+    found = pole_pairs_from(electrical, mechanical)
     assert found.number == expected
     assert found.ratio == pytest.approx(abs(electrical / mechanical))
 
@@ -256,8 +282,8 @@ def test_the_labels_are_their_numbers() -> None:
 
 def test_copper_at_25_degrees() -> None:
     """1/259.5 = 0.003854 a kelvin; 0.500 ohm at 20 degC is 0.598 ohm at 70 (0.00393 at 20)."""
-    assert pytest.approx(0.003854, abs=5e-7) == c.COPPER_COEFFICIENT_25_1_K
-    at_20 = c.COPPER_COEFFICIENT_25_1_K / (1.0 - 5.0 * c.COPPER_COEFFICIENT_25_1_K)
+    assert pytest.approx(0.003854, abs=5e-7) == COPPER_COEFFICIENT_25_1_K
+    at_20 = COPPER_COEFFICIENT_25_1_K / (1.0 - 5.0 * COPPER_COEFFICIENT_25_1_K)
     assert at_20 == pytest.approx(0.00393, abs=5e-6)
 
 
@@ -274,12 +300,12 @@ def test_copper_at_25_degrees() -> None:
     ],
 )
 def test_saliency_beyond_a_tenth_and_two_u(ratio: float, u: float, word: str) -> None:
-    assert word in (c.saliency_words(ratio, u) if u else c.saliency_words(ratio))
+    assert word in (saliency_words(ratio, u) if u else saliency_words(ratio))
 
 
 @pytest.mark.parametrize(("off", "number"), [(0.0199, 7), (0.0201, None)])
 def test_pole_pairs_within_two_hundredths(off: float, number: int | None) -> None:
     for count in (7.0 - off, 7.0 + off):
-        assert c.pole_pairs_from(count * 10.0, 10.0).number == number
-    assert c.pole_pairs_from(0.01, 10.0).number is None
-    assert c.pole_pairs_from(-10.0, 10.0).number == 1
+        assert pole_pairs_from(count * 10.0, 10.0).number == number
+    assert pole_pairs_from(0.01, 10.0).number is None
+    assert pole_pairs_from(-10.0, 10.0).number == 1

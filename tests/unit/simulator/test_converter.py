@@ -7,7 +7,8 @@ import pytest
 
 from pipeline.simulator import converter
 from pipeline.simulator.bench import record
-from pipeline.simulator.converter import COLUMNS, Control
+from pipeline.simulator.control import Control
+from pipeline.simulator.converter import COLUMNS
 from pipeline.simulator.field import energy
 from pipeline.simulator.locked import pair_step
 from pipeline.simulator.plant import plant_of

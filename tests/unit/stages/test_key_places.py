@@ -16,7 +16,8 @@ from pipeline.execution.caches import fits, keys, run_cache
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.tasks.work import Stamp
 from pipeline.io.ingest.guard import ReadLimits
-from pipeline.io.ingest.survey import Question, Survey, look, survey
+from pipeline.io.ingest.identification import Question, identify
+from pipeline.io.ingest.survey import Survey, survey
 from pipeline.io.maps.source_map import FieldMap, SourceMap
 from pipeline.records.constants import Constants
 from pipeline.records.errors import UsageError
@@ -94,7 +95,7 @@ def test_an_answer_is_kept_until_what_it_hangs_on_changes(
     beside.write_text("motor_id: m\ntest: drive\n")
     question = Question("a.txt", "a.meta.yaml", (("lot", "7"),))
     sources, limits = {"hall": HALL}, ReadLimits()
-    answer = look(folder, question, sources)
+    answer = identify(folder, question, sources)
     assert answer.entry is not None
 
     def known(

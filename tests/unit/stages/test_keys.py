@@ -17,8 +17,10 @@ import pytest
 
 from pipeline.execution.caches import keys
 from pipeline.execution.jobs import MotorJob
+from pipeline.io.ingest.entry import Entry
 from pipeline.io.ingest.guard import ReadLimits
-from pipeline.io.ingest.survey import Entry, Question, Survey
+from pipeline.io.ingest.identification import Question
+from pipeline.io.ingest.survey import Survey
 from pipeline.io.maps.source_map import FieldMap, SourceMap, TimeMap
 from pipeline.io.tables.csv_dialect import CsvDialect
 from pipeline.records.capture import Campaign, Capture, CaptureMeta, Mask
