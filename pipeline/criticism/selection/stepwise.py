@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -332,14 +331,14 @@ def _is_determined(system: LinearSystem) -> bool:
     held_out = leave_out(system)
     sure = significantly_nonzero(system, held_out, system.policy.selection.least_u)
     parameters = effect.parameters_of(system.fit.machine)
-    least, size = system.policy.selection.least_u, partial(system.fit.size, effect)
-    nonzero = [
-        p for p in parameters if f"{effect.name}.{p.name}" in sure or 0.0 < least * p.u < size(p)
-    ]
+    least, discrimination = system.policy.selection.least_u, discriminate(system.fit, effect)
+    excluded = discrimination is not None and discrimination.name is None
+    logged = {p.name: (system.fit.size(effect, p), p.u) for p in parameters if p.u > 0.0}
+    logged |= discrimination.values if discrimination is not None else {}
+    by_logs = {name for name, (size, u) in logged.items() if size > least * u}
+    nonzero = [p for p in parameters if f"{effect.name}.{p.name}" in sure or p.name in by_logs]
     twists = [p for p in parameters if p.negligible > 0 and not p.amplitude]
     coupled = effect.discriminator is None or not twists or any(p in nonzero for p in twists)
-    discrimination = discriminate(system.fit, effect) if coupled else None
-    excluded = discrimination is not None and discrimination.name is None
     amplitudes = [f"{effect.name}.{p.name}" for p in parameters if p.amplitude]
     present = any(p.amplitude for p in nonzero) or together_nonzero(
         system, held_out, amplitudes, least

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.criticism.effect import Discrimination
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.model import Model
+from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.fit import Fit, floors
@@ -19,6 +20,7 @@ from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.stepwise import (
     _floored_anew,
     _form_error_factors,
+    _is_determined,
     _same_hook,
     material,
     search,
@@ -270,3 +272,21 @@ def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkey
     assert search(fitted(hidden), LIBRARY)[-1].added == ("windage",)
     monkeypatch.setattr("pipeline.criticism.selection.stepwise._is_determined", unsure)
     assert search(fitted(hidden), LIBRARY)[-1].added == ()
+
+
+@pytest.mark.parametrize(("logged", "determined"), [({}, False), ({"gap_rad": (5e-3, 1e-4)}, True)])
+def test_a_gap_that_windows_leave_open_is_determined_where_full_logs_show_it(
+    monkeypatch, logged, determined
+):
+    effect = effects()["backlash"]
+    fit = fitted((log(noise=1.0), log(noise=1.0, seed=6)))
+    model = fit.model.with_effects(effect)
+    loose = {"backlash.share": 0.5, "backlash.gap_rad": 1e-3, "backlash.twist_rad": 3e-3}
+    values = {**fit.values, **zero(effect, model), **loose}
+    coupled = linear_system(replace(fit, model=model, values=values))
+    for name, answer in (
+        ("significantly_nonzero", {"backlash.share"}),
+        ("discriminate", Discrimination("backlash", logged)),
+    ):
+        monkeypatch.setattr(f"pipeline.criticism.selection.stepwise.{name}", lambda *_, a=answer: a)
+    assert _is_determined(coupled) is determined
