@@ -40,10 +40,11 @@ from pipeline.criticism.selection.missing_data import (
     unused_captures,
 )
 from pipeline.criticism.selection.one_capture import rests_on
-from pipeline.criticism.selection.requested_model import BaseFit, fit_of, frame_notes
+from pipeline.criticism.selection.requested_model import BaseFit, fit_of
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
 from pipeline.criticism.selection.stepwise import LadderStep, loss_without
 from pipeline.criticism.selection.transducer_place import place_notes
+from pipeline.criticism.selection.voltage_frame import frame_notes
 from pipeline.criticism.validation.signature import signature
 from pipeline.physics.notation import number_text
 from pipeline.records.capture import Campaign

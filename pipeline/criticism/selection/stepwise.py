@@ -44,6 +44,7 @@ from pipeline.criticism.selection.score_test import (
     widened,
 )
 from pipeline.criticism.selection.transducer_place import at_better_place
+from pipeline.criticism.selection.voltage_frame import in_better_frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +122,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         if chosen is None:
             break
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
-        fit = at_better_place(reconsidered(_backward(chosen, base))).fit
+        fit = at_better_place(in_better_frame(reconsidered(_backward(chosen, base)))).fit
         effects = fit.model.effects[base:]
         fit = replace(fit, tolerance=tolerances(fit, effects))
         if effects:

@@ -16,6 +16,7 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.score_test import clears
 
 TORQUE = "torque_shaft_nm"
 _STATOR = (
@@ -36,18 +37,21 @@ def at_better_place(system: LinearSystem) -> LinearSystem:
     -------
     LinearSystem
         The same where no torque is over its floor, or the other place does not lower the deviance
-        by `policy.selection.tie`.
+        by `policy.selection.tie` or leaves most of the torque's excess: what neither place explains
+        is an effect's, and no coupling shows at the stator.
 
     """
     significant = significant_groups(system)
-    torques = [channel == TORQUE for _, channel, _ in system.labels]
+    torques = np.array([channel == TORQUE for _, channel, _ in system.labels])
     if not significant[torques].any():
         return system
     segments = tuple(_at_other_place(s) if _reads_torque(s) else s for s in system.segments)
     # only the inertia's column is another there
     kept = np.flatnonzero([column.name != "j_kgm2" for column in system.columns])
     other = gauss_newton(replace(system.fit, segments=segments), before=system.only(kept))
-    return other if other.deviance < system.deviance - system.policy.selection.tie else system
+    before, after = (one.reduced_chi2(one.residual) for one in (system, other))
+    explains = other.deviance < system.deviance - system.policy.selection.tie
+    return other if explains and clears(system, significant & torques, before, after) else system
 
 
 def place_notes(segments: Sequence[Segment]) -> tuple[str, ...]:

@@ -12,7 +12,8 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.equations.dq import _shortened
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.residuals.residual import residual
-from pipeline.criticism.selection.requested_model import fit_of, frame_notes
+from pipeline.criticism.selection.requested_model import fit_of
+from pipeline.criticism.selection.voltage_frame import frame_notes
 from tests.unit.criticism.machines import BASE, log, machine
 
 EVERY = 60
