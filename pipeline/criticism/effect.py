@@ -159,13 +159,15 @@ class Evidence:
     `tests` those that excite it, the best first, and `experiment` the one to record.
 
     `alternatives`: other effects, each with the test or calibration that discriminates it from
-    this. `rare`: benches seldom have it, so that of two that tie the other is named.
+    this. `rare`: benches seldom have it, so that of two that tie the other is named. `in_place_of`:
+    a nuisance, zero in a model with the effect, and the parameter that is it at an unusual size.
     """
 
     tests: tuple[str, ...]
     experiment: str
     signals: tuple[str, ...] = ()
     rare: bool = False
+    in_place_of: tuple[str, str] | None = None
     alternatives: Mapping[str, str] = field(default_factory=dict)
 
 

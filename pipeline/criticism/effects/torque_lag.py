@@ -48,5 +48,6 @@ EFFECT = Effect(
         choice("stamped", (0.0, 1.0), "1: all of the delay is a late stamp, 0: a first-order lag"),
     ),
     signals=("torque_shaft_nm", "iq_a"),
+    in_place_of=("late_torque_s", "lag_s"),
     load=_load,
 )

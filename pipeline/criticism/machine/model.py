@@ -122,6 +122,8 @@ BASE: tuple[Constant, ...] = (
 )
 UNLOGGED_AT_REST = "unlogged_rest_k"
 """That of the winding in tests at rest: they warm it little, and show nothing of one that turns."""
+_NOTHING = 1e-6
+"""Share of its usual size that a nuisance keeps beside an effect that names it."""
 LATE_TORQUE = "late_torque_s"
 """Nuisance of every transducer: its filter."""
 LATE_SPEED = "late_speed_s"
@@ -210,6 +212,11 @@ class Model:
             for c, u in base
             if u is not None
         }
+        for effect in self.effects:
+            if effect.in_place_of is not None:
+                nuisance, _ = effect.in_place_of
+                center, u = priors[nuisance]
+                priors[nuisance] = center, _NOTHING * u
         priors |= {n: p.usual for n, (_, p) in self.parameters().items() if p.usual is not None}
         return priors | self.stated()
 

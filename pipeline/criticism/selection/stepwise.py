@@ -44,6 +44,7 @@ from pipeline.criticism.selection.score_test import (
     widened,
 )
 from pipeline.criticism.selection.transducer_place import at_better_place
+from pipeline.criticism.selection.unusual_nuisances import with_nuisances
 from pipeline.criticism.selection.voltage_frame import in_better_frame
 
 
@@ -101,6 +102,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         wide = widened(fit, offered, steps[-1].system if steps else None)
         significant = significant_groups(wide)
         scores = score_all(wide, offered, significant)
+        scores = with_nuisances(wide, offered, scores)
         scores = with_starts(wide, offered, scores, significant)
         scores = with_linear_start(wide, offered, scores, significant)
         scores = with_log_start(wide, offered, scores, significant)
@@ -455,8 +457,11 @@ def begin_from(fit: Fit, score: Score) -> Fit:
         The score of the candidate.
 
     """
-    model = fit.model.with_effects(score.candidate.effect)
+    effect = score.candidate.effect
+    model = fit.model.with_effects(effect)
     moved = {name: fit.values[name] + change for name, change in score.moves.items()}
+    if effect.in_place_of is not None:
+        moved[effect.in_place_of[0]] = 0.0
     start = {**moved, **score.candidate.values, **score.step}
     return replace(fit, model=model).at(start)
 

@@ -12,9 +12,11 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.score_test import candidates, score_all, widened
-from pipeline.criticism.selection.stepwise import search
+from pipeline.criticism.selection.stepwise import begin_from, search
+from pipeline.criticism.selection.unusual_nuisances import with_nuisances
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
@@ -106,18 +108,38 @@ def test_the_filter_of_a_transducer_is_undone():
     assert np.abs(undone - clean).max() < 1e-3 * off
 
 
+def filtered(late_s, seed):
+    """The log behind a transducer's filter."""
+    segment = log(seed=seed, noise=1.0)
+    torque = segment.recorded["torque_shaft_nm"]
+    slope = np.gradient(log().recorded["torque_shaft_nm"], segment.ts_s)
+    return replace(
+        segment, recorded={**segment.recorded, "torque_shaft_nm": torque - late_s * slope}
+    )
+
+
+def fitted_behind(late_s):
+    segments, model = (filtered(late_s, 5), filtered(late_s, 6)), Model(machine(), ())
+    start = Fit(segments, model, dict(BASE), floors(segments, model, BASE), BASE)
+    return gauss_newton(start).fit
+
+
 @pytest.mark.parametrize(("late_s", "named"), [(2e-5, set()), (2e-3, {"torque_lag"})])
 def test_a_usual_filter_is_a_nuisance_and_a_long_one_a_name(late_s, named):
-    def filtered(seed):
-        segment = log(seed=seed, noise=1.0)
-        torque = segment.recorded["torque_shaft_nm"]
-        slope = np.gradient(log().recorded["torque_shaft_nm"], segment.ts_s)
-        return replace(
-            segment, recorded={**segment.recorded, "torque_shaft_nm": torque - late_s * slope}
-        )
-
-    segments, model = (filtered(5), filtered(6)), Model(machine(), ())
-    start = Fit(segments, model, dict(BASE), floors(segments, model, BASE), BASE)
-    fit = gauss_newton(start).fit
+    fit = fitted_behind(late_s)
     library = {n: effects()[n] for n in ("torque_lag", "compliance", "windage")}
     assert {*search(fit, library)[-1].added} == named
+
+
+def test_an_effect_takes_over_the_nuisance_that_it_is_at_an_unusual_size():
+    fit = fitted_behind(2e-4)
+    lag_s, (_, usual_s) = fit.values["late_torque_s"], fit.model.priors()["late_torque_s"]
+    assert lag_s > 5.0 * usual_s
+    offered = candidates({"torque_lag": effects()["torque_lag"]}, fit.model)
+    wide = widened(fit, offered)
+    (score,) = with_nuisances(wide, offered, ())
+    assert score.fall == pytest.approx((lag_s / usual_s) ** 2, rel=1e-6)
+    begun = begin_from(fit, score)
+    assert (begun.values["late_torque_s"], begun.values["torque_lag.lag_s"]) == (0.0, lag_s)
+    saved = wide.only(wide.model_columns).deviance - linear_system(begun).deviance
+    assert saved == pytest.approx(score.fall, rel=0.1)
