@@ -38,10 +38,12 @@ ARITHMETIC = {
         "_SHORT",
         "_SIN_120",
     },  # rounding; legs
-    "machine/model.py": {"BASE", "_STEP"},  # a centre of ±1/12; a complex step
+    # a centre of ±1/12; a complex step; all but zero
+    "machine/model.py": {"BASE", "_STEP", "_NOTHING"},
     "machine/two_masses.py": {"LINEAR_COUPLING"},  # sizes that an effect states for itself
     "regression/bounds.py": {"_AT"},  # rounding
     "selection/changed_between.py": {"_FREE"},  # the whole of a share
+    "selection/voltage_frame.py": {"_HALF_HOLD"},  # from the start of a hold to its middle
     "regression/fit.py": {"_SEED"},
     "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart
     "regression/identifiability.py": {"_EDGE"},  # rounding
