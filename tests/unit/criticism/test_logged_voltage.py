@@ -13,8 +13,9 @@ from pipeline.criticism.equations.dq import _shortened
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.requested_model import fit_of
+from pipeline.criticism.selection.stepwise import search
 from pipeline.criticism.selection.voltage_frame import frame_notes
-from tests.unit.criticism.machines import BASE, log, machine
+from tests.unit.criticism.machines import BASE, LIBRARY, fitted, log, machine
 
 EVERY = 60
 PAIRS = 7
@@ -109,3 +110,18 @@ def test_only_held_voltages_have_a_frame_to_choose() -> None:
     centred = replace(late, instrument=replace(late.instrument, timing="centred"))
     base = fit_of([centred], Model(machine(), ()))
     assert base.system.segments[0].instrument.frame == 0.0
+
+
+def test_the_frame_is_asked_again_when_an_effect_joins() -> None:
+    """The search begins in the wrong frame, as behind a dead time that spoke for it."""
+
+    def dragged(segment: Segment) -> Segment:
+        omega = np.gradient(segment.recorded["theta_mech_rad"], segment.ts_s)
+        torque = segment.recorded["torque_shaft_nm"] - 0.3 * omega * np.abs(omega) / 250.0**2
+        return replace(segment, recorded={**segment.recorded, "torque_shaft_nm": torque})
+
+    fit = fitted([dragged(held(0.5, 1.0)), replace(dragged(held(0.5, 1.0)), capture="again")])
+    assert {segment.instrument.frame for segment in fit.segments} == {0.0}
+    last = search(fit, {"windage": LIBRARY["windage"]})[-1]
+    assert last.added == ("windage",)
+    assert {segment.instrument.frame for segment in last.fit.segments} == {0.5}

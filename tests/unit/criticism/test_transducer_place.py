@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.regression.linear_system import linear_system
+from pipeline.criticism.selection.transducer_place import TORQUE, at_better_place
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.design import Bench
 from tests.simulated import campaign_of, design
+from tests.unit.criticism.machines import fitted, log
 
 TESTS = ("resistance_ab", "torque_map_slow", "torque_map_backward", "drive_0", "spin_down_forward")
 PLACES = {
@@ -33,3 +37,19 @@ def test_the_place_of_a_transducer_is_told_and_is_no_effect(place, hidden):
     notes = [note for note in result.notes if "read at the stator" in note]
     told = ["torque_shaft_nm of 3 captures"] if place == "at the stator" else []
     assert [note[: len(told[0])] for note in notes] == told
+
+
+@pytest.mark.parametrize(("left", "moves"), [(0.9, False), (0.1, True)])
+def test_a_place_that_leaves_most_of_the_torque_open_is_not_taken(monkeypatch, left, moves):
+    """An effect that neither place explains, such as backlash, speaks a little for the stator."""
+    system = linear_system(fitted((log(noise=1.0), log(noise=1.0, seed=6))))
+    torque = np.array([channel == TORQUE for _, channel, _ in system.labels])[system.group]
+
+    def missing(times):
+        return replace(system, residual=np.where(torque, times, 1.0) * system.residual)
+
+    elsewhere = missing(40.0 * left**0.5)
+    monkeypatch.setattr(f"{at_better_place.__module__}.gauss_newton", lambda *_, **__: elsewhere)
+    here = missing(40.0)
+    assert elsewhere.deviance < here.deviance - here.policy.selection.tie
+    assert (at_better_place(here) is elsewhere) == moves
