@@ -60,7 +60,7 @@ def _taken_over(wide: LinearSystem, offered: Sequence[Candidate], candidate: Can
         saved,
         0.0,
         {f"{effect.name}.{parameter}": value},
-        {nuisance: -value},
+        {},
         saved / total if total > policy.excess else 0.0,
         abs(value) / (known.negligible * scale),
         policy=policy,

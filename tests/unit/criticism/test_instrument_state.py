@@ -141,5 +141,6 @@ def test_an_effect_takes_over_the_nuisance_that_it_is_at_an_unusual_size():
     assert score.fall == pytest.approx((lag_s / usual_s) ** 2, rel=1e-6)
     begun = begin_from(fit, score)
     assert (begun.values["late_torque_s"], begun.values["torque_lag.lag_s"]) == (0.0, lag_s)
+    assert begun.model.priors()["late_torque_s"][1] < 1e-3 * usual_s
     saved = wide.only(wide.model_columns).deviance - linear_system(begun).deviance
     assert saved == pytest.approx(score.fall, rel=0.1)
