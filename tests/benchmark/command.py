@@ -28,8 +28,9 @@ class Options:
     `action`: run, table (of what has been run), sensitivity (measure a* anew), or policy (halve and
     double the chosen numbers `fields`, or `all`, on `count` cases). `output`: folder
     of sealed truths and results. `subset`: small, of minutes, or full, of hours. `shard`: which
-    part of the cases to work on, i/n with i from 1. `seed`: of every random draw. `docs`: Markdown
-    page to put the table into, between its marks. `date`: date to write over the table. `world`:
+    part of the cases to work on, i/n with i from 1. `seed`: of every random draw, and of the motors
+    of a world, from 1. `docs`: Markdown page to put the table into, between its marks. `date`: date
+    to write over the table. `world`:
     somebody else's plant to record in place of the project's simulator. `method`: another method
     to judge on a world in place of `diagnose` (`worlds/rivals.py`).
     """
@@ -106,7 +107,7 @@ def _world(chosen: Options, book: Book) -> str:
     if chosen.method and chosen.method not in METHODS:
         raise UsageError(f"no method {chosen.method!r}", f"known are {', '.join(METHODS)}")
     try:
-        drawn = world_cases(chosen.world)
+        drawn = world_cases(chosen.world, chosen.seed)
     except ImportError as error:
         remedy = f"install {WORLDS[chosen.world]}: docs/benchmark.md says how"
         raise UsageError(f"world={chosen.world} needs {error.name}", remedy) from error

@@ -9,25 +9,27 @@ from tests.benchmark.worlds.case import MARKS, WorldCase, judged, marked
 from tests.benchmark.worlds.recording import world
 
 LINES = ("nothing", "typical", "third", "pair", "outside")
-SEEDS = (1, 2, 3)
+MOTORS = 3
 THIRD = 0.3
 Found = Sequence[tuple[WorldCase, Mapping[str, Any]]]
 
 
-def cases(name: str) -> list[WorldCase]:
-    """Every case of a world: nulls, each effect at two sizes, pairs, and what no library has."""
-    place = world(name)
-    found = []
+def cases(name: str, draw: int = 1) -> list[WorldCase]:
+    """Every case of a world: nulls, each effect at two sizes, pairs, and what no library has; on
+    three motors and stations, which are others at each `draw`.
+    """
+    place, found = world(name), []
+    seeds = range(MOTORS * (draw - 1) + 1, MOTORS * draw + 1)
     for programme, effects in place.EFFECTS.items():
-        found += [WorldCase(name, programme, seed) for seed in SEEDS]
+        found += [WorldCase(name, programme, seed) for seed in seeds]
         for k, effect in enumerate(effects):
             for size in (1.0, THIRD):
-                found.append(WorldCase(name, programme, 1 + k % 3, {effect: size}))
+                found.append(WorldCase(name, programme, seeds[k % MOTORS], {effect: size}))
     lab = "laboratory"
     for k, (one, other) in enumerate(place.PAIRS):
-        found.append(WorldCase(name, lab, 1 + k % 3, {one: 1.0, other: 0.5}))
+        found.append(WorldCase(name, lab, seeds[k % MOTORS], {one: 1.0, other: 0.5}))
     for effect in place.OUTSIDE:
-        found += [WorldCase(name, lab, seed, {effect: 1.0}, outside=True) for seed in SEEDS]
+        found += [WorldCase(name, lab, seed, {effect: 1.0}, outside=True) for seed in seeds]
     return found
 
 
