@@ -40,11 +40,10 @@ from pipeline.criticism.selection.missing_data import (
     unused_captures,
 )
 from pipeline.criticism.selection.one_capture import rests_on
+from pipeline.criticism.selection.other_readings import reading_notes
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
 from pipeline.criticism.selection.stepwise import LadderStep, loss_without
-from pipeline.criticism.selection.transducer_place import place_notes
-from pipeline.criticism.selection.voltage_frame import frame_notes
 from pipeline.criticism.validation.signature import signature
 from pipeline.physics.notation import number_text
 from pipeline.records.capture import Campaign
@@ -200,8 +199,7 @@ def _notes(
         *unlogged_temperatures(last.fit),
         *against_stated(last, ladder.held_out[-1]),
         *hum_notes(ladder.base.hum),
-        *frame_notes(last.segments),
-        *place_notes(last.segments),
+        *reading_notes(last.segments),
         *end.notes,
         *_temperature_note(end),
         *_combination_notes(combinations, ladder.steps[-1].added),

@@ -112,7 +112,7 @@ class Motor:
         Parameters
         ----------
         **effects
-            Size of each effect, 1 for a typical one, or its parameters.
+            Size of each effect in the unit of its `Form`, or its parameters.
 
         """
         return replace(self, effects=MappingProxyType({**self.effects, **effects}))

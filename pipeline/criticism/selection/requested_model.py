@@ -14,8 +14,6 @@ from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.score_test import candidates, score_all, widened
 from pipeline.criticism.selection.stepwise import begin_from
-from pipeline.criticism.selection.transducer_place import at_better_place
-from pipeline.criticism.selection.voltage_frame import in_better_frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +63,7 @@ def fit_of(segments: Sequence[Segment], model: Model) -> BaseFit:
     hum = hum_of(segments, rough.model, rough.values)
     humming = with_hum(segments, hum, rough.model, rough.values)
     rough = replace(rough, segments=humming)
-    system = at_better_place(in_better_frame(first_fit(rough)))
+    system = first_fit(rough)
     if not shaped:
         return BaseFit(system, hum)
     while shaped:

@@ -33,6 +33,7 @@ from pipeline.criticism.selection.discrimination import discriminate, renamed
 from pipeline.criticism.selection.far_starts import with_starts
 from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.log_start import with_log_start
+from pipeline.criticism.selection.other_readings import other_reading
 from pipeline.criticism.selection.pruning import trimmed, with_all_terms
 from pipeline.criticism.selection.score_test import (
     Score,
@@ -43,9 +44,7 @@ from pipeline.criticism.selection.score_test import (
     score_all,
     widened,
 )
-from pipeline.criticism.selection.transducer_place import at_better_place
 from pipeline.criticism.selection.unusual_nuisances import with_nuisances
-from pipeline.criticism.selection.voltage_frame import in_better_frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +89,9 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
 
     Notes
     -----
-    Shares of friction or magnet that explain as much as the best effect, within a `tie`, are left
-    free instead; what full logs show of that effect counts for it.
+    Shares of friction or magnet left free, or another reading of a column, that explain as much as
+    the best effect, within a `tie`, are taken instead; what full logs show of that effect counts
+    for it.
 
     """
     steps: list[LadderStep] = []
@@ -114,17 +114,18 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         couplings = bool(significant.any())
         passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
         chosen = _chosen(wide, passing, fit.model.effects[base:])
-        free = with_free_shares(wide)
-        if free is not None and (
-            chosen is None or free.deviance < _with_full_logs(chosen) + policy.tie
+        others = [other for other in (with_free_shares(wide), other_reading(wide)) if other]
+        other = min(others, key=lambda one: one.deviance, default=None)
+        if other is not None and (
+            chosen is None or other.deviance < _with_full_logs(chosen) + policy.tie
         ):
-            fit = free.fit
+            fit = other.fit
             del steps[-1]
             continue
         if chosen is None:
             break
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
-        fit = at_better_place(in_better_frame(reconsidered(_backward(chosen, base)))).fit
+        fit = reconsidered(_backward(chosen, base)).fit
         effects = fit.model.effects[base:]
         fit = replace(fit, tolerance=tolerances(fit, effects))
         if effects:

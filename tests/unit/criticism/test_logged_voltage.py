@@ -12,9 +12,9 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.equations.dq import _shortened
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.residuals.residual import residual
+from pipeline.criticism.selection.other_readings import by_best_readings, reading_notes
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.stepwise import search
-from pipeline.criticism.selection.voltage_frame import frame_notes
 from tests.unit.criticism.machines import BASE, LIBRARY, fitted, log, machine
 
 EVERY = 60
@@ -98,18 +98,18 @@ def held(before_middle: float, noise: float) -> Segment:
 
 @pytest.mark.parametrize("frame", [0.0, 0.5])
 def test_the_frame_of_held_voltages_is_the_one_that_explains_them(frame: float) -> None:
-    base = fit_of([held(frame, 1.0)], Model(machine(), ()))
-    (segment,) = base.system.segments
+    system = by_best_readings(fit_of([held(frame, 1.0)], Model(machine(), ())).system)
+    (segment,) = system.segments
     assert segment.instrument.frame == frame
-    assert bool(frame_notes(base.system.segments)) == bool(frame)
-    assert base.system.fit.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
+    assert bool(reading_notes(system.segments)) == bool(frame)
+    assert system.fit.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
 
 
 def test_only_held_voltages_have_a_frame_to_choose() -> None:
     late = held(0.5, 1.0)
     centred = replace(late, instrument=replace(late.instrument, timing="centred"))
-    base = fit_of([centred], Model(machine(), ()))
-    assert base.system.segments[0].instrument.frame == 0.0
+    system = by_best_readings(fit_of([centred], Model(machine(), ())).system)
+    assert system.segments[0].instrument.frame == 0.0
 
 
 def test_the_frame_is_asked_again_when_an_effect_joins() -> None:

@@ -1,0 +1,130 @@
+"""How a column was read, where no metadata state it and only the captures tell.
+
+A transducer of torque in the shaft reads T − drags − J θ″; one at the stator reads the reaction
+torque T − drags, as the bearings are inside and the inertia of the rotor is not. The same captures
+cannot fit both where the shaft gathers speed under load, as another test knows the inertia.
+
+A control loop computes a voltage in the rotor frame of its sampled angle and turns it ahead.
+Firmware logs the vector from before or behind that: in the frame of the sampling instant, from
+which on it is held, or of the middle of its hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.goodness import significant_groups
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.score_test import clears
+
+TORQUE = "torque_shaft_nm"
+_HALF_HOLD = 0.5
+"""Of the start of a hold, before its middle."""
+_STATOR = (
+    "torque_shaft_nm of {} captures is read at the stator (a reaction torque): no inertia of the "
+    "rotor is in it; in the shaft it would miss by more"
+)
+_SAMPLED = (
+    "held voltages of {} captures are taken in the rotor frame of the sampling instant, which "
+    "explains them better than that of the middle of their period"
+)
+
+
+def other_reading(system: LinearSystem) -> LinearSystem | None:
+    """The fit by the other reading of a column, of the column where that explains most.
+
+    Parameters
+    ----------
+    system
+        A fit by either reading of each column.
+
+    Returns
+    -------
+    LinearSystem or None
+        None where no other reading lowers the deviance by `policy.selection.tie`.
+
+    Notes
+    -----
+    In a search it competes with the effects: an encoder off its centre looks like a torque without
+    the inertia, and a dead time like another frame, until they are in the model.
+
+    """
+    limit = system.deviance - system.policy.selection.tie
+    better = (other for other in _others(system) if other.deviance < limit)
+    return min(better, key=lambda other: other.deviance, default=None)
+
+
+def by_best_readings(system: LinearSystem) -> LinearSystem:
+    """The fit by the readings that explain the captures best.
+
+    Parameters
+    ----------
+    system
+        A fit by either reading of each column.
+
+    """
+    while (other := other_reading(system)) is not None:
+        system = other
+    return system
+
+
+def reading_notes(segments: Sequence[Segment]) -> tuple[str, ...]:
+    """Notes on columns that are not read as is usual.
+
+    Parameters
+    ----------
+    segments
+        The segments of a fit.
+
+    Returns
+    -------
+    tuple of str
+        Empty where there are none.
+
+    """
+    sampled = {segment.capture for segment in segments if segment.instrument.frame}
+    stator = {segment.capture for segment in segments if segment.instrument.stator}
+    captures = ((_SAMPLED, sampled), (_STATOR, stator))
+    return tuple(note.format(len(names)) for note, names in captures if names)
+
+
+def _others(system: LinearSystem) -> Iterator[LinearSystem]:
+    """The fit by the other reading of each column that may have one."""
+    if any(_has_held_vectors(segment) for segment in system.segments):
+        turned = (_in_other_frame(s) if _has_held_vectors(s) else s for s in system.segments)
+        yield gauss_newton(replace(system.fit, segments=tuple(turned)))
+    significant = significant_groups(system)
+    torques = significant & [channel == TORQUE for _, channel, _ in system.labels]
+    if torques.any():
+        moved = (_at_other_place(s) if _reads_torque(s) else s for s in system.segments)
+        # only the inertia's column is another there
+        kept = np.flatnonzero([column.name != "j_kgm2" for column in system.columns])
+        fit = replace(system.fit, segments=tuple(moved))
+        other = gauss_newton(fit, before=system.only(kept))
+        # what neither place explains is an effect's, and no coupling shows at the stator
+        if clears(system, torques, *(one.reduced_chi2(one.residual) for one in (system, other))):
+            yield other
+
+
+def _has_held_vectors(segment: Segment) -> bool:
+    """Whether a segment has voltage vectors that are held from their sample on."""
+    return segment.instrument.timing == "held" and "vd_v" in segment.channels
+
+
+def _in_other_frame(segment: Segment) -> Segment:
+    instrument = segment.instrument
+    return replace(segment, instrument=replace(instrument, frame=_HALF_HOLD - instrument.frame))
+
+
+def _reads_torque(segment: Segment) -> bool:
+    return TORQUE in segment.recorded and TORQUE in segment.channels
+
+
+def _at_other_place(segment: Segment) -> Segment:
+    instrument = segment.instrument
+    return replace(segment, instrument=replace(instrument, stator=not instrument.stator))
