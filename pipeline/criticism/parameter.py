@@ -24,7 +24,7 @@ class Parameter:
         Magnitude that is seen on real benches [scales].
     negligible
         Magnitude that is negligible in use [scales]; with a shape parameter below it the effect is
-        absent.
+        absent. An amplitude for which it is 0 goes with the others: alone it is no such effect.
     scale
         Entry of `Machine.scales`, such as `torque_nm`; `1` for the unit itself.
     low, high

@@ -51,7 +51,7 @@ _SHARE_OF = {
 """What a share that is left free is of."""
 _LOOKS_ALIKE = {
     "spin_down": "a part on the shaft or a clock that is off there",
-    "open_circuit": "a clock that is off there",
+    "open_circuit": "a clock that is off there, or a gain of voltages or torques,",
 }
 """What else such a share may be."""
 _WITHIN = (

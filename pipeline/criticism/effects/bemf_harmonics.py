@@ -39,7 +39,12 @@ EFFECT = Effect(
     signature="orders 6ε and 12ε: proportional to speed in voltage, to current in torque",
     tests=("open_circuit", "torque_map"),
     experiment="an open-circuit spin",
-    headline="back-EMF that is no pure sine, {q6_cos & q6_sin %} of the flux in its sixth wave",
+    headline=tuple(
+        f"back-EMF that is no pure sine, {{{axis}{order}_cos & {axis}{order}_sin %}} of the flux "
+        f"in wave {order} of its {axis} axis"
+        for order in (6, 12)
+        for axis in "qd"
+    ),
     reference="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed. (2006), ch. 4",
     parameters=(
         *(

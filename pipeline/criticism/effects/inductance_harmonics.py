@@ -46,7 +46,14 @@ EFFECT = Effect(
     signature="orders 6ε proportional to current in voltage and to its square in torque",
     tests=("torque_map",),
     experiment="a torque map, or a slow turn under current",
-    headline="inductance that changes with the rotor's angle, {q6_cos & q6_sin %} on the q axis",
+    headline=tuple(
+        f"inductance that changes with the rotor's angle, {{{name}_cos & {name}_sin %}} {where}"
+        for name, where in (
+            ("q6", "on the q axis"),
+            ("d6", "on the d axis"),
+            ("cross6", "between the axes"),
+        )
+    ),
     reference="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed. (2006), ch. 5",
     parameters=(
         *(

@@ -29,7 +29,10 @@ EFFECT = Effect(
     signature="torque lost with speed, and with the square of the flux",
     tests=("torque_map", "spin_down"),
     experiment="a torque map at two speeds with d current; a spin-down without the magnet",
-    headline="eddy currents in the iron, a drag of {drag_nm} at the highest speed",
+    headline=(
+        "eddy currents in the iron, a drag of {drag_nm} at the highest speed",
+        "excess loss in the iron, a drag of {excess_nm} at the highest speed",
+    ),
     in_friction=True,
     reference="Bertotti, IEEE Trans. Magn. 24 (1988), general properties of power losses",
     parameters=(

@@ -41,12 +41,16 @@ EFFECT = Effect(
     signature="hysteresis of torque against angle within a small angle of a reversal",
     tests=("drive",),
     experiment="slow reversals under load",
-    headline="friction of {torque_nm} that gives like a spring over {travel_rad} after a reversal",
+    headline=(
+        "friction of {torque_nm} that gives like a spring over {travel_rad} after a reversal",
+        "friction damped by {damping_nm} that gives like a spring over {travel_rad} after a "
+        "reversal",
+    ),
     reference="Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995), "
     "doi:10.1109/9.376053: bristles with a damping; without it Dahl, AIAA J. 14 (1976)",
     parameters=(
         Parameter("torque_nm", "N·m", 0.01, 0.001, "torque_nm", low=0.0, high=1.0),
-        Parameter("damping_nm", "N·m", 0.1, 0.0, "torque_nm", low=0.0, high=10.0, optional=1),
+        Parameter("damping_nm", "N·m", 0.1, 0.01, "torque_nm", low=0.0, high=10.0, optional=1),
         Parameter(
             "travel_rad", "rad", 0.001, 0.0001, low=1e-5, high=0.1, scan=(0.0003, 0.003, 0.03)
         ),

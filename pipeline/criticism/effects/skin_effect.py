@@ -77,7 +77,10 @@ EFFECT = Effect(
     signature="resistance that grows with electrical speed, whatever the temperature",
     tests=("torque_map", "drive", "lcr"),
     experiment="current steps at the highest speed and at a tenth of it",
-    headline="resistance that grows with frequency, by {rise %} at the highest speed",
+    headline=(
+        "resistance that grows with frequency, by {rise %} at the highest speed",
+        "resistance that grows with frequency, by {meter_rise %} at the meter's",
+    ),
     reference="Dowell, Proc. IEE 113 (1966), effects of eddy currents in windings; Foster, Bell "
     "Syst. Tech. J. 3 (1924), a reactance theorem",
     parameters=(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.operating import Array
+from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown, tolerances
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
 from pipeline.criticism.regression.goodness import (
@@ -200,7 +201,7 @@ def _chosen(
             cost = finished.deviance + math.log(wide.size) * finished.model_columns.size
             if cost > least + policy.tie:
                 return None
-            if _is_determined(linear_system(finished.fit)):
+            if _is_determined(linear_system(finished.fit), wide):
                 return finished
             least = min(least, cost)
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
@@ -315,21 +316,25 @@ def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np
     what was `significant` [G] as a remainder before.
     """
     fit, effect = system.fit, system.fit.model.effects[-1]
-    if material(fit, effect):
-        return True
+    return material(fit, effect) or _takes_most(system, before, significant)
+
+
+def _takes_most(system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_]) -> bool:
+    fit, effect = system.fit, system.fit.model.effects[-1]
     chi2 = [fitted.reduced_chi2(fitted.residual) for fitted in (before, system)]
     takes_most = effect.discriminator is None and clears(system, significant, *chi2)
     return takes_most and shaped(fit, effect)
 
 
-def _is_determined(system: LinearSystem) -> bool:
-    """Whether some amplitude of the newest effect differs significantly from zero: two standard
-    uncertainties away, whichever capture is left out; or all of them together do. Of a coupling,
-    its twist or gap must be so as well, by the fit or by full logs, and full logs must not exclude
-    it.
+def _is_determined(system: LinearSystem, before: LinearSystem) -> bool:
+    """Whether some amplitude of the newest effect that matters differs significantly from zero:
+    two standard uncertainties away, whichever capture is left out; or all of them together do. Of
+    a coupling, its twist or gap must be so as well, by the fit or by full logs, and full logs must
+    not exclude it.
 
-    A counterexample: a drag below the lowest speed of any capture can mend how friction changes
-    sense at a reversal, while its own size is not known at all.
+    Counterexamples: a drag below the lowest speed of any capture can mend how friction changes
+    sense at a reversal, while its own size is not known at all; and waves of the flux too small to
+    matter are sure beside a large one that may be zero.
     """
     effect = system.fit.model.effects[-1]
     held_out = leave_out(system)
@@ -343,11 +348,15 @@ def _is_determined(system: LinearSystem) -> bool:
     nonzero = [p for p in parameters if f"{effect.name}.{p.name}" in sure or p.name in by_logs]
     twists = [p for p in parameters if p.negligible > 0 and not p.amplitude]
     coupled = effect.discriminator is None or not twists or any(p in nonzero for p in twists)
-    amplitudes = [f"{effect.name}.{p.name}" for p in parameters if p.amplitude]
-    present = any(p.amplitude for p in nonzero) or together_nonzero(
-        system, held_out, amplitudes, least
+    amplitudes = [p for p in parameters if p.amplitude and p.negligible > 0.0]
+    names = [f"{effect.name}.{p.name}" for p in amplitudes]
+    present = [p for p in amplitudes if p in nonzero]
+    if not present and together_nonzero(system, held_out, names, least):
+        present = amplitudes
+    matters = size_of(system.fit, effect, present) >= 1.0 or (
+        bool(present) and _takes_most(system, before, significant_groups(before))
     )
-    return coupled and not excluded and present
+    return coupled and not excluded and matters
 
 
 def _same_hook(effect: Effect, added: Sequence[Effect]) -> list[Effect]:
@@ -483,7 +492,7 @@ def material(fit: Fit, effect: Effect) -> bool:
         Some amplitude is over its negligible size, and every shape that has one over its own.
 
     """
-    return shaped(fit, effect) and size_of(fit, effect, "negligible") >= 1.0
+    return shaped(fit, effect) and size_of(fit, effect, effect.parameters_of(fit.machine)) >= 1.0
 
 
 def shaped(fit: Fit, effect: Effect) -> bool:
@@ -505,8 +514,8 @@ def shaped(fit: Fit, effect: Effect) -> bool:
     )
 
 
-def size_of(fit: Fit, effect: Effect, unit: str) -> float:
-    """The largest amplitude of an effect, relative to one of its declared sizes.
+def size_of(fit: Fit, effect: Effect, parameters: Iterable[Parameter]) -> float:
+    """The largest of some amplitudes of an effect, relative to its negligible size.
 
     Parameters
     ----------
@@ -514,20 +523,19 @@ def size_of(fit: Fit, effect: Effect, unit: str) -> float:
         A fit with the effect.
     effect
         The effect.
-    unit
-        `negligible` or `typical`.
+    parameters
+        Parameters of it.
 
     Returns
     -------
     float
-        0 where no amplitude declares such a size.
+        0 where none is an amplitude that declares such a size.
 
     """
-    machine = fit.machine
     sizes = [
-        fit.size(effect, p) / (getattr(p, unit) * machine.scale(p))
-        for p in effect.parameters_of(machine)
-        if p.amplitude and getattr(p, unit) > 0
+        fit.size(effect, p) / (p.negligible * fit.machine.scale(p))
+        for p in parameters
+        if p.amplitude and p.negligible > 0.0
     ]
     return max(sizes, default=0.0)
 

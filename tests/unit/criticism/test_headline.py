@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -87,6 +88,23 @@ def test_every_effect_names_parameters_that_it_has(name: str) -> None:
     words = headline(effect, reported)
     assert effect.headline and UNKNOWN_SIZE not in words
     assert "{" not in words
+
+
+@pytest.mark.parametrize("name", sorted(effects()))
+def test_whatever_makes_an_effect_large_is_said(name: str) -> None:
+    """No size that is nothing beside its uncertainty is told of an effect that is surely there."""
+    effect = effects()[name]
+    coupled = effect.discriminator is not None
+    for large in effect.every(MACHINE):
+        if large.amplitude == coupled or large.negligible == 0.0:
+            continue
+        reported = {
+            p.name: ReportedParameter(0.02 if p.name == large.name else 1e-5, 1e-4, p.unit)
+            for p in effect.every(MACHINE)
+        }
+        said = re.findall(r"([\d.]+) ± ([\d.]+)", headline(effect, reported))
+        clear = [float(size) > 10.0 * float(u) for size, u in said]
+        assert any(clear) or not said, (large.name, said)
 
 
 @pytest.mark.parametrize("bad", range(3))

@@ -138,7 +138,7 @@ def test_a_small_effect_matters_where_it_takes_what_would_be_told_as_a_remainder
     steps = search(fitted(segments), library)
     assert remainder(steps[0].system)
     assert steps[-1].added == ("windage",)
-    assert size_of(steps[-1].fit, library["windage"], "negligible") < 0.3
+    assert size_of(steps[-1].fit, library["windage"], library["windage"].parameters) < 0.3
     few = (with_drag(curved(0.03)), with_drag(curved(0.03), 6))
     for captured, times in ((few, 1.0), (segments, 10.0)):
         last = search(cautious(captured, times), library)[-1]
@@ -265,7 +265,7 @@ def test_an_effect_is_material_by_its_amplitude_and_by_shapes_that_have_a_least(
 
 
 def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkeypatch):
-    def unsure(system):
+    def unsure(system, _):
         return system.fit.model.effects[-1].name != "windage"
 
     hidden = tuple(with_drag(curved(0.1), seed) for seed in (5, 6))
@@ -289,4 +289,4 @@ def test_a_gap_that_windows_leave_open_is_determined_where_full_logs_show_it(
         ("discriminate", Discrimination("backlash", logged)),
     ):
         monkeypatch.setattr(f"pipeline.criticism.selection.stepwise.{name}", lambda *_, a=answer: a)
-    assert _is_determined(coupled) is determined
+    assert _is_determined(coupled, coupled) is determined

@@ -183,6 +183,9 @@ def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept
     [
         ("windage", {"drag_nm": 0.1}, {"drag_nm": 0.04}, True),
         ("windage", {"drag_nm": 0.1}, {"drag_nm": 0.06}, False),
+        ("bemf_harmonics", {"q6_sin": 1e-4, "d12_sin": 1e-2}, {"d12_sin": 6e-3}, False),
+        ("bemf_harmonics", {"q6_sin": 1e-3, "d12_sin": 1e-2}, {"d12_sin": 6e-3}, True),
+        ("current_gain", {"mean": 0.05, "cosine": 0.01}, {"cosine": 6e-3}, False),
         ("presliding", {"torque_nm": 0.1, "travel_rad": 1e-3}, {"travel_rad": 1e-2}, True),
         ("compliance", {"share": 0.1, "twist_rad": 1e-3}, {"share": 0.04}, True),
         ("compliance", {"share": 0.1, "twist_rad": 1e-3}, {"share": 0.06}, False),
@@ -208,7 +211,7 @@ def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, s
     step = np.array([apart.get(key, 0.0) for key in values])
     held = HeldOut(plain.residual, 1.0, {0: step, 1: -step})
     monkeypatch.setattr("pipeline.criticism.selection.stepwise.leave_out", lambda _: held)
-    assert _is_determined(system) is sure
+    assert _is_determined(system, plain) is sure
 
 
 @pytest.mark.parametrize(("damping_nm", "sure"), [(0.1, True), (-0.1, False)])
