@@ -73,7 +73,8 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
     if time[-1] < 2.0 * width or float(np.ptp(theta)) < policy.turning_rad:
         return None
     weak = weak_rows(time, width)
-    usable = log.keep & ~_rests(theta, log, policy)
+    quarter = max(3, round(policy.load_window_s / 4 / log.period_s))
+    usable = log.keep & ~rests(theta, quarter, policy)
     complete = weak.integral((~usable).astype(float)) == 0.0
     omega = smooth_speed(time, theta, policy.load_window_s / 8)
     driven, groups = _columns(log, weak, machine, omega)
@@ -105,13 +106,27 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
     return min(shares)
 
 
-def _rests(theta: Array, log: DriveLog, policy: Cutting) -> NDArray[np.bool_]:
-    """Samples [n] at which the shaft stays within what bristles bend, for a quarter of a window.
+def rests(theta_rad: Array, size: int, policy: Cutting) -> NDArray[np.bool_]:
+    """Where a shaft stays within what bristles bend.
 
     There dry friction holds any torque below its own, and no acceleration follows the current.
+
+    Parameters
+    ----------
+    theta_rad
+        Angle [n].
+    size
+        Samples for which it does.
+    policy
+        How far bristles bend.
+
+    Returns
+    -------
+    array [n] of bool
+        The samples in the middle of so many.
+
     """
-    size = max(3, round(policy.load_window_s / 4 / log.period_s))
-    span = maximum_filter1d(theta, size) - minimum_filter1d(theta, size)
+    span = maximum_filter1d(theta_rad, size) - minimum_filter1d(theta_rad, size)
     return span < policy.rest_rad
 
 

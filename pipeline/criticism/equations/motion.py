@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
 from pipeline.criticism.data.traces import thinned, window_of
-from pipeline.criticism.data.unlogged_load import runs_free
+from pipeline.criticism.data.unlogged_load import rests, runs_free
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
 from pipeline.criticism.machine.two_masses import reach
@@ -49,7 +49,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     -------
     Segment or None
         None without an angle, with a transducer, and where something else than the current drives
-        the shaft. Windows are few because waves of the angle take long to compute at speed.
+        the shaft. Windows are few because waves of the angle take long to compute at speed. None is
+        of a shaft at rest: there friction holds what a load and the current leave over.
 
     """
     log = None if capture.has(TORQUE) else drive_log(capture, machine)
@@ -61,7 +62,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     window = window_of(log.period_s, log.keep.size, policy)
     full = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
     pad = max(policy.motion_pad, reach(log.period_s, machine.policy.torsion))
-    shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion, pad)
+    moves = log.keep & ~rests(shaft["theta_mech_rad"], window, policy)
+    shaft, starts = thinned(shaft, moves, window, policy.windows_motion, pad)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     middle = np.rint(shaft["t_s"][starts + window // 2] / log.period_s)
     segment = segment_of(

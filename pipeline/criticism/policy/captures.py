@@ -176,7 +176,7 @@ class Cutting:
         on="free and loaded drives of three benches: at 20 ms a host's jitter looks like a load",
     )  # fmt: skip
     rest_rad: float = chosen(
-        2e-3, "rad", "angle within which a shaft rests, for a quarter of that window",
+        2e-3, "rad", "angle within which a shaft rests",
         why="bristles bend by a milliradian to either side",
     )  # fmt: skip
     load_samples: int = derived(

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
 from pipeline.criticism.comparison import compare
@@ -58,6 +59,26 @@ def test_only_a_free_shaft_has_an_equation_of_motion(keep):
 
 def test_a_transducer_tells_the_load_whatever_it_is():
     assert kinds(driven(FREE, (*AXES, "torque_shaft_nm"))) == {"dq"}
+
+
+def test_a_shaft_at_rest_says_nothing_of_a_load():
+    """Half a second is appended in which a load of half the friction is held by it."""
+    moving = driven(FREE)
+    (capture,) = moving.captures
+    (table,) = capture.tables
+    end_s, period = table["t_s"][-1], table["t_s"][1] - table["t_s"][0]
+    rest = pl.concat([table.tail(1)] * round(0.5 / period)).with_columns(
+        t_s=end_s + period * (1.0 + pl.int_range(pl.len()))
+    )
+    both = replace(capture, tables=(pl.concat([table, rest]),))
+    (motion,) = (
+        one
+        for one in segments(replace(moving, captures=(both,)), machine_of(moving, Constants()))
+        if one.kind == "motion"
+    )
+    last = motion.recorded["t_s"][motion.weak.starts + motion.weak.length // 2]
+    assert last.max() < end_s - table["t_s"][0]
+    assert last.max() > 0.9 * (end_s - table["t_s"][0])
 
 
 def test_what_a_load_leaves_is_far_from_what_a_free_shaft_leaves():
