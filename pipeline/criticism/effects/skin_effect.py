@@ -12,9 +12,15 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
 
 
-def _bench(x: Operating) -> NDArray[np.bool_]:
-    """Whether an instrument drives each sample [n] at standstill: a step, or an LCR meter."""
-    return (x.omega_rad_s == 0.0) & (not x.inverter)
+def _stepped(x: Operating) -> NDArray[np.bool_]:
+    """Whether a bench steps the current at each sample [n], at standstill."""
+    return (x.omega_rad_s == 0.0) & (not x.inverter) & (x.freq_hz == 0.0)
+
+
+def _above(x: Operating) -> NDArray[np.bool_]:
+    """Whether a meter's frequency is above any of the machine's, at each sample [n]."""
+    at_rest = (x.omega_rad_s == 0.0) & (not x.inverter)
+    return at_rest & (x.freq_hz > x.machine.scales["freq_hz"])
 
 
 def _square(x: Operating) -> Array:
@@ -39,16 +45,16 @@ def _inner_h(x: Operating, q: Values) -> float:
 
 def _coenergy(x: Operating, q: Values) -> Any:
     bent = q["bend"] * _square(x)
-    share = _inner_h(x, q) * np.where(_bench(x), 1.0, bent / (1.0 + bent))
+    share = _inner_h(x, q) * np.where(_stepped(x), 1.0, bent / (1.0 + bent))
     return -0.5 * share * (x.id_a * x.id_a + x.iq_a * x.iq_a)
 
 
 def _drop(x: Operating, q: Values) -> Complex:
-    square, bench = _square(x), _bench(x)
-    turning = q["rise"] * square * (1.0 + q["bend"]) / (1.0 + q["bend"] * square)
-    rise = np.where(bench, q["meter_rise"] * (x.freq_hz > 0.0), turning)
+    square = _square(x)
+    rise = q["rise"] * square * (1.0 + q["bend"]) / (1.0 + q["bend"] * square)
+    rise = np.where(_above(x), q["meter_rise"], rise)
     drop: Complex = x.base["r_ohm"] * rise * x.i_a
-    if _inner_h(x, q) and bench.all() and not x.freq_hz.any():
+    if _inner_h(x, q) and _stepped(x).all():
         drop = drop + _in_a_step(x, q)
     return drop
 

@@ -61,11 +61,27 @@ def test_a_step_finds_the_branch_as_a_resistance_first_and_an_inductance_at_last
     assert EFFECT.drop(x, q).real == pytest.approx(expected, abs=1e-9 * whole)
 
 
-def test_a_meter_has_a_resistance_of_its_own_and_none_of_the_inner_field():
-    x = replace(operating(3), omega_rad_s=np.zeros(3), inverter=False, cache={}, ts_s=1.0)
+def metered(freq_hz):
+    still = np.zeros(3)
+    at = {"omega_rad_s": still, "freq_hz": still + freq_hz, "inverter": False, "ts_s": 1.0}
+    return replace(operating(3), cache={}, **at)
+
+
+def test_a_meter_above_the_machine_s_frequency_has_its_own_resistance_and_no_inner_field():
+    x = metered(1e6)
     q = values(x)
     assert EFFECT.drop(x, q) == pytest.approx(0.3 * x.base["r_ohm"] * x.i_a)
-    assert effect_flux(EFFECT, x, q)[0] == pytest.approx(-BRANCH_OHM * LATE_S * x.i_a)
+    assert effect_flux(EFFECT, x, q)[0] == pytest.approx(-BRANCH_OHM * LATE_S * x.i_a, rel=1e-5)
+
+
+def test_a_meter_at_a_frequency_of_the_machine_reads_what_the_machine_has_there():
+    """At 120 Hz of 280, a resistance that is not the one of 1 MHz was held against the effect."""
+    meter = metered(120.0)
+    turning = replace(meter, omega_rad_s=np.full(3, 50.0), inverter=True, cache={})
+    q = values(meter)
+    assert EFFECT.drop(meter, q) == pytest.approx(EFFECT.drop(turning, q))
+    fluxes = (effect_flux(EFFECT, x, q)[0] for x in (meter, turning))
+    assert next(fluxes) == pytest.approx(next(fluxes))
 
 
 def test_without_a_bend_resistance_grows_with_the_square_of_the_frequency():
