@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import RECORDERS, Effect
+from pipeline.criticism.machine.model import BASE
 from pipeline.criticism.operating import Operating, Recorded, Samples, ShaftState
 from pipeline.criticism.parameter import SCALES, Machine, Parameter
 from pipeline.records.errors import PipelineError, UsageError
@@ -35,6 +36,8 @@ _HOOKS = (
     "clock",
 )
 _OF_RECORDED = ("i_a", "torque_nm", "eps_rad", "omega_e_rad_s")
+_OF_MACHINE = ("drop", "flux", "motion", "torque")
+"""Hooks of the base constants that are of the machine, and no nuisance."""
 _MEND = "correct the file"
 _TRIED = 3
 """Samples that a hook is tried on: a few, since it may difference them."""
@@ -126,6 +129,7 @@ def guarded(effect: Effect, path: Path, text: str) -> Effect:
     label = f"effect {effect.name}"
     for parameter in effect.parameters:
         _known_scale(parameter, path, label, text)
+    _known_nuisance(effect, path)
     hooks = {name: getattr(effect, name) for name in _HOOKS}
     behind: dict[str, Any] = {
         name: Hook(hook, f"{name} of {label}", str(path))
@@ -167,6 +171,23 @@ def _known_scale(parameter: Parameter, path: Path, label: str, text: str = "") -
     similar = get_close_matches(parameter.scale, SCALES, 1)
     hint = f"did you mean {similar[0]!r}? " if similar else ""
     raise UsageError(message, f"{hint}scales are 1, {', '.join(SCALES)}")
+
+
+def _known_nuisance(effect: Effect, path: Path) -> None:
+    """Refuses an effect `in_place_of` what there is not."""
+    if effect.in_place_of is None:
+        return
+    named = tuple(effect.in_place_of)
+    message = f"{path.name}: effect {effect.name}: in_place_of is {named!r}"
+    nuisances = [constant.name for constant in BASE if constant.hook not in _OF_MACHINE]
+    own = [parameter.name for parameter in effect.parameters]
+    if len(named) != 2:
+        raise UsageError(message, "name a nuisance and a parameter of the effect")
+    for name, known in zip(named, (nuisances, own), strict=True):
+        if name not in known:
+            similar = get_close_matches(name, known, 1)
+            hint = f"did you mean {similar[0]!r}? " if similar else ""
+            raise UsageError(message, f"{hint}there are {', '.join(known)}")
 
 
 class _NoNameError(KeyError):

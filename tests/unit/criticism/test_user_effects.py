@@ -54,6 +54,15 @@ def folder(tmp_path: Path, was: str = "", now: str = "") -> str:
         ("import numpy", "import nothing_there\nimport numpy", 1, "nothing_there"),
         ("import numpy", "import sys; sys.exit(0)\nimport numpy", 1, "it ends the program"),
         ("parameters=(", "parameters=3 or (", None, "TypeError"),
+        *(
+            ("torque=torque,", f"torque=torque, in_place_of={named},", None, words)
+            for named, words in (
+                (("late_torqe_s", "torque_nm"), "did you mean 'late_torque_s'"),
+                (("late_torque_s", "torqe_nm"), "did you mean 'torque_nm'"),
+                (("j_kgm2", "torque_nm"), "there are ripple_slope"),
+                (("late_torque_s",), "name a nuisance and a parameter"),
+            )
+        ),
     ],
 )
 def test_what_loading_tells(tmp_path: Path, was: str, now: str, line: int | None, words: str):
