@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import PAIR_RAD, Segment, electrical_orders, segment_of
-from pipeline.criticism.data.sensor_noise import sensor_noise
+from pipeline.criticism.data.segment import (
+    PAIR_RAD,
+    Segment,
+    Sensors,
+    electrical_orders,
+    segment_of,
+)
+from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
 from pipeline.criticism.data.sensors import prepared
 from pipeline.criticism.data.shaft_angle import ANGLES, shaft_angle, with_angle
 from pipeline.criticism.data.traces import LINES_V, even_clock, smoothed, thinned, window_of
@@ -19,7 +26,7 @@ from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
-from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage
+from pipeline.criticism.signals.voltage import central, fine_slope, recorded_voltage
 from pipeline.numerics.projection import Projection, projection
 from pipeline.physics.frames import vector_of_lines
 from pipeline.records.capture import Capture
@@ -61,10 +68,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         shaft_angle(columns, period, machine)
     else:
         keep &= _by_voltage(columns, machine, window, period)
-    sensors = prepared(columns, period, machine.policy)
+    sensors = _beside_waves(prepared(columns, period, machine.policy), columns, machine, window)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     columns, starts = thinned(columns, keep, window, policy.windows)
-    weak = projection(columns["theta_mech_rad"], starts, window, electrical_orders(machine))
+    orders, margin = electrical_orders(machine), policy.wave_samples
+    weak = projection(columns["theta_mech_rad"], starts, window, orders, margin=margin)
     weak = weak.only(_steady(weak, columns["theta_mech_rad"], policy))
     return segment_of(
         capture,
@@ -77,6 +85,28 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         weak=weak,
         fixed={} if encoder else {_VOLTAGE_FRAME: 1.0},
     )
+
+
+def _beside_waves(
+    sensors: Sensors, columns: Mapping[str, Array], machine: Machine, window: int
+) -> Sensors:
+    """The sensors with the noise of voltages beside the waves of their angle, where that is less.
+
+    Of few samples a turn the seventh wave of a back-EMF bends as much between them as noise does.
+    """
+    theta = smoothed(columns["theta_mech_rad"], 2 * (window // 2) + 1)
+    orders = machine.pole_pairs * np.arange(machine.policy.cutting.voltage_orders + 2)
+    waves = np.gradient(theta)[:, None] * np.exp(1j * orders * theta[:, None])
+    basis = np.column_stack([waves.real, waves.imag[:, 1:]])
+    inverse = np.linalg.pinv(basis.T @ basis, hermitian=True)
+    noise, steps = dict(sensors.noise), dict(sensors.steps)
+    for name in LINES_V:
+        if name in columns:
+            rest = columns[name] - basis @ (inverse @ (basis.T @ columns[name]))
+            noise[name] = min(noise[name], sensor_noise(rest, machine.policy.sensor_noise))
+            step = coarse_step(columns[name], noise[name], machine.policy.sensor_noise)
+            steps |= {name: step} if step else {}
+    return replace(sensors, noise=noise, steps=steps)
 
 
 def _by_voltage(
@@ -181,7 +211,7 @@ def predicted(
     """
     period = segment.ts_s
     omega = x.once(x.theta_rad, "pace", lambda: central(x.machine.pole_pairs * x.theta_rad, period))
-    voltage = rotor_voltage(pieces, omega, period)
+    voltage = pieces.drop_v + fine_slope(pieces.psi_wb, period) + 1j * omega * pieces.psi_wb
     voltage *= 1.0 + segment.fixed.get(OPEN_FLUX, 0.0) * values[OPEN_FLUX]
     by_encoder = _VOLTAGE_FRAME not in segment.fixed
     voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=by_encoder)

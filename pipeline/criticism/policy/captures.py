@@ -59,6 +59,10 @@ class Cutting:
         12, "1", "electrical orders that the angle of a voltage leaves to the voltage",
         why="those of back-EMF and of errors of the meter; motion has all others",
     )  # fmt: skip
+    wave_samples: float = derived(
+        5.0, "samples a cycle", "of a wave of an open winding's voltage that is examined",
+        source="differences of eighth order miss a hundredth of the slope there",
+    )  # fmt: skip
     reversal_u: float = chosen(
         6.0, "standard deviations of noise", "angle that a shaft must turn back by for a reversal",
         why="noise alone comes to five in a log of 1e6 samples",

@@ -11,6 +11,7 @@ from pipeline.criticism.machine.model import Model, Pieces, values_of
 from pipeline.criticism.operating import Array, Complex, Operating, Values
 from pipeline.criticism.signals.true_state import angle_error, zero_angle
 
+_EIGHTH_ORDER = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)
 RIPPLES = ("ripple_edge", "ripple_shift", "frame_lag_s", "command_lead")
 """Nuisances of held vectors and their frame that are in the voltage (`model.BASE`)."""
 
@@ -127,6 +128,34 @@ def central(signal: Any, period_s: float) -> Any:
     """
     slope = np.zeros_like(signal)
     slope[1:-1] = (signal[2:] - signal[:-2]) * (0.5 / period_s)
+    return slope
+
+
+def fine_slope(signal: Complex, period_s: float) -> Complex:
+    """Slope by central differences of eighth order, of a signal that is smooth between samples.
+
+    Parameters
+    ----------
+    signal
+        [n, any unit]
+    period_s
+        Sample period [s].
+
+    Returns
+    -------
+    array [n]
+        Of a wave with five samples a cycle it misses a hundredth, where the difference of two
+        neighbours misses a quarter; zero in four samples at both ends.
+
+    References
+    ----------
+    Fornberg, Math. Comp. 51 (1988), 699, doi:10.1090/S0025-5718-1988-0935077-0.
+
+    """
+    slope = np.zeros_like(signal)
+    for reach, weight in enumerate(_EIGHTH_ORDER, 1):
+        after, before = signal[4 + reach :], signal[4 - reach : signal.size - 4 - reach]
+        slope[4:-4] += (weight / period_s) * (after[: slope.size - 8] - before)
     return slope
 
 

@@ -92,3 +92,27 @@ def test_a_swing_of_the_shaft_is_no_voltage():
     size = 5e-3 * 2.0 * np.pi * 37.0
     assert abs(at_sixth) == pytest.approx(0.01 * size, rel=0.15)
     assert np.std(left) < 0.1 * 0.05 * size
+
+
+def test_harmonics_count_of_few_samples_a_turn():
+    """Eight samples a cycle of the sixth wave: its bend is no noise, and its slope is resolved."""
+    omega, psi, share, u = 300.0, 0.0094, 0.012, 2e-3
+    t = 2.0 * np.pi / (48.0 * omega) * np.arange(4000)
+    eps = omega * t
+    flux = psi * (1.0 + share * np.cos(6.0 * eps))
+    slope = -6.0 * omega * psi * share * np.sin(6.0 * eps)
+    wave = np.exp(1j * eps) * (slope + 1j * omega * flux)
+    turns = np.exp(2j * np.pi / 3.0 * np.arange(3))
+    lines = [(wave * (np.conj(turns[k]) - np.conj(turns[(k + 1) % 3]))).real for k in range(3)]
+    noise = u * np.random.default_rng(5).standard_normal((3, t.size))
+    columns = dict(zip(("vab_v", "vbc_v", "vca_v"), np.array(lines) + noise, strict=True))
+    made = cut(capture("open_circuit", t_s=t, theta_mech_rad=eps / 7.0, **columns), machine(7))
+    assert made.sensors.noise["vab_v"] == pytest.approx(u, rel=0.25)
+    assert 42 in made.weak.orders
+    model = Model(machine(7), (effects()["bemf_harmonics"],))
+    values = {**start_values(model, machine(7)), "psi_wb": psi, "bemf_harmonics.d6_cos": share}
+    left = made.weak.project(residual(made, model, values))
+    plain = made.weak.project(residual(made, model, {**values, "bemf_harmonics.d6_cos": 0.0}))
+    seventh = made.weak.orders == 42
+    assert np.std(left[:, :, seventh]) < 1.2 * u
+    assert np.std(plain[:, :, seventh]) > 20.0 * u
