@@ -43,6 +43,7 @@ ARITHMETIC = {
     "machine/two_masses.py": {"LINEAR_COUPLING"},  # sizes that an effect states for itself
     "regression/bounds.py": {"_AT"},  # rounding
     "selection/changed_between.py": {"_FREE"},  # the whole of a share
+    "signals/voltage.py": {"_EIGHTH_ORDER"},  # of a difference
     "selection/other_readings.py": {"_HALF_HOLD"},  # from the start of a hold to its middle
     "regression/fit.py": {"_SEED"},
     "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart
