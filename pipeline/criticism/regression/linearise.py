@@ -328,6 +328,7 @@ class _Sampler:
         self.effect_pieces: dict[str, Pieces] = {}
         self.gains = {c.name for c in base_of(model.machine) if c.hook in ("gain", "log")}
         self.paced: dict[float, Array] = {}
+        self.of_nothing: Array | None = None
         self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
         self.base_residual = measured(segment, segment.recorded, model, values) - self.start
@@ -484,10 +485,10 @@ class _Sampler:
             return drag if np.any(drag) else None
         model = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
         if self.observes.form == "affine":
-            zero_pieces = self._pieces_of_nothing()
-            after = predicted(self.segment, self.x, change, model, self.values) - predicted(
-                self.segment, self.x, zero_pieces, model, self.values
-            )
+            if self.of_nothing is None:
+                zero_pieces = self._pieces_of_nothing()
+                self.of_nothing = predicted(self.segment, self.x, zero_pieces, model, self.values)
+            after = predicted(self.segment, self.x, change, model, self.values) - self.of_nothing
         else:
             after = predicted(self.segment, self.x, change, model, self.quiet)
         return -after / column.step if np.any(np.abs(after) > _NOTHING) else None
