@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
@@ -423,3 +423,36 @@ def between(signal: Any, at: Array) -> Any:
 
 Values = Mapping[str, float]
 Signals = Mapping[str, Array]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Noted(Mapping[str, float]):
+    """Values that note which of them are read.
+
+    Attributes
+    ----------
+    plain
+        The values.
+    read
+        Names that were read, each after the `stem`.
+    stem
+        What goes before the names: of the short names of an effect, `effect.`.
+
+    """
+
+    plain: Values
+    read: set[str]
+    stem: str = ""
+
+    def __getitem__(self, name: str) -> float:
+        """The value of a name, which counts as read."""
+        self.read.add(self.stem + name)
+        return self.plain[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """The names."""
+        return iter(self.plain)
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.plain)

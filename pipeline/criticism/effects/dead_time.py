@@ -24,6 +24,9 @@ def _drop(x: Operating, q: Values) -> Complex:
     whole_v = q["loss_v"] + q["given_v"]
     if q["given_v"] and x.supply.volts_v is not None:
         x = x.fed(volts_v=x.supply.volts_v + given_v)
+    on: Complex = q["on_v"] / x.machine.scales["current_a"] * x.i_a
+    if not (q["loss_v"] or q["given_v"]):
+        return on
     turn, phases, eps = _phases(x, q["lag_s"])
     if q["ripple"] == _EDGES:
         shares = lost_shares(x, eps, phases, whole_v, q["width_a"])
@@ -32,7 +35,7 @@ def _drop(x: Operating, q: Values) -> Complex:
     else:
         shares = np.tanh(phases / q["width_a"])
     rotor: Complex = whole_v * vector_of(shares) * np.conj(turn) - given_v
-    return rotor + q["on_v"] / x.machine.scales["current_a"] * x.i_a if q["on_v"] else rotor
+    return rotor + on if q["on_v"] else rotor
 
 
 def _given(x: Operating, q: Values) -> Complex:

@@ -20,7 +20,7 @@ from functools import partial
 import numpy as np
 
 from pipeline.criticism.effect import CoenergyHook, Effect, Hooks
-from pipeline.criticism.operating import Array, Complex, Operating, Values
+from pipeline.criticism.operating import Array, Complex, Noted, Operating, Values
 from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.captures import Priors
 from pipeline.criticism.policy.policy import Policy
@@ -250,7 +250,7 @@ class Model:
         return replace(self, effects=tuple(e for e in self.effects if e.name not in names))
 
 
-def values_of(effect: Effect, machine: Machine, values: Values) -> dict[str, float]:
+def values_of(effect: Effect, machine: Machine, values: Values) -> Values:
     """The parameters of one effect by their short names.
 
     Parameters
@@ -264,14 +264,17 @@ def values_of(effect: Effect, machine: Machine, values: Values) -> dict[str, flo
 
     Returns
     -------
-    dict of float
-        In their units; 0 for those of optional terms that are left out.
+    mapping of float
+        In their units; 0 for those of optional terms that are left out. Of `Noted` values, one that
+        notes in the same set.
 
     """
-    parameters = {p.name: values[f"{effect.name}.{p.name}"] for p in effect.parameters_of(machine)}
-    if not effect.left_out:
-        return parameters
-    return {p.name: 0.0 for p in effect.every(machine)} | parameters
+    noted = values if isinstance(values, Noted) else None
+    known, stem = values if noted is None else noted.plain, f"{effect.name}."
+    parameters = {p.name: known[stem + p.name] for p in effect.parameters_of(machine)}
+    if effect.left_out:
+        parameters = {p.name: 0.0 for p in effect.every(machine)} | parameters
+    return parameters if noted is None else Noted(parameters, noted.read, stem)
 
 
 def clock_gain(recorder: str | None, model: Model, values: Values) -> float:
@@ -400,14 +403,22 @@ def effect_flux(effect: Hooks, x: Operating, q: Values) -> tuple[Complex, Array]
     def slope(moved: Operating) -> Array:
         return np.imag(hook(moved, q)) / _STEP * ones
 
-    by_d = slope(replace(x, id_a=x.id_a + 1j * _STEP))
-    by_q = slope(replace(x, iq_a=x.iq_a + 1j * _STEP))
+    by_d = slope(replace(x, id_a=_stepped(x, x.id_a)))
+    by_q = slope(replace(x, iq_a=_stepped(x, x.iq_a)))
     flux: Complex = by_d + 1j * by_q
     used = frozenset(name for name, value in q.items() if value)
     if not x.once(x.eps_rad, (hook, used), lambda: _turns(hook, x.one_sample(), q)):
         return flux, np.zeros(shape)
-    beside = x.once(x.eps_rad, "beside", lambda: x.eps_rad + 1j * _STEP)
-    return flux, slope(replace(x, eps_rad=beside))
+    return flux, slope(replace(x, eps_rad=_stepped(x, x.eps_rad)))
+
+
+def _stepped(x: Operating, column: Array) -> Complex:
+    """A column [n] of a state after its complex step; the same array for all effects."""
+
+    def stepped() -> Complex:
+        return column + np.complex128(1j * _STEP)
+
+    return x.once(column, "beside", stepped)
 
 
 def _turns(hook: CoenergyHook, x: Operating, q: Values) -> bool:

@@ -30,7 +30,7 @@ from pipeline.criticism.machine.model import (
     values_of,
     zero,
 )
-from pipeline.criticism.operating import Array, Complex, Operating, Values
+from pipeline.criticism.operating import Array, Complex, Noted, Operating, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.noise_floors import Floor, offsets, reading_error, window_gain
@@ -197,7 +197,10 @@ def _weak_columns(
     known, nothing = sampler.weak, np.zeros(int(valid.sum()))
     new = [column for column in columns if known.get(column.key, (None, nothing))[0] != column]
     for first in range(0, len(new), _CHUNK):
-        changes = {column.key: sampler.change(column) for column in new[first : first + _CHUNK]}
+        changes: dict[ColumnKey, Array | None] = {}
+        for column in (part := new[first : first + _CHUNK]):
+            if sampler.twin(column) is None:
+                changes[column.key] = sampler.change(column)
         observed = {key: change for key, change in changes.items() if change is not None}
         computed = dict.fromkeys(changes, nothing)
         if observed:
@@ -207,7 +210,10 @@ def _weak_columns(
             weak[moving] = projected(segment, stacked[moving])
             parts = weak.reshape(len(observed), *valid.shape)
             computed |= {key: one[valid] for key, one in zip(observed, parts, strict=True)}
-        known.update({c.key: (c, computed[c.key]) for c in new[first : first + _CHUNK]})
+        known.update({c.key: (c, computed[c.key]) for c in part if c.key in computed})
+    for column in new:
+        if (twin := sampler.twin(column)) is not None:
+            known[column.key] = column, known[twin][1]
     return [known[column.key][1] for column in columns]
 
 
@@ -306,12 +312,14 @@ def _reading_error(segment: Segment, model: Model, near: Values) -> Array:
 class _Sampler:
     """Sampled change of a segment's residual along columns; hooks are linear, sensors are not.
 
-    `weak`: the weak samples [R] of columns that were asked for, by their keys.
+    `weak`: the weak samples [R] of columns that were asked for, by their keys. `read`: by the name
+    of a parameter, its columns in a model without the effect, and which values each read.
     """
 
     def __init__(self, segment: Segment, model: Model, values: dict[str, float]) -> None:
         self.segment, self.model, self.values = segment, model, values
         self.weak: dict[ColumnKey, tuple[Column, Array]] = {}
+        self.read: dict[str, list[tuple[Column, set[str]]]] = {}
         self.observes = equation_of(segment).observes
         self.recorder = equation_of(segment).recorder
         self.x = operate(segment, segment.recorded, model, values)
@@ -320,6 +328,7 @@ class _Sampler:
         self.effect_pieces: dict[str, Pieces] = {}
         self.gains = {c.name for c in base_of(model.machine) if c.hook in ("gain", "log")}
         self.paced: dict[float, Array] = {}
+        self.of_nothing: Array | None = None
         self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
         self.base_residual = measured(segment, segment.recorded, model, values) - self.start
@@ -329,6 +338,16 @@ class _Sampler:
     def at(self, segment: Segment, model: Model, values: Values) -> bool:
         """Whether this is the sampler of a segment at a point."""
         return segment is self.segment and values == self.values and model == self.model
+
+    def twin(self, column: Column) -> ColumnKey | None:
+        """Key of a column that was computed at other shapes, and read none of those that differ."""
+        stem = column.name.partition(".")[0]
+        for other, read in self.read.get(column.name, ()):
+            differ = {f"{stem}.{name}" for name, _ in {*column.at} ^ {*other.at}}
+            same = (other.effect, other.step) == (column.effect, column.step)
+            if same and differ.isdisjoint(read):
+                return other.key
+        return None
 
     def change(self, column: Column) -> Array | None:
         """d(residual)/d(parameter) [C, n]; None where it is zero throughout."""
@@ -399,7 +418,7 @@ class _Sampler:
         inside = effect in self.model.effects
         model = self.model if inside else self.model.with_effects(effect)
         start = self._start(column, effect)
-        moved = {**start, column.name: start[column.name] + column.step}
+        moved = self._moved(column, start)
         if effect.clock is not None:
             gains = [clock_gain(self.recorder, model, values) for values in (start, moved)]
             return self._along_time(column.step) * (gains[1] - gains[0]) / column.step
@@ -415,7 +434,7 @@ class _Sampler:
             self.paced[step] = (self._residual(self.model, moved) - self.base_residual) / step
         return self.paced[step]
 
-    def residual_with(self, effect: Effect, model: Model, moved: dict[str, float]) -> Array:
+    def residual_with(self, effect: Effect, model: Model, moved: Values) -> Array:
         """The residual where an effect has moved. An error of a voltage or a torque leaves the
         machine's state, and what its hooks gave, as they are.
         """
@@ -432,10 +451,18 @@ class _Sampler:
             return self.values
         return {**self.values, **zero(effect, self.model, column.at)}
 
+    def _moved(self, column: Column, start: Mapping[str, float]) -> Values:
+        """The values after a column's step; at trial shapes, they note which of them are read."""
+        moved = {**start, column.name: start[column.name] + column.step}
+        if not column.at:
+            return moved
+        read: set[str] = set()
+        self.read.setdefault(column.name, []).append((column, read))
+        return Noted(moved, read)
+
     def _hook(self, column: Column, effect: Effect) -> Array | None:
         start = self._start(column, effect)
-        moved = {**start, column.name: start[column.name] + column.step}
-        change = self._pieces(effect, moved)
+        change = self._pieces(effect, self._moved(column, start))
         if effect in self.model.effects:
             if effect.name not in self.effect_pieces:
                 self.effect_pieces[effect.name] = self._pieces(effect, start)
@@ -458,10 +485,10 @@ class _Sampler:
             return drag if np.any(drag) else None
         model = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
         if self.observes.form == "affine":
-            zero_pieces = self._pieces_of_nothing()
-            after = predicted(self.segment, self.x, change, model, self.values) - predicted(
-                self.segment, self.x, zero_pieces, model, self.values
-            )
+            if self.of_nothing is None:
+                zero_pieces = self._pieces_of_nothing()
+                self.of_nothing = predicted(self.segment, self.x, zero_pieces, model, self.values)
+            after = predicted(self.segment, self.x, change, model, self.values) - self.of_nothing
         else:
             after = predicted(self.segment, self.x, change, model, self.quiet)
         return -after / column.step if np.any(np.abs(after) > _NOTHING) else None

@@ -20,6 +20,7 @@ from pipeline.criticism.regression.linear_system import (
 from pipeline.criticism.regression.linearise import _Sampler, absorb, effect_columns, whitened_anew
 from pipeline.criticism.regression.noise_floors import offsets
 from pipeline.criticism.residuals.residual import operate, residual
+from pipeline.criticism.selection.score_test import candidates
 from tests.unit.criticism.machines import BASE, coasting, log, machine
 
 PLAIN = Model(machine(), ())
@@ -146,6 +147,20 @@ def test_a_drag_s_column_has_the_gain_of_the_transducer_in_it():
     expected = residual(segment, with_it, moved) - residual(segment, with_it, still)
     found = _Sampler(segment, PLAIN, values).change(column)
     assert found * column.step == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("one", [log(noise=1.0), coasting()], ids=["log", "coast"])
+def test_a_column_at_shapes_that_it_does_not_read_is_the_one_before(one):
+    sampler, anew = (_Sampler(one, PLAIN, {**BASE}) for _ in range(2))
+    changes, twins = {}, []
+    for column in (c for offered in candidates(LIBRARY, PLAIN) for c in offered.columns):
+        twin = sampler.twin(column)
+        if twin is None:
+            changes[column.key] = sampler.change(column)
+        else:
+            assert np.array_equal(changes[twin], anew.change(column))
+            twins.append(column.name)
+    assert ("current_gain.mean" in twins) is (one.kind == "dq")
 
 
 def test_a_fit_that_comes_back_to_where_it_was_computes_nothing_again(monkeypatch):
