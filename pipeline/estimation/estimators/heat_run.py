@@ -257,6 +257,7 @@ ESTIMATOR = Estimator(
     EXPERIMENT,
     fit_heat_run,
     uses=("temp_coeff_magnet_1_k", *TURNING, *REFERENCE),
+    rank=1,
     options={
         "least_span_k": 5.0,
         # A bead of half a millimetre in the winding follows within a tenth of a second, one in a
