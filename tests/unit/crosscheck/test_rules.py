@@ -14,6 +14,7 @@ from scipy.signal import lfilter
 from pipeline.crosscheck import registry
 from pipeline.crosscheck.protocol import Rule
 from pipeline.crosscheck.registry import rules
+from pipeline.crosscheck.rules import torque_equation
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
@@ -307,6 +308,19 @@ def test_torque_equation_needs_both_terms() -> None:
     assert judge("torque_equation", constants(), whole).status == "pass"
     wrong_sign = constants({"kt_reluctance_nm_a2": -10 * P * (LD - LQ)})
     assert judge("torque_equation", wrong_sign, whole).status == "fail"
+
+
+@pytest.mark.parametrize(("gain", "suspect"), [(1.0, "saturation"), (1.1547, "1.1547")])
+def test_a_convention_is_in_the_torque_at_no_d_current_too(gain: float, suspect: str) -> None:
+    """A reluctance torque that is off by itself lands on 1.1547; a convention scales all of it."""
+    whole = torque_map()
+    id_a = min(torque_equation._strongest_d_current_a(whole), 0.0)
+    kt, slope = 1.5 * P * PSI, 1.5 * P * (LD - LQ)
+    off = (1.1547 * (kt + slope * id_a) - kt) / id_a if gain == 1.0 else gain * slope
+    made = constants({"kt_peak_nm_a": gain * kt, "kt_reluctance_nm_a2": off})
+    check = judge("torque_equation", made, whole)
+    assert check.value == pytest.approx(1.1547, abs=1e-3)
+    assert suspect in (check.suspect or "")
 
 
 def current_step(tau_s: float, temp_degc: float | None = 25.0) -> Campaign:
