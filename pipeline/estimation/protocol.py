@@ -59,7 +59,8 @@ class Estimator:
         Those of `uses` that refine the result and are not needed; a plan does not propose to record
         them for that.
     rank
-        Preference among estimators of one constant; the lowest is published.
+        Preference among estimators of one constant; the lowest is published, among equals the one
+        that is known best.
     terms
         Glossary entries of constants that `contract/outputs.md` does not name.
     clock_powers

@@ -127,7 +127,7 @@ def fit_all(
     Returns
     -------
     constants
-        All estimates in order of preference (rank, then dependency order).
+        All estimates in order of preference (rank, then uncertainty, then dependency order).
     evidence
         Of all fits.
     failures
@@ -169,12 +169,17 @@ def _fit_all(
         else:
             fitted = Fit(_missing(estimator, estimator.experiment))
         fits.append((estimator.rank, order, _possible(estimator, fitted)))
-        ranked = sorted(fits, key=lambda item: item[:2])
-        measured = reconciled(Constants(tuple(e for _, _, fit in ranked for e in fit.estimates)))
+        measured = reconciled(Constants(_preferred(fits)))
         known = Constants((*measured.estimates, *stated))
     known = Constants(tuple(_untorn(e) for e in known.estimates))
     evidence = tuple(e for _, _, fit in fits for e in fit.evidence)
     return known, evidence, tuple(failures)
+
+
+def _preferred(fits: Sequence[tuple[int, int, Fit]]) -> tuple[Estimate, ...]:
+    """All estimates by rank; of equal rank the one that is known best, then as they were fitted."""
+    estimates = [(rank, order, e) for rank, order, fit in fits for e in fit.estimates]
+    return tuple(e for *_, e in sorted(estimates, key=lambda item: (item[0], item[2].u, item[1])))
 
 
 def _fitted(

@@ -186,8 +186,11 @@ def _constants() -> Iterable[Term]:
     yield constant("cogging_order", "1", "leading cogging order a mechanical turn", 1, 5000, True)
     yield constant("cogging_amplitude_nm", "N·m", "amplitude of the leading cogging order")
     yield constant("j_rotor_kgm2", "kg·m²", "rotor inertia", TINY, 1e4)
-    yield constant("torque_coulomb_nm", "N·m", "Coulomb friction torque")
-    yield constant("b_visc_nm_s_rad", "N·m·s/rad", "viscous friction coefficient", -1.0, 1e4)
+    # the magnet's flux brakes at zero current too: only a rotor without magnets parts iron from dry
+    dry = "drag of any speed: Coulomb friction, and hysteresis of the iron"
+    viscous = "drag over speed: viscous friction, and eddy currents of the magnet's flux"
+    yield constant("torque_coulomb_nm", "N·m", dry)
+    yield constant("b_visc_nm_s_rad", "N·m·s/rad", viscous, -1.0, 1e4)
     yield constant("tau_elec_s", "s", "electrical time constant, Lq over R", 0.0, 100.0)
     yield constant("tau_mech_s", "s", "mechanical time constant, J R over 1.5 (p ψ)²", 0.0, 1e5)
     yield constant("rth_winding_k_w", "K/W", "winding to ambient, steady state", 0.0, 1e4)

@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.requirements import LINE_CURRENTS
 from pipeline.contracts.waveform import Array, noise_of
+from pipeline.numerics.plateaus import block_means
 from pipeline.physics.glossary import of_ohmmeter
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
@@ -25,7 +26,9 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
     - resistance: an ohmmeter's readings pass; max |i| > m σ in a line, else refused; one level only
       warns.
-    - current step, torque map: the range of the current > 2 m σ, else refused.
+    - current step: the range of the current > 2 m σ, else refused.
+    - torque map: the range of the current's means over a hundredth of the rows > 2 m σ of a mean,
+      else refused: a ripple from row to row hides no level.
     - heat run: max |i| > m σ, else refused; a rise of the winding below `rise_k` [K] warns.
     - flux map, torque table: two levels or more, else refused; a table of one sense only warns.
 
@@ -76,7 +79,9 @@ def _step(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 def _torque_map(capture: Capture, options: Mapping[str, float]) -> Passed:
     current = _finite(capture, "iq_a")["iq_a"]
-    if _clear_of_noise(current, np.ptp(current), 2.0 * options["noise_multiple"]):
+    size = max(current.size // 100, 1)
+    levels = block_means(current, size)
+    if np.ptp(levels) > 2.0 * options["noise_multiple"] * noise_of(current) / np.sqrt(size):
         return Passed()
     raise CaptureError(
         CODE,

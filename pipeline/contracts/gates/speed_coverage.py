@@ -14,6 +14,7 @@ from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
 CODE = "speed_coverage"
+PARTS = 100
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
@@ -21,10 +22,10 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
     Notes
     -----
-    Spin-down: the median speed of the fastest tenth of the record over that of the last tenth (by
+    Spin-down: the median speed of the fastest hundredth of the record over that of the last one (by
     the travel of an angle where no speed is there); below `fall` [1] refuses, for Coulomb and
-    viscous friction cannot be separated then. Torque map and drive: less than `turns` [1] of travel
-    warns.
+    viscous friction cannot be separated then. A coast may be a small part of its record.
+    Torque map and drive: less than `turns` [1] of travel warns.
 
     """
     if capture.meta.test == "spin_down":
@@ -41,7 +42,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _coast(capture: Capture, options: Mapping[str, float]) -> Passed:
-    speeds = _speeds_of_tenths(capture)
+    speeds = _speeds_of_parts(capture)
     top, end = float(np.max(speeds)), float(speeds[-1])
     if end * options["fall"] <= top and top > 0.0:
         return Passed()
@@ -53,20 +54,20 @@ def _coast(capture: Capture, options: Mapping[str, float]) -> Passed:
     )
 
 
-def _speeds_of_tenths(capture: Capture) -> NDArray[np.float64]:
-    """Speed [10 or fewer, rad/s] of each tenth of a record: its median, or by the angle's travel.
+def _speeds_of_parts(capture: Capture) -> NDArray[np.float64]:
+    """Speed [100 or fewer, rad/s] of each hundredth of a record: its median, or the angle's travel.
 
-    Fewer than ten rows have a tenth each.
+    Fewer than a hundred rows are a part each.
     """
     column = "omega_mech_rad_s" if capture.has("omega_mech_rad_s") else "theta_mech_rad"
     columns = capture.arrays("t_s", column)
     fine = np.isfinite(columns["t_s"]) & np.isfinite(columns[column])
     t_s, motion = columns["t_s"][fine], columns[column][fine]
     if column == "theta_mech_rad":
-        ends = np.linspace(0, max(t_s.size - 1, 0), min(11, t_s.size)).round().astype(int)
+        ends = np.linspace(0, max(t_s.size - 1, 0), min(PARTS + 1, t_s.size)).round().astype(int)
         travel, took = np.diff(motion[ends]), np.diff(t_s[ends])
         return np.abs(travel / took) if ends.size > 1 else np.zeros(1)
-    parts = np.array_split(np.abs(motion), min(10, max(motion.size, 1)))
+    parts = np.array_split(np.abs(motion), min(PARTS, max(motion.size, 1)))
     return np.array([float(np.median(part)) if part.size else 0.0 for part in parts])
 
 

@@ -26,10 +26,11 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
     Notes
     -----
-    Block means of 1.5 (v_d i_d + v_q i_q) are regressed on shaft power, i² (copper), |i| (inverter
-    drop), |ω| and ω² (friction, iron): the coefficient of shaft power is 1 in any machine, whatever
-    it loses, and lands on a convention's number where one is wrong. i_q ω is the instrument for
-    shaft power, so that a shaft that rings does not pull it to zero. Its uncertainty is that of the
+    Block means of 1.5 (v_d i_d + v_q i_q) are regressed on shaft power P, dP/dt (a transducer that
+    lags by τ reads P - τ dP/dt), i² (copper), |i| (inverter drop), |ω| and ω² (friction, iron): the
+    coefficient of shaft power is 1 in any machine, whatever it loses, and lands on a convention's
+    number where one is wrong. i_q ω is the instrument for shaft power, so that a shaft that rings
+    does not pull it to zero, and its rate the one for dP/dt. Its uncertainty is that of the
     regression and of the gains of current, voltage and torque; the option `allowance` [1] is added.
 
     References
@@ -76,7 +77,8 @@ def _speed(data: Mapping[str, Array]) -> Array:
 
 
 def _blocks(capture: Capture, r_phase_ohm: float | None) -> Array:
-    """Block means [n, 8]: net power, i_q omega, shaft power, i², |i|, |omega|, omega², 1; SI.
+    """Block means [n, 10]: net power; i_q omega, shaft power, a rate behind each; then i², |i|,
+    |omega|, omega², 1; SI.
 
     Copper loss at the winding's temperature is taken off where R and the temperature are known,
     so that its slow growth is not read as anything else.
@@ -85,18 +87,20 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> Array:
     wanted = (*COLUMNS, speed, *(n for n in ("temp_winding_degc",) if capture.has(n)))
     data = capture.finite(*wanted)
     if data["t_s"].size < LEAST_ROWS:
-        return np.empty((0, 8))
+        return np.empty((0, 10))
     i_squared = data["id_a"] ** 2 + data["iq_a"] ** 2
     power = 1.5 * (data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"])
     if r_phase_ohm is not None and "temp_winding_degc" in data:
         r_ohm = copper_resistance_ohm(r_phase_ohm, data["temp_winding_degc"], 25.0)
         power = power - 1.5 * r_ohm * i_squared
     omega = _speed(data)
-    shaft = data["torque_shaft_nm"] * omega
+    driving, shaft = data["iq_a"] * omega, data["torque_shaft_nm"] * omega
     columns = (
         power,
-        data["iq_a"] * omega,
+        driving,
+        np.gradient(driving, data["t_s"]),
         shaft,
+        np.gradient(shaft, data["t_s"]),
         i_squared,
         np.sqrt(i_squared),
         np.abs(omega),
@@ -109,15 +113,15 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> Array:
 
 
 def _slope(blocks: Array) -> tuple[float, float]:
-    """Coefficient of shaft power by the instrument in column 1, and its standard uncertainty.
+    """Coefficient of shaft power, and its standard uncertainty, by the instruments in columns 1, 2.
 
     Sandwich with five lags (Newey and West, Econometrica 55, 1987): blocks neither scatter alike
     nor independently.
     """
     scale = np.maximum(np.abs(blocks).max(axis=0), 1e-300)
     scaled = blocks / scale
-    y, x = scaled[:, 0], scaled[:, 2:]
-    instruments = np.column_stack([scaled[:, 1], scaled[:, 3:]])
+    y, x = scaled[:, 0], scaled[:, 3:]
+    instruments = np.column_stack([scaled[:, 1:3], scaled[:, 5:]])
     bread = np.linalg.pinv(instruments.T @ x, rcond=1e-10)
     beta = bread @ (instruments.T @ y)
     meat = instruments * (y - x @ beta)[:, None]
@@ -125,7 +129,7 @@ def _slope(blocks: Array) -> tuple[float, float]:
     for lag in range(1, 6):
         shifted = (1.0 - lag / 6.0) * (meat[lag:].T @ meat[:-lag])
         spread = spread + shifted + shifted.T
-    unit = scale[0] / scale[2]
+    unit = scale[0] / scale[3]
     u = np.sqrt(max(float((bread @ spread @ bread.T)[0, 0]), 0.0))
     return float(beta[0]) * unit, float(u) * unit
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
+from pipeline.crosscheck.judge import Ratio, judge_deviation, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
@@ -15,6 +16,7 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import propagate
 
 NAME = "torque_equation"
+BENT = "saturation or cross-saturation: torque agrees at no d current, and inductances are of steps"
 
 
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
@@ -24,7 +26,8 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     -----
     (Kt + k_r i_d)/(1.5 p [ψ + (L_d − L_q) i_d]), with Kt and k_r fitted to the torque map and ψ,
     L_d, L_q from back-EMF and steps: both terms of the torque equation at once, where the
-    reluctance term weighs most. The option `allowance` [1] covers the map's own saturation.
+    reluctance term weighs most. The option `allowance` [1] covers the map's own saturation. A
+    convention would be in the torque at no d current too: where that agrees, none is suspected.
 
     References
     ----------
@@ -41,7 +44,7 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     if id_a == 0.0:
         return not_evaluated(NAME, "needs a torque_map with d currents")
     pairs = round(present["pole_pairs"].number)
-    return judge_ratio(
+    judged = judge_ratio(
         NAME,
         _ratio(present, pairs, id_a),
         options["allowance"],
@@ -50,6 +53,9 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
         pairs,
         "inductances or torque of other conditions, or a sensor's gain",
     )
+    magnet = _ratio(present, pairs, 0.0)
+    of_magnet = judge_deviation(magnet.value - 1.0, magnet.u, options["allowance"])
+    return replace(judged, suspect=BENT) if judged.suspect and of_magnet == "pass" else judged
 
 
 def _strongest_d_current_a(campaign: Campaign) -> float:

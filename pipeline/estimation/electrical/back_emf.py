@@ -89,15 +89,26 @@ def flux_of(spin: Spin, stretch: Stretch, orders: Sequence[int]) -> StretchFlux:
     slope = np.array([c[0].real, c[0].imag]) / psi
     u_psi = math.sqrt(variance * float(slope @ inverse[:2, :2] @ slope))
     temps = None if spin.temp_degc is None else spin.temp_degc[stretch.rows]
+    ratios = {abs(k): complex(c[n] / c[0]) for n, k in enumerate(ranks) if abs(k) > 1}
+    if len(spin.channels) == 1 and _backward(spin, stretch):
+        ratios = {k: ratio.conjugate() for k, ratio in ratios.items()}
     return StretchFlux(
         psi,
         u_psi,
-        {abs(k): complex(c[n] / c[0]) for n, k in enumerate(ranks) if abs(k) > 1},
+        ratios,
         u_psi / psi,
         stretch.speed_rad_s,
         None if temps is None or not np.isfinite(temps).any() else float(np.nanmean(temps)),
         float(psi * omega.mean()),
     )
+
+
+def _backward(spin: Spin, stretch: Stretch) -> bool:
+    """Whether the shaft turns backward, as far as it is recorded: one voltage alone does not tell,
+    and is read as that of the positive sense, which mirrors the phases of its harmonics.
+    """
+    motion = spin.omega_rad_s if spin.theta_rad is None else np.gradient(spin.theta_rad)
+    return motion is not None and float(np.nanmean(motion[stretch.rows])) < 0.0
 
 
 def _least_squares(designs: Sequence[Array], samples: Sequence[Array]) -> tuple[Array, Array]:

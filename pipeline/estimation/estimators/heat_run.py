@@ -33,6 +33,7 @@ from pipeline.records.uncertainty import Budget, Contribution, propagate
 
 METHOD = Method("heat_run")
 GIVES = ("temp_coeff_copper_1_k", "r_phase_ohm")
+LAG = "assumed:thermometer_lag"
 EXPERIMENT = (
     "record a heat_run: steady current on a locked rotor until the winding is 20 K warmer, with "
     "temp_winding_degc, voltage and current"
@@ -41,7 +42,10 @@ EXPERIMENT = (
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """R(T) = r25 + slope (T - 25) of one heat run [ohm, ohm/K] with scatter and its means."""
+    """R(T) = r25 + slope (T - 25) of one heat run [ohm, ohm/K] with scatter and its means.
+
+    It warms by dT/dt = rise_25 - rise_rate (T - 25) [K/s, 1/s].
+    """
 
     record: HeatRecord
     r25_ohm: float
@@ -49,6 +53,7 @@ class Line:
     covariance: Array
     span_k: float
     rise_rate_1_s: float
+    rise_25_k_s: float
     dof: float
     fitted: Array
 
@@ -140,6 +145,7 @@ def _line(record: HeatRecord) -> Line | None:
         fit.covariance * tau,
         float(np.ptp(excess)),
         max(-float(rate.coefficients[1]), 0.0),
+        float(rate.coefficients[0]),
         max(fit.dof / tau, 1.0),
         record.r_phase_ohm - fit.residuals,
     )
@@ -148,16 +154,15 @@ def _line(record: HeatRecord) -> Line | None:
 def _slope_budget(line: Line, options: Mapping[str, float]) -> Budget:
     """Contributions to dR/dT: scatter, gains, and a thermometer that lags.
 
-    A lag tau_l behind a temperature that settles at rate k changes the slope by k tau_l; one
-    exponential does not separate it from alpha, so a slow thermometer has to be stated (`u_lag_s`).
+    A lag tau_l behind a temperature that settles at rate k makes the slope smaller by k tau_l, and
+    R25 larger by what the winding warms in tau_l at 25 degC; one exponential does not separate it
+    from alpha, so a slow thermometer has to be stated (`u_lag_s`).
     """
     slope = line.slope_ohm_k
     parts = [
         METHOD.scatter("slope", math.sqrt(float(line.covariance[1, 1])), line.dof),
         *_gains(line, slope),
-        Contribution(
-            "assumed:thermometer_lag", slope * line.rise_rate_1_s * options["u_lag_s"], "B"
-        ),
+        Contribution(LAG, slope * line.rise_rate_1_s * options["u_lag_s"], "B"),
     ]
     return budget_of(parts)
 
@@ -231,6 +236,7 @@ def _resistance(line: Line, options: Mapping[str, float], notes: Sequence[str]) 
             temperature_source(meta), -line.slope_ohm_k * meta.instrument_u("u_temp_degc"), "B"
         ),
         Contribution("assumed:voltage_offset_v", drop / current, "B"),
+        Contribution(LAG, -line.slope_ohm_k * line.rise_25_k_s * options["u_lag_s"], "B"),
     ]
     at = {"temp_winding_degc": 25.0, "current_a": round(current, 4)}
     words = [*notes]
@@ -257,6 +263,7 @@ ESTIMATOR = Estimator(
     EXPERIMENT,
     fit_heat_run,
     uses=("temp_coeff_magnet_1_k", *TURNING, *REFERENCE),
+    rank=1,
     options={
         "least_span_k": 5.0,
         # A bead of half a millimetre in the winding follows within a tenth of a second, one in a

@@ -7,7 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.estimation.electrical.magnet_temperature import magnet_source, magnet_uncertainties
+from pipeline.estimation.electrical.magnet_temperature import (
+    magnet_source,
+    magnet_uncertainties,
+    unlogged_note,
+)
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.electrical.ripple_torque import RIPPLE, winding_of
 from pipeline.estimation.mechanical.drag import drag_of
@@ -22,7 +26,7 @@ from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.setups import another_setup, setups_of
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, SAMPLED, ShaftRows, shaft_rows
-from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
+from pipeline.estimation.mechanical.torque_constant import UNKNOWN, USES, torque_constant
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -36,6 +40,7 @@ from pipeline.estimation.uncertainty.instruments import (
 )
 from pipeline.estimation.uncertainty.regimes import Disagreement
 from pipeline.numerics.coast_setups import Setup, setup_words
+from pipeline.numerics.identifiability import within
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
@@ -227,7 +232,7 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
         campaign = replace(campaign, captures=campaign.of("drive"))
     rows = _rows(known, campaign) if torque is not None else None
     if torque is None or rows is None or not np.any(rows.kind == DRIVE):
-        missing = "a torque constant is not known" if torque is None else "no usable drive log"
+        missing = UNKNOWN if torque is None else "no usable drive log"
         missing = f"{missing}; {_setups_reason(setups)}" if len(setups) > 1 else missing
         return METHOD.nothing(GIVES, f"{missing}; {EXPERIMENT}")
     nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
@@ -258,9 +263,12 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
 
 
 def _of_a_known_sign(estimates: tuple[Estimate, ...]) -> tuple[Estimate, ...]:
-    """The estimates; none where the inertia, which comes first, may be zero."""
+    """The estimates; none where the inertia, which comes first and scales the others, may be zero.
+
+    What is not known to its own size is published by nobody (`estimation.registry`).
+    """
     inertia = estimates[0]
-    if not inertia.known or inertia.u < abs(inertia.number):
+    if not inertia.known or within(np.array(inertia.u), np.array(abs(inertia.number))):
         return estimates
     note = (
         f"the acceleration does not follow the torque: the inertia came out as "
@@ -432,7 +440,8 @@ def _words(rows: ShaftRows, torque: Torque, drag: DragFit) -> list[str]:
         words.append("id_a not logged, its torque taken as none")
     if not np.any(rows.kind == COAST):
         words.append("no spin_down: friction from driven motion alone")
-    return [*words, unstated_note(rows.captures, ("current", "torque"))]
+    drives = [c for c in rows.captures if c.meta.test == "drive"]
+    return [*words, unlogged_note(drives), unstated_note(rows.captures, ("current", "torque"))]
 
 
 def _load_words(rows: ShaftRows, strange: float, left_out: Sequence[str]) -> list[str]:

@@ -31,7 +31,7 @@ from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import Contribution
+from pipeline.records.uncertainty import Contribution, propagate
 
 TERMS = (
     Term("coast_coulomb_rad_s2", "rad/s²", "Coulomb friction over inertia, from coasting",
@@ -156,8 +156,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 
     The trajectory is integrated, the record never differentiated; windage, Stribeck's bump and an
     eccentric encoder join where the residuals demand them. J is not in it: that needs a known
-    torque (estimator inertia). Coasts of several set-ups (`coast_setups`) have no common value;
-    what each gives is in the note.
+    torque (estimator inertia). Where no one drag explains both senses and one of each does, their
+    mean is given, which is the part that is odd in speed. Coasts of several set-ups
+    (`coast_setups`) have no common value; what each gives is in the note.
     """
     del known
     captures = campaign.of("spin_down")
@@ -184,22 +185,53 @@ def _fit(captures: Sequence[Capture], options: Mapping[str, float]) -> Fit:
         return METHOD.nothing(
             GIVES, f"no coast-down of {LEAST_SAMPLES} samples or more; {EXPERIMENT}"
         )
+    motion, solution = _solved(coasts, options["level"])
+    senses = [[c for c in coasts if c.sense == sense] for sense in (1, -1)]
+    if all(senses) and _residual(solution) > policy().coast_down.unexplained:
+        each = [(of_sense, *_solved(of_sense, options["level"])) for of_sense in senses]
+        if all(_residual(one[2]) <= policy().coast_down.unexplained for one in each):
+            return _of_both_senses(each)
+    if not np.isfinite([solution.u(0), solution.u(1)]).all():
+        return METHOD.nothing(
+            GIVES, f"the coasts do not part dry from viscous friction; {EXPERIMENT}"
+        )
+    return Fit(_estimates(motion, coasts, solution), _evidence(motion, coasts, solution))
+
+
+def _solved(coasts: Sequence[Coast], level: float) -> tuple[Motion, NonlinearFit]:
+    """One drag of all coasts, with what the residuals demand."""
     fastest = max(c.speed_rad_s for c in coasts)
     motion = Motion((), (), fastest)
     solution = _solve(motion, coasts, None)
     for _ in range(2):
-        wider = _wider(motion, coasts, solution, options["level"])
+        wider = _wider(motion, coasts, solution, level)
         if wider == motion:
             break
         solution = _solve(
             wider, coasts, _transferred(motion, wider, solution.parameters, len(coasts))
         )
         motion = wider
-    if not np.isfinite([solution.u(0), solution.u(1)]).all():
-        return METHOD.nothing(
-            GIVES, f"the coasts do not part dry from viscous friction; {EXPERIMENT}"
-        )
-    return Fit(_estimates(motion, coasts, solution), _evidence(motion, coasts, solution))
+    return motion, solution
+
+
+def _residual(fit: NonlinearFit) -> float:
+    """What a fit leaves [1], in the encoder's own noise."""
+    free = fit.residuals.size - fit.parameters.size
+    return float(np.sqrt(fit.residuals @ fit.residuals / free))
+
+
+def _of_both_senses(each: Sequence[tuple[list[Coast], Motion, NonlinearFit]]) -> Fit:
+    """The mean of both senses' drags, where no one drag explains what one each does."""
+    pairs = zip(*(_estimates(motion, of, fit) for of, motion, fit in each), strict=True)
+    estimates = []
+    for one, other in pairs:
+        drags = f"{one.number:.5g} forward, {other.number:.5g} backward"
+        note = f"no one drag explains both senses, this is the mean of {drags}; {one.note}"
+        budget = propagate([(0.5, one.budget), (0.5, other.budget)])
+        value, paths = 0.5 * (one.number + other.number), sorted({*one.captures, *other.captures})
+        estimates.append(METHOD.measured(one.name, value, budget, paths, one.at, note))
+    plots = [plot for of, motion, fit in each for plot in _evidence(motion, of, fit)]
+    return Fit(tuple(estimates), tuple(plots))
 
 
 def _coasts(capture: Capture) -> list[Coast]:
@@ -321,8 +353,7 @@ def _transferred(old: Motion, new: Motion, parameters: Array, coasts: int) -> Ar
 
 
 def _estimates(motion: Motion, coasts: Sequence[Coast], fit: NonlinearFit) -> tuple[Estimate, ...]:
-    free = fit.residuals.size - fit.parameters.size
-    spread = float(fit.residuals @ fit.residuals) / free
+    free, spread = fit.residuals.size - fit.parameters.size, _residual(fit) ** 2
     tau = autocorrelation_time(fit.residuals)
     joint = fit.covariance[:2, :2] * spread * tau
     scale = np.sqrt(np.diag(joint))

@@ -6,6 +6,10 @@ from pipeline.physics.coupling import coupling_as
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, derived
 
+UNKNOWN = (
+    "a torque constant is not known: state kt_peak_nm_a and u_kt_peak_nm_a (`constants=`, or the "
+    "metadata), or record an open_circuit or a torque_map"
+)
 USES = ("kt_peak_nm_a", "kt_from_ke_nm_a", "ke_phase_peak_v_s_rad")
 
 

@@ -22,3 +22,12 @@ def test_two_levels_of_both_currents_make_a_flux_map() -> None:
     assert said("current_coverage", capture("flux_map", id_a=one, iq_a=two)) == "refused"
     assert said("current_coverage", capture("flux_map", id_a=two, iq_a=one)) == "refused"
     assert said("current_coverage", capture("flux_map", id_a=two)) == ""
+
+
+@pytest.mark.parametrize(("step_a", "expected"), [(0.5, ""), (0.0, "refused")])
+def test_steps_of_current_under_a_ripple_of_the_back_emf(step_a: float, expected: str) -> None:
+    """Thirteen levels below a ripple as large as all of them, of seven rows a period."""
+    levels = np.repeat(np.arange(13.0) - 6.0, 1000) * step_a
+    ripple = 3.0 * np.sin(0.9 * np.arange(levels.size))
+    made = capture("torque_map", iq_a=levels + ripple, torque_shaft_nm=levels)
+    assert said("current_coverage", made) == expected

@@ -74,11 +74,19 @@ def test_rotor_angles_count_modulo_a_half_turn(angles: list[float], expected: st
 @pytest.mark.parametrize(("end", "expected"), [(101.0, "refused"), (99.0, "")])
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_a_coast_falls_by_a_third(end: float, expected: str, sense: float) -> None:
-    """A tenth of the record at the top, a tenth at the end: 150 rad/s and a little over 100."""
+    """From 150 rad/s to a little over 100, and to a little under."""
     fall = np.linspace(150.0, end, 800)
     speed = sense * np.concatenate([np.full(100, 150.0), fall, np.full(100, end)])
     assert said("speed_coverage", capture("spin_down", omega_mech_rad_s=speed)) == expected
     assert said("speed_coverage", capture("spin_down", omega_mech_rad_s=0.0 * speed)) == "refused"
+
+
+def test_a_coast_that_is_a_small_part_of_its_record_is_one() -> None:
+    """A shaft that stops after a second, and is shaken by a load for the rest of a minute."""
+    t_s = np.arange(0.0, 60.0, 1e-3)
+    speed = np.maximum(200.0 * (1.0 - t_s), 0.0) + 5.0 * np.sin(71.0 * t_s)
+    assert said("speed_coverage", capture("spin_down", omega_mech_rad_s=speed)) == ""
+    assert said("speed_coverage", capture("spin_down", omega_mech_rad_s=speed[2000:])) == "refused"
 
 
 @pytest.mark.parametrize(("turns", "expected"), [(0.98, "warned"), (1.02, "")])

@@ -13,6 +13,7 @@ from pipeline.contracts.gates import clock_jump, current_coverage
 from pipeline.contracts.rotation import line_voltage_vector, turning
 from pipeline.contracts.schemas import check_tables
 from pipeline.contracts.waveform import noise_of
+from pipeline.numerics.plateaus import block_means
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 from tests.unit.contracts.test_gate_limits import GATES, TURN, capture, noise, said
@@ -225,14 +226,16 @@ def test_a_second_level_is_one_of_a_twentieth_of_the_rows(share: float, expected
 
 @pytest.mark.parametrize(("times", "expected"), [(19.5, "refused"), (20.5, "")])
 def test_a_range_of_twenty_times_the_noise_is_a_signal(times: float, expected: str) -> None:
+    """In a step of its rows, in a torque map of means over ten of a thousand rows."""
     step = np.repeat([0.0, 1.0], 500)
-    height = 10.0
-    for _ in range(30):
-        current = noise(1000) + height * step
-        height *= times / (np.ptp(current) / noise_of(current))
-    assert np.ptp(current) / noise_of(current) == pytest.approx(times, rel=1e-3)
-    for made in (capture("current_step", ia_a=current), capture("torque_map", iq_a=-current)):
-        assert said("current_coverage", made) == expected
+    for size, test, column in ((1, "current_step", "ia_a"), (10, "torque_map", "iq_a")):
+        height = 10.0
+        for _ in range(30):
+            current = noise(1000) + height * step
+            reach = np.ptp(block_means(current, size)) * np.sqrt(size) / noise_of(current)
+            height *= times / reach
+        assert reach == pytest.approx(times, rel=1e-3)
+        assert said("current_coverage", capture(test, **{column: -current})) == expected
 
 
 @pytest.mark.parametrize(("times", "expected"), [(9.7, "refused"), (10.3, "")])

@@ -9,10 +9,12 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
+from scipy.signal import lfilter
 
 from pipeline.crosscheck import registry
 from pipeline.crosscheck.protocol import Rule
 from pipeline.crosscheck.registry import rules
+from pipeline.crosscheck.rules import torque_equation
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
@@ -218,7 +220,7 @@ def test_meter_against_steps_takes_the_worse_axis() -> None:
     assert (check.suspect or "").startswith("2:")
 
 
-def torque_map(gain: float = 1.0, ringing_nm: float = 0.0) -> Campaign:
+def torque_map(gain: float = 1.0, ringing_nm: float = 0.0, lag_s: float = 0.0) -> Campaign:
     """A dynamometer test from the dq equations: 3 speeds, 30 current pairs, losses and noise."""
     rng = np.random.default_rng(3)
     rows = 200
@@ -231,6 +233,8 @@ def torque_map(gain: float = 1.0, ringing_nm: float = 0.0) -> Campaign:
     vd = R * id_a - P * omega * LQ * iq_a + drop[0]
     vq = R * iq_a + P * omega * (LD * id_a + PSI) + drop[1]
     shaft = torque - 0.005 * np.sign(omega) - 2e-5 * omega
+    share = math.exp(-1e-4 / lag_s) if lag_s else 0.0
+    shaft = lfilter([1.0 - share], [1.0, -share], shaft)
     columns = {
         "t_s": 1e-4 * np.arange(omega.size),
         "id_a": id_a,
@@ -253,6 +257,12 @@ def test_power_balance_sees_no_loss_as_a_fault() -> None:
 def test_a_ringing_shaft_does_not_unbalance_the_power() -> None:
     check = judge("power_balance", constants(), torque_map(ringing_nm=1.0))
     assert check.status in ("pass", "not_evaluated")
+
+
+def test_a_transducer_that_lags_does_not_unbalance_the_power() -> None:
+    """3 ms behind steps of 20 ms; without its rate the ratio would be 1.17 of what it is."""
+    check = judge("power_balance", constants(), torque_map(lag_s=3e-3))
+    assert check.value == pytest.approx(1.0, abs=0.01)
 
 
 def test_line_voltage_taken_for_phase_unbalances_the_power() -> None:
@@ -298,6 +308,19 @@ def test_torque_equation_needs_both_terms() -> None:
     assert judge("torque_equation", constants(), whole).status == "pass"
     wrong_sign = constants({"kt_reluctance_nm_a2": -10 * P * (LD - LQ)})
     assert judge("torque_equation", wrong_sign, whole).status == "fail"
+
+
+@pytest.mark.parametrize(("gain", "suspect"), [(1.0, "saturation"), (1.1547, "1.1547")])
+def test_a_convention_is_in_the_torque_at_no_d_current_too(gain: float, suspect: str) -> None:
+    """A reluctance torque that is off by itself lands on 1.1547; a convention scales all of it."""
+    whole = torque_map()
+    id_a = min(torque_equation._strongest_d_current_a(whole), 0.0)
+    kt, slope = 1.5 * P * PSI, 1.5 * P * (LD - LQ)
+    off = (1.1547 * (kt + slope * id_a) - kt) / id_a if gain == 1.0 else gain * slope
+    made = constants({"kt_peak_nm_a": gain * kt, "kt_reluctance_nm_a2": off})
+    check = judge("torque_equation", made, whole)
+    assert check.value == pytest.approx(1.1547, abs=1e-3)
+    assert suspect in (check.suspect or "")
 
 
 def current_step(tau_s: float, temp_degc: float | None = 25.0) -> Campaign:

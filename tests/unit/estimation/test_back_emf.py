@@ -79,6 +79,23 @@ def test_one_channel_of_a_scope_gives_flux_and_harmonics_but_no_phase_order():
     assert "two line voltages" in found["phase_order"].note
 
 
+@pytest.mark.parametrize("column", ["theta_mech_rad", "omega_mech_rad_s"])
+def test_one_channel_of_both_senses_has_one_phase_a_harmonic(column):
+    """A seventh a quarter of its turn off, forward and backward: their mean was nothing."""
+    made = []
+    for speed in (100.0, -100.0):
+        t_s = np.arange(20_000) / 2e4
+        theta = speed * t_s
+        phases = [5.0 * theta - 2.0 * math.pi * k / 3.0 for k in (0, 1)]
+        v = [-0.02 * speed * (np.sin(e) + 0.05 * np.sin(7.0 * e + 1.5)) for e in phases]
+        shaft = {"theta_mech_rad": theta, "omega_mech_rad_s": np.full(t_s.size, speed)}
+        noise = 2e-3 * np.random.default_rng(1).standard_normal(t_s.size)
+        columns = {"vab_v": v[0] - v[1] + noise, column: shaft[column]}
+        made.append(capture("open_circuit", f"spin_{speed}", t_s=t_s, **columns))
+    seventh = estimates(open_circuit.ESTIMATOR, *made)["bemf_harmonic_7"]
+    assert seventh.number == pytest.approx(0.05, rel=1e-2)
+
+
 def test_exchanged_leads_are_seen_as_phase_order():
     found = estimates(open_circuit.ESTIMATOR, spin_capture((40.0, 120.0), swap=True))
     assert found["phase_order"].value == -1

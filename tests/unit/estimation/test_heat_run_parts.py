@@ -36,6 +36,7 @@ def test_the_line_of_a_heat_run() -> None:
     assert line.slope_ohm_k == pytest.approx(0.4 * 0.0039, rel=5e-3)
     assert line.span_k == pytest.approx(np.ptp(record.temp_winding_degc))
     assert line.rise_rate_1_s == pytest.approx(1.0 / 60.0, rel=2e-2)
+    assert line.rise_25_k_s == pytest.approx(50.0 / 60.0, rel=2e-2)
     excess = record.temp_winding_degc - 25.0
     fit = linear_fit(np.column_stack([np.ones(300), excess]), record.r_phase_ohm)
     tau = autocorrelation_time(fit.residuals)
@@ -72,7 +73,8 @@ def test_alpha_and_r25_of_one_run_and_what_they_rest_on() -> None:
     parts = {p.source: p.u for p in alpha.budget}
     assert abs(parts.get("voltage@s", 0.0)) < 1e-12
     assert parts["temperature@s"] == pytest.approx(value**2 * 0.5)
-    assert parts["assumed:thermometer_lag"] == pytest.approx(value * line.rise_rate_1_s * 0.5)
+    lag_k = line.rise_rate_1_s + value * line.rise_25_k_s
+    assert parts["assumed:thermometer_lag"] == pytest.approx(value * lag_k * 0.5)
     v, (a, b) = line.covariance, (-value / line.r25_ohm, 1.0 / line.r25_ohm)
     u = math.sqrt(a * a * v[0, 0] + b * b * v[1, 1] + 2.0 * a * b * v[0, 1])
     assert alpha.u_a == pytest.approx(u)
@@ -112,3 +114,17 @@ def test_a_coefficient_that_the_scatter_hides_is_not_published() -> None:
     assert not estimates(soak.ESTIMATOR, *rough)["temp_coeff_copper_1_k"].known
     allowed = estimates(soak.ESTIMATOR, *rough, worst_u_rel=50.0)["temp_coeff_copper_1_k"]
     assert allowed.u_a > 0.2 * abs(allowed.number)
+
+
+def test_a_thermometer_that_lags_is_in_the_budget_of_both_results() -> None:
+    """By half a second: R25 too large by what the winding warms in it, the slope too small."""
+    record = line_of(1e-5)
+    warming = 50.0 / 60.0 * np.exp(-record.t_s / 60.0)
+    late = _line(replace(record, temp_winding_degc=record.temp_winding_degc - 0.5 * warming))
+    true = _line(record)
+    assert late is not None and true is not None
+    options = heat_run.ESTIMATOR.options
+    of_r25 = {p.source: p.u for p in _resistance(true, options, []).budget}
+    of_slope = {p.source: p.u for p in heat_run._slope_budget(true, options)}
+    assert late.r25_ohm - true.r25_ohm == pytest.approx(-of_r25[heat_run.LAG], rel=0.05)
+    assert late.slope_ohm_k - true.slope_ohm_k == pytest.approx(-of_slope[heat_run.LAG], rel=0.05)

@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from pipeline.estimation.estimators.inertia import ESTIMATOR as INERTIA
-from pipeline.estimation.estimators.inertia import GIVES
+from pipeline.estimation.estimators.inertia import GIVES, METHOD
 from pipeline.estimation.estimators.torque_map import ESTIMATOR as TORQUE_MAP
+from pipeline.estimation.mechanical.setups import another_setup
 from pipeline.records.estimate import Estimate
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.design import EXACT, Bench
@@ -41,6 +42,25 @@ def test_friction_is_that_of_the_drives_where_a_coast_carries_more(far: float) -
     assert viscous.number == pytest.approx(TRUE["b_visc_nm_s_rad"], abs=3.0 * viscous.u)
     assert "they turn something else" in dry.note
     assert not any("spin_down" in path for path in dry.captures)
+
+
+@pytest.mark.parametrize(("dry_nm", "u_dry", "other"), [(0.5, 0.1, True), (0.9, 0.1, False),
+                                                       (0.5, 0.2, False)])  # fmt: skip
+def test_a_drive_that_knows_no_viscous_drag_knows_the_dry_one(
+    dry_nm: float, u_dry: float, other: bool
+) -> None:
+    """Half of the drag by the coasts; by the drives 1 N·m, and nothing is known of its slope."""
+
+    def found(dry: float, u: float, u_slope: float) -> list[Estimate]:
+        values = (1.0, 0.0), (dry, u), (0.01 * dry, u_slope)
+        at = {"omega_mech_rad_s": 100.0}
+        rows = zip(GIVES, values, strict=True)
+        parts = ((name, value, [METHOD.scatter(name, u, 50.0)]) for name, (value, u) in rows)
+        return [METHOD.measured(name, value, part, ("a",), at) for name, value, part in parts]
+
+    words = another_setup(found(dry_nm, 0.01, 1e-4), found(1.0, u_dry, 0.02))
+    assert bool(words) is other
+    assert not other or "0.5 times" in words
 
 
 def test_a_coast_of_the_same_shaft_is_used() -> None:

@@ -62,3 +62,23 @@ def test_what_no_motor_is_without_has_a_size(
     campaign = Campaign("m", (capture("drive", "a", t_s=np.arange(3.0)),))
     (found,) = registry.fit_all(campaign, {})[0].estimates
     assert found.status == status
+
+
+@pytest.mark.parametrize(("rank", "published"), [(0, "sure"), (1, "rough"), (-1, "sure")])
+def test_of_equal_rank_the_surer_method_is_published(
+    rank: int, published: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two methods that agree, the rough one of rank 0 and the first to be fitted."""
+    sizes = {"rough": (0, 4e-6), "sure": (rank, 1e-6)}
+    made = {
+        name: replace(SOUND, method=name, budget=type_a(name, u)) for name, (_, u) in sizes.items()
+    }
+    both = tuple(
+        Estimator(name, ("ld_h",), ("drive",), "", lambda *_, e=made[name]: Fit((e,)), rank=place)
+        for name, (place, _) in sizes.items()
+    )
+    monkeypatch.setattr(registry, "estimators", lambda: both)
+    campaign = Campaign("m", (capture("drive", "a", t_s=np.arange(3.0)),))
+    best = registry.fit_all(campaign, {})[0].best("ld_h")
+    assert best is not None
+    assert best.method == published

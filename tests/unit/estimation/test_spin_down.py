@@ -94,3 +94,21 @@ def test_friction_of_another_form_below_the_resolution_of_the_encoder(name: str,
     for one in found:
         assert one.number == pytest.approx(truths[one.name], rel=5e-4)
         assert abs(one.number - truths[one.name]) < 3.0 * one.u
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.35])
+def test_each_sense_may_have_a_drag_of_its_own(apart: float) -> None:
+    """The mean of both is the odd part; with one drag for both u was forty times the value."""
+    rng = np.random.default_rng(4)
+    captures = []
+    for sense in (1, -1):
+        dry, viscous = 213.0 * (1.0 + sense * apart), 0.187 * (1.0 + sense * apart)
+        t_s = np.arange(0.0, 1200.0 / dry, 1e-3)
+        travel, _ = coast_down(t_s, 1200.0, lambda w, d=dry, v=viscous: d + v * w)
+        theta = sense * travel + 1e-4 * rng.standard_normal(t_s.size)
+        captures.append(capture("spin_down", f"coast_{sense}", t_s=t_s, theta_mech_rad=theta))
+    found = estimates(ESTIMATOR, *captures)
+    for name, value in (("coast_coulomb_rad_s2", 213.0), ("coast_viscous_1_s", 0.187)):
+        assert found[name].number == pytest.approx(value, rel=1e-3)
+        assert found[name].u < 1e-2 * value
+        assert ("no one drag" in found[name].note) is (apart > 0.0)
