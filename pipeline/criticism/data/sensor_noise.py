@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pipeline.criticism.data.traces import parabolas
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.sensors import SensorNoise
 
@@ -189,23 +190,11 @@ def smoothed(signal: Array, step: float, policy: SensorNoise) -> Array:
     for length in policy.smooth:
         if length > signal.size:
             break
-        even = _parabolic(signal, length)
+        even = parabolas(signal, length)
         if best is not signal and float((signal - even).std()) > most:
             break
         best = even
     return best
-
-
-def _parabolic(signal: Array, length: int) -> Array:
-    """Values of the parabola through each sample's `length` neighbours, an odd number; at either
-    end, of the one through the first or the last of them.
-    """
-    half = length // 2
-    basis, _ = np.linalg.qr(np.vander(np.arange(length) - half, 3))
-    fitted = basis @ basis.T
-    inside = np.convolve(signal, fitted[half], mode="valid")
-    ends = fitted @ signal[:length], fitted @ signal[-length:]
-    return np.concatenate([ends[0][:half], inside, ends[1][half + 1 :]])
 
 
 def rounding_error(even: Array, step: float, shift: float) -> Array:

@@ -227,9 +227,6 @@ def first_fit(rough: Fit) -> LinearSystem:
 def rough_anew(fit: Fit) -> Fit:
     """A rough fit begun once more from orders of magnitude, shapes of effects as they are.
 
-    Before an effect came in, its absence may have moved constants, and the floors made by them, to
-    where no step leads back from: an encoder off its centre shakes a light rotor less.
-
     Parameters
     ----------
     fit
