@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from datetime import datetime
 
 from pipeline.records.current_status import CurrentStatus
@@ -14,6 +16,10 @@ WORDS = {
     "refused": "Do not use: a check failed.",
     "revoked": "Do not use: it was released, and revoked.",
 }
+_REASON = re.compile(
+    r"(?P<kind>unverified: |missing: |impossible: )(?P<name>[^ ]+)(?: \((?P<remark>.*)\))?",
+    re.DOTALL,
+)
 IN_SPITE = "Approved in spite of what its model leaves."
 
 
@@ -48,6 +54,45 @@ def status_lines(current: CurrentStatus) -> tuple[str, ...]:
     if current.in_force is not None and not current.exported:
         lines.append(f"export writes {exported(current.in_force)}, not this one")
     return tuple(lines)
+
+
+def status_points(why: Sequence[str]) -> tuple[str, ...]:
+    """The reasons for a status, as short as a list at the top of a page has to be.
+
+    Parameters
+    ----------
+    why
+        Reasons as the datasheet has them.
+
+    Returns
+    -------
+    tuple of str
+        What is said of several captures or constants once, with all their names; a remark to its
+        first semicolon, as the table of constants has all of it.
+
+    Examples
+    --------
+    >>> status_points(["missing: ld_h (no step; 3 windows)", "missing: lq_h (no step)"])
+    ('missing: ld_h, lq_h (no step)',)
+
+    """
+    points: dict[tuple[str, str], list[str]] = {}
+    for reason in why:
+        kind, name, remark = _parts(reason)
+        points.setdefault((kind, remark), []).append(name)
+    return tuple(
+        f"{kind}{', '.join(names)}{f' ({remark})' if remark else ''}"
+        for (kind, remark), names in points.items()
+    )
+
+
+def _parts(reason: str) -> tuple[str, str, str]:
+    """What is wrong, with its colon; with what; and the remark on it to its first semicolon."""
+    match = _REASON.fullmatch(reason)
+    if match is None:
+        return "", reason, ""
+    remark = (match["remark"] or "").partition("; ")[0]
+    return match["kind"], match["name"], remark
 
 
 def exported(version: Version) -> str:

@@ -113,7 +113,7 @@ class Disagreement:
 
         """
         each = ", ".join(
-            f"{100.0 * (r - 1.0):+.2g} % {n}"
+            f"{100.0 * (r - 1.0):+.3g} % {n}"
             for r, n in zip(self.relative, self.partition.names, strict=True)
         )
         return f"{subject} disagrees with itself by {self.partition.name} beyond chance ({each})"

@@ -11,7 +11,7 @@ from pipeline.records.model_verdict import MODEL_REASON
 from pipeline.report.pages.link_block import replaced
 from pipeline.report.pages.page import render
 from pipeline.views.model_words import model_words
-from pipeline.views.status_text import status_lines, status_words
+from pipeline.views.status_text import status_lines, status_points, status_words
 
 BEGIN, END = "<!-- status -->", "<!-- end of status -->"
 
@@ -33,6 +33,7 @@ def status_block(sheet: Datasheet, current: CurrentStatus) -> str:
         current=current,
         words=status_words(current),
         lines=status_lines(current),
+        points=status_points(current.why),
         model=None if sheet.model is None else model_words(sheet.model, sheet.motor_id),
         model_reason=MODEL_REASON,
         unverified=sum(c.integrity != "verified" for c in sheet.captures),
