@@ -76,10 +76,10 @@ def status_points(why: Sequence[str]) -> tuple[str, ...]:
     ('missing: ld_h, lq_h (no step)',)
 
     """
-    points: dict[tuple[str, str], list[str]] = {}
+    points: dict[tuple[str, str], dict[str, None]] = {}
     for reason in why:
         kind, name, remark = _parts(reason)
-        points.setdefault((kind, remark), []).append(name)
+        points.setdefault((kind, remark), {})[name] = None
     return tuple(
         f"{kind}{', '.join(names)}{f' ({remark})' if remark else ''}"
         for (kind, remark), names in points.items()
@@ -90,7 +90,7 @@ def _parts(reason: str) -> tuple[str, str, str]:
     """What is wrong, with its colon; with what; and the remark on it to its first semicolon."""
     match = _REASON.fullmatch(reason)
     if match is None:
-        return "", reason, ""
+        return reason, "", ""
     remark = (match["remark"] or "").partition("; ")[0]
     return match["kind"], match["name"], remark
 
