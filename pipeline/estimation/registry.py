@@ -177,9 +177,15 @@ def _fit_all(
 
 
 def _preferred(fits: Sequence[tuple[int, int, Fit]]) -> tuple[Estimate, ...]:
-    """All estimates by rank; of equal rank the one that is known best, then as they were fitted."""
-    estimates = [(rank, order, e) for rank, order, fit in fits for e in fit.estimates]
-    return tuple(e for *_, e in sorted(estimates, key=lambda item: (item[0], item[2].u, item[1])))
+    """All estimates by rank, then as they were fitted; of one constant and equal rank the one that
+    is known best comes first.
+    """
+    ranked = sorted(fits, key=lambda item: item[:2])
+    alike: dict[tuple[int, str], list[Estimate]] = {}
+    for rank, _, fit in ranked:
+        for estimate in fit.estimates:
+            alike.setdefault((rank, estimate.name), []).append(estimate)
+    return tuple(e for same in alike.values() for e in sorted(same, key=lambda e: e.u))
 
 
 def _fitted(
