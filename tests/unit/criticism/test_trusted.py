@@ -214,6 +214,27 @@ def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, s
     assert _is_determined(system, plain) is sure
 
 
+def test_what_all_current_sensors_share_names_no_difference_of_them(monkeypatch):
+    """Not even where it takes most of what is left: that is a gain, of which there are others."""
+    plain = missing_by(torque_shaft_nm=1.0).system
+    gain = effects()["current_gain"]
+    model = Model(machine(), (gain,))
+    values = {**BASE, **zero(gain, model), "current_gain.mean": 0.05}
+    system = replace(
+        plain,
+        columns=(Column("current_gain.mean", 1e-3),),
+        matrix=np.random.default_rng(4).normal(0.0, 1e5, (plain.size, 1)),
+        prior_precision=np.zeros(1),
+        prior_gradient=np.zeros(1),
+        fit=Fit((log(),) * 3, model, values, (), {}),
+        model_column_count=1,
+    )
+    held = HeldOut(plain.residual, 1.0, {})
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise.leave_out", lambda _: held)
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise._takes_most", lambda *_: True)
+    assert not _is_determined(system, plain)
+
+
 @pytest.mark.parametrize(("damping_nm", "sure"), [(0.1, True), (-0.1, False)])
 def test_amplitudes_that_stand_for_one_another_are_surely_there_together(damping_nm, sure):
     """Friction and damping of bristles, of which captures know the sum to 0.02 and the difference
