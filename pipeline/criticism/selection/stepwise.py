@@ -189,21 +189,23 @@ def _chosen(
     predicted fall and differs significantly from zero.
 
     That fit is finished with columns of its own, and without terms that are not worth their
-    penalty. Where one that explains more by over a `tie` is not sure of its size, no other is named
-    in its place.
+    penalty. Where one that explains more by over a `tie` is not sure of its size, no other that
+    acts there is named in its place.
     """
-    policy, least = wide.policy.selection, math.inf
+    policy = wide.policy.selection
+    unsure: list[tuple[float, NDArray[np.bool_]]] = []
     for first in range(0, min(len(passing), policy.refit_rounds * policy.refits), policy.refits):
         batch = list(passing[first : first + policy.refits])
         while (best := _refit_best(wide, batch, added)) is not None:
             named = [effect.name for effect in best.fit.model.effects]
             finished = trimmed(gauss_newton(with_all_terms(best.fit), before=best), named)
             cost = finished.deviance + math.log(wide.size) * finished.model_columns.size
-            if cost > least + policy.tie:
+            acts = _acts(finished)
+            if any(cost > least + policy.tie and np.any(acts & where) for least, where in unsure):
                 return None
             if _is_determined(linear_system(finished.fit), wide):
                 return finished
-            least = min(least, cost)
+            unsure.append((cost, acts))
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
     return None
 
@@ -434,12 +436,18 @@ def spoils(tried: LinearSystem, before: Array, after: Array, relief: float = 0.0
         `least_share`, since any refit moves an error of another cause a little.
 
     """
-    name = f"{tried.fit.model.effects[-1].name}."
-    columns = [n for n, column in enumerate(tried.columns) if column.name.startswith(name)]
-    acts = np.bincount(tried.group, np.any(tried.matrix[:, columns], axis=1), len(tried.labels)) > 0
+    acts = _acts(tried)
     change = np.maximum(after, 1.0) - np.maximum(before, 1.0)
     counts = acts & (np.abs(change) > tried.policy.selection.least_share * np.maximum(before, 1.0))
     return float((tried.counts * change)[counts].sum()) > relief
+
+
+def _acts(system: LinearSystem) -> NDArray[np.bool_]:
+    """The groups [G] in which the newest effect acts."""
+    name = f"{system.fit.model.effects[-1].name}."
+    columns = [n for n, column in enumerate(system.columns) if column.name.startswith(name)]
+    moved = np.any(system.matrix[:, columns], axis=1)
+    return np.bincount(system.group, moved, len(system.labels)) > 0
 
 
 def _floor_factors(tried: LinearSystem) -> Array:

@@ -274,6 +274,24 @@ def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkey
     assert search(fitted(hidden), LIBRARY)[-1].added == ()
 
 
+def test_an_explanation_of_unsure_size_does_not_speak_where_it_does_not_act(monkeypatch):
+    """As a field inside the conductors, in current steps, beside the windage of coasts."""
+
+    def acts(system):
+        unsure = system.fit.model.effects[-1].name == "windage"
+        return np.full(len(system.labels), unsure) ^ (np.arange(len(system.labels)) > 0)
+
+    def sure(system, _):
+        return system.fit.model.effects[-1].name != "windage"
+
+    hidden = tuple(with_drag(curved(0.1), seed) for seed in (5, 6))
+    for name, answer in (("_is_determined", sure), ("_acts", acts)):
+        monkeypatch.setattr(f"pipeline.criticism.selection.stepwise.{name}", answer)
+    added = search(fitted(hidden), LIBRARY)[-1].added
+    assert added
+    assert "windage" not in added
+
+
 @pytest.mark.parametrize(("logged", "determined"), [({}, False), ({"gap_rad": (5e-3, 1e-4)}, True)])
 def test_a_gap_that_windows_leave_open_is_determined_where_full_logs_show_it(
     monkeypatch, logged, determined
