@@ -15,6 +15,8 @@ from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
 CODE = "current_coverage"
+_PARTS = 100
+"""Of a torque map, each with a mean: a ripple averages out in it, and a level does not."""
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
@@ -79,7 +81,7 @@ def _step(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 def _torque_map(capture: Capture, options: Mapping[str, float]) -> Passed:
     current = _finite(capture, "iq_a")["iq_a"]
-    size = max(current.size // 100, 1)
+    size = max(current.size // _PARTS, 1)
     levels = block_means(current, size)
     if np.ptp(levels) > 2.0 * options["noise_multiple"] * noise_of(current) / np.sqrt(size):
         return Passed()

@@ -14,7 +14,8 @@ from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
 CODE = "speed_coverage"
-PARTS = 100
+_PARTS = 100
+"""Of a record, each with a speed: a coast is at least a few hundredths of what was recorded."""
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
@@ -64,10 +65,10 @@ def _speeds_of_parts(capture: Capture) -> NDArray[np.float64]:
     fine = np.isfinite(columns["t_s"]) & np.isfinite(columns[column])
     t_s, motion = columns["t_s"][fine], columns[column][fine]
     if column == "theta_mech_rad":
-        ends = np.linspace(0, max(t_s.size - 1, 0), min(PARTS + 1, t_s.size)).round().astype(int)
+        ends = np.linspace(0, max(t_s.size - 1, 0), min(_PARTS + 1, t_s.size)).round().astype(int)
         travel, took = np.diff(motion[ends]), np.diff(t_s[ends])
         return np.abs(travel / took) if ends.size > 1 else np.zeros(1)
-    parts = np.array_split(np.abs(motion), min(PARTS, max(motion.size, 1)))
+    parts = np.array_split(np.abs(motion), min(_PARTS, max(motion.size, 1)))
     return np.array([float(np.median(part)) if part.size else 0.0 for part in parts])
 
 

@@ -92,7 +92,7 @@ def _beside_waves(
 ) -> Sensors:
     """The sensors with the noise of voltages beside the waves of their angle, where that is less.
 
-    Of few samples a turn the seventh wave of a back-EMF bends as much between them as noise does.
+    Of few samples a turn the seventh wave of a back-EMF bends between them as noise does.
     """
     theta = smoothed(columns["theta_mech_rad"], 2 * (window // 2) + 1)
     orders = machine.pole_pairs * np.arange(machine.policy.cutting.voltage_orders + 2)

@@ -20,7 +20,7 @@ from pipeline.criticism.effect import RECORDERS, Effect
 from pipeline.criticism.machine.model import BASE
 from pipeline.criticism.operating import Operating, Recorded, Samples, ShaftState
 from pipeline.criticism.parameter import SCALES, Machine, Parameter
-from pipeline.records.errors import PipelineError, UsageError
+from pipeline.records.errors import PipelineError, UsageError, meant
 
 _HOOKS = (
     "coenergy",
@@ -185,9 +185,7 @@ def _known_nuisance(effect: Effect, path: Path) -> None:
         raise UsageError(message, "name a nuisance and a parameter of the effect")
     for name, known in zip(named, (nuisances, own), strict=True):
         if name not in known:
-            similar = get_close_matches(name, known, 1)
-            hint = f"did you mean {similar[0]!r}? " if similar else ""
-            raise UsageError(message, f"{hint}there are {', '.join(known)}")
+            raise UsageError(message, meant(name, known))
 
 
 class _NoNameError(KeyError):

@@ -115,7 +115,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         couplings = bool(significant.any())
         passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
         chosen = _chosen(wide, passing, fit.model.effects[base:])
-        others = [other for other in (with_free_shares(wide), other_reading(wide)) if other]
+        others = filter(None, (with_free_shares(wide), other_reading(wide)))
         other = min(others, key=lambda one: one.deviance, default=None)
         if other is not None and (
             chosen is None or other.deviance < _with_full_logs(chosen) + policy.tie
@@ -314,14 +314,13 @@ def _refitted(wide: LinearSystem, score: Score) -> LinearSystem:
 
 
 def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_]) -> bool:
-    """Whether the newest effect of a refit is large enough to matter in use, or takes most of
-    what was `significant` [G] as a remainder before.
-    """
+    """Whether the newest effect of a refit is large enough to matter in use, or takes most."""
     fit, effect = system.fit, system.fit.model.effects[-1]
     return material(fit, effect) or _takes_most(system, before, significant)
 
 
 def _takes_most(system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_]) -> bool:
+    """Whether the newest effect takes most of what was `significant` [G] as a remainder before."""
     fit, effect = system.fit, system.fit.model.effects[-1]
     chi2 = [fitted.reduced_chi2(fitted.residual) for fitted in (before, system)]
     takes_most = effect.discriminator is None and clears(system, significant, *chi2)

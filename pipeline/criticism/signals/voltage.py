@@ -12,6 +12,7 @@ from pipeline.criticism.operating import Array, Complex, Operating, Values
 from pipeline.criticism.signals.true_state import angle_error, zero_angle
 
 _EIGHTH_ORDER = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)
+"""Weights of a slope: of the differences of samples one, two, three and four to either side."""
 RIPPLES = ("ripple_edge", "ripple_shift", "frame_lag_s", "command_lead")
 """Nuisances of held vectors and their frame that are in the voltage (`model.BASE`)."""
 

@@ -57,9 +57,9 @@ def folder(tmp_path: Path, was: str = "", now: str = "") -> str:
         *(
             ("torque=torque,", f"torque=torque, in_place_of={named},", None, words)
             for named, words in (
-                (("late_torqe_s", "torque_nm"), "did you mean 'late_torque_s'"),
-                (("late_torque_s", "torqe_nm"), "did you mean 'torque_nm'"),
-                (("j_kgm2", "torque_nm"), "there are ripple_slope"),
+                (("late_torqe_s", "torque_nm"), "did you mean late_torque_s?"),
+                (("late_torque_s", "torqe_nm"), "did you mean torque_nm?"),
+                (("j_kgm2", "torque_nm"), "known are ripple_slope"),
                 (("late_torque_s",), "name a nuisance and a parameter"),
             )
         ),
