@@ -102,8 +102,8 @@ def _beside_waves(
     noise, steps = dict(sensors.noise), dict(sensors.steps)
     for name in LINES_V:
         if name in columns:
-            rest = columns[name] - basis @ (inverse @ (basis.T @ columns[name]))
-            noise[name] = min(noise[name], sensor_noise(rest, machine.policy.sensor_noise))
+            remainder = columns[name] - basis @ (inverse @ (basis.T @ columns[name]))
+            noise[name] = min(noise[name], sensor_noise(remainder, machine.policy.sensor_noise))
             step = coarse_step(columns[name], noise[name], machine.policy.sensor_noise)
             steps |= {name: step} if step else {}
     return replace(sensors, noise=noise, steps=steps)

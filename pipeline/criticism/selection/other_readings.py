@@ -1,4 +1,4 @@
-"""How a column was read, where no metadata state it and only the captures tell.
+"""How a column was read, where no metadata state it and only the captures show it.
 
 A transducer of torque in the shaft reads T − drags − J θ″; one at the stator reads the reaction
 torque T − drags, as the bearings are inside and the inertia of the rotor is not. The same captures
@@ -55,7 +55,7 @@ def other_reading(system: LinearSystem) -> LinearSystem | None:
 
     """
     limit = system.deviance - system.policy.selection.tie
-    better = (other for other in _others(system) if other.deviance < limit)
+    better = (other for other in _refits(system) if other.deviance < limit)
     return min(better, key=lambda other: other.deviance, default=None)
 
 
@@ -93,7 +93,7 @@ def reading_notes(segments: Sequence[Segment]) -> tuple[str, ...]:
     return tuple(note.format(len(names)) for note, names in captures if names)
 
 
-def _others(system: LinearSystem) -> Iterator[LinearSystem]:
+def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
     """The fit by the other reading of each column that may have one."""
     if any(_has_held_vectors(segment) for segment in system.segments):
         turned = (_in_other_frame(s) if _has_held_vectors(s) else s for s in system.segments)

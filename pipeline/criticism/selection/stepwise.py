@@ -115,12 +115,12 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         couplings = bool(significant.any())
         passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
         chosen = _chosen(wide, passing, fit.model.effects[base:])
-        others = filter(None, (with_free_shares(wide), other_reading(wide)))
-        other = min(others, key=lambda one: one.deviance, default=None)
-        if other is not None and (
-            chosen is None or other.deviance < _with_full_logs(chosen) + policy.tie
+        unnamed = filter(None, (with_free_shares(wide), other_reading(wide)))
+        alternative = min(unnamed, key=lambda system: system.deviance, default=None)
+        if alternative is not None and (
+            chosen is None or alternative.deviance < _with_full_logs(chosen) + policy.tie
         ):
-            fit = other.fit
+            fit = alternative.fit
             del steps[-1]
             continue
         if chosen is None:

@@ -44,7 +44,7 @@ def test_friction_is_that_of_the_drives_where_a_coast_carries_more(far: float) -
     assert not any("spin_down" in path for path in dry.captures)
 
 
-def found(dry: float, u: float, slope: float, u_slope: float) -> list[Estimate]:
+def drags(dry: float, u: float, slope: float, u_slope: float) -> list[Estimate]:
     """J of 1, T_c and B with their standard uncertainties, of drives or coasts up to 100 rad/s."""
     values = (1.0, 0.0), (dry, u), (slope, u_slope)
     at = {"omega_mech_rad_s": 100.0}
@@ -59,15 +59,15 @@ def test_a_drive_that_knows_no_viscous_drag_knows_the_dry_one(
     dry_nm: float, u_dry: float, other: bool
 ) -> None:
     """Half of the drag by the coasts; by the drives 1 N·m, and nothing is known of its slope."""
-    words = another_setup(found(dry_nm, 0.01, 0.01 * dry_nm, 1e-4), found(1.0, u_dry, 0.01, 0.02))
+    words = another_setup(drags(dry_nm, 0.01, 0.01 * dry_nm, 1e-4), drags(1.0, u_dry, 0.01, 0.02))
     assert bool(words) is other
     assert not other or "0.5 times" in words
 
 
 def test_another_inertia_would_scale_the_drag_at_every_speed() -> None:
     """Dry friction of half and a slope of twice are 1.5 N·m at half speed, as by the drives."""
-    assert another_setup(found(0.5, 0.01, 0.01, 1e-4), found(1.0, 0.01, 0.02, 1e-4))
-    assert not another_setup(found(0.5, 0.01, 0.02, 1e-4), found(1.0, 0.01, 0.01, 1e-4))
+    assert another_setup(drags(0.5, 0.01, 0.01, 1e-4), drags(1.0, 0.01, 0.02, 1e-4))
+    assert not another_setup(drags(0.5, 0.01, 0.02, 1e-4), drags(1.0, 0.01, 0.01, 1e-4))
 
 
 def test_a_coast_of_the_same_shaft_is_used() -> None:
