@@ -92,7 +92,7 @@ def test_every_effect_names_parameters_that_it_has(name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(effects()))
 def test_whatever_makes_an_effect_large_is_said(name: str) -> None:
-    """No size that is nothing beside its uncertainty is reported of an effect that is surely there."""
+    """No size that is nothing beside its u is reported of an effect that is surely there."""
     effect = effects()[name]
     amplitudes = [p for p in effect.every(MACHINE) if p.amplitude and p.negligible > 0.0]
     # of a coupling the twist or gap must be sure as well, and is said
