@@ -98,8 +98,9 @@ class Sensing:
         (segment, channel, model, values) -> what the linearity of a sensor is a share of [n, the
         channel's unit]; None for the recorded signal itself.
     errors
-        Those of `voltage_jumps`, `unsampled`, `current_jumps`, `torque_jumps`, `encoder_lines`,
-        `standstill`, `pulses` and `late_speed` that an equation of a drive's log has.
+        Those of `voltage_jumps`, `unsampled`, `instants`, `current_jumps`, `torque_jumps`,
+        `encoder_lines`, `standstill`, `pulses` and `late_speed` that an equation of a drive's log
+        has.
     sensors
         Recorded signals that the channels are made of, where these are not the signals themselves.
     sensed

@@ -308,7 +308,12 @@ EQUATION = Equation(
     recorder="log",
     sensing=Sensing(
         _reading,
-        frozenset({"voltage_jumps", "torque_jumps", "encoder_lines", "standstill", "pulses"}),
+        frozenset(
+            {
+                *("voltage_jumps", "instants"),
+                *("torque_jumps", "encoder_lines", "standstill", "pulses"),
+            }
+        ),
     ),
     use=Use(
         turns=True,

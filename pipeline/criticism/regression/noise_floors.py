@@ -29,6 +29,8 @@ from pipeline.criticism.signals.voltage import central, unresolved
 
 VOLTS = ("vd_v", "vq_v")
 SPEED = "omega_mech_rad_s"
+_WINDING = {"vd_v": ("id_a", "ld_h"), "vq_v": ("iq_a", "lq_h")}
+"""Current and inductance of each axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -349,14 +351,29 @@ def _of_voltages(segment: Segment, model: Model, values: Values) -> Array:
     errors = equation_of(segment).sensing.errors
     total = _jumps(segment, VOLTS, model.policy.noise_floors)[None, :, None]
     if "unsampled" in errors:
-        current = segment.recorded["iq_a"]
-        change = values["lq_h"] * unresolved(current) * central(current, segment.ts_s)
-        total = np.hypot(total, np.abs(projected(segment, change[None])))
+        total = np.hypot(total, np.abs(projected(segment, _unsampled(segment, values, 0.0))))
+    if "instants" in errors and segment.instrument.timing == "instant":
+        unsampled = _unsampled(segment, values, model.policy.noise_floors.jump)
+        total = np.hypot(total, np.abs(projected(segment, unsampled)))
     if any(effect.drop is not None for effect in model.effects):
         steep = steep_drops(model, values, operate(segment, segment.recorded, model, values))
         by_axis = {"vd_v": steep.real, "vq_v": steep.imag}
         axes = np.stack([by_axis[channel] for channel in segment.channels if channel in VOLTS])
         total = np.hypot(total, np.abs(projected(segment, axes)))
+    return total
+
+
+def _unsampled(segment: Segment, values: Values, jump: float) -> Array:
+    """Voltage [V, n] of each axis by which currents change between the samples of a log, where they
+    bend by more than so many times their noise: of that, an instant may show nothing or all.
+    """
+    axes = [channel for channel in segment.channels if channel in VOLTS]
+    total = np.zeros((len(axes), segment.size))
+    for place, channel in enumerate(axes):
+        column, inductance = _WINDING[channel]
+        current, noise = segment.recorded[column], segment.sensors.noise[column]
+        share = unresolved(current, math.sqrt(2.0) * jump * noise)
+        total[place] = values[inductance] * share * central(current, segment.ts_s)
     return total
 
 

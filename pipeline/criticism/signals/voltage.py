@@ -160,13 +160,15 @@ def fine_slope(signal: Complex, period_s: float) -> Complex:
     return slope
 
 
-def unresolved(signal: Array) -> Array:
+def unresolved(signal: Array, least: float = 0.0) -> Array:
     """The share of a signal's slope that its samples do not resolve.
 
     Parameters
     ----------
     signal
         [n, any unit].
+    least
+        Second difference [same unit] below which it is straight, such as one of its noise.
 
     Returns
     -------
@@ -189,6 +191,7 @@ def unresolved(signal: Array) -> Array:
     """
     share = np.zeros(signal.size)
     bend, size = np.abs(np.diff(signal, 2)), np.abs(signal[2:] - signal[:-2])
+    bend[bend < least] = 0.0
     share[1:-1] = np.minimum(bend / np.where(size > 0.0, size, np.inf), 1.0)
     beside = share.copy()
     beside[:-1] = np.maximum(beside[:-1], share[1:])

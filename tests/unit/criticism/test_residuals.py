@@ -201,6 +201,24 @@ def test_a_jump_is_known_to_a_quarter_of_a_sample(signal):
     assert near[~over].max() < 0.1 * told.max(), "of the reading itself"
 
 
+def test_an_instant_of_the_voltage_may_miss_what_a_jump_of_the_current_takes():
+    """L Δi between two samples is in a mean over the time between them, not in an instant."""
+    segment, jump, at = log(noise=1.0), 2.0, 4000
+    weak, step = segment.weak, np.where(np.arange(8000) < at, 0.0, jump)
+    current = segment.recorded["id_a"] + step
+    jumping = replace(segment, recorded={**segment.recorded, "id_a": current})
+    mean = replace(segment.instrument, timing="centred")
+    smooth, instant = (reading_error(one, PLAIN, BASE)[0, :, 0] for one in (segment, jumping))
+    of_mean = reading_error(replace(jumping, instrument=mean), PLAIN, BASE)[0, :, 0]
+    inside = (weak.starts < at - 1) & (at < weak.starts + weak.length)
+    beside = at - weak.starts[inside]
+    functions = weak.functions[0, 0][beside - 1] + weak.functions[0, 0][beside]
+    missed = BASE["ld_h"] * jump / (2.0 * segment.ts_s) * functions
+    assert np.sqrt(instant[inside] ** 2 - smooth[inside] ** 2) == pytest.approx(missed, rel=0.05)
+    assert instant[~inside] == pytest.approx(smooth[~inside]), "noise of a current is no jump"
+    assert of_mean == pytest.approx(smooth)
+
+
 @pytest.mark.parametrize("omega", [60.0, 120.0])
 def test_a_line_of_the_encoder_s_error_is_a_torque_by_the_square_of_its_pace(omega):
     """θ + a cos kθ at a steady pace is J (kω)² a on order k, for an a of 0.03 steps."""
