@@ -44,6 +44,7 @@ ARITHMETIC = {
     "regression/bounds.py": {"_AT"},  # rounding
     "selection/changed_between.py": {"_FREE"},  # the whole of a share
     "signals/voltage.py": {"_EIGHTH_ORDER"},  # of a difference
+    "residuals/segments.py": {"_ALTERNATING"},  # of third differences
     "selection/other_readings.py": {"_HALF_HOLD"},  # from the start of a hold to its middle
     "regression/fit.py": {"_SEED"},
     "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart

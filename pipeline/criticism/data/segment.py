@@ -376,6 +376,25 @@ def row_index(
     return group, window, np.broadcast_to(valid[None], shape), groups
 
 
+def rows_where(segment: Segment, holds: Callable[[str, float], bool]) -> NDArray[np.bool_]:
+    """Which of the valid weak samples are of certain groups.
+
+    Parameters
+    ----------
+    segment
+        Any segment.
+    holds
+        Whether a (channel, order) is meant.
+
+    Returns
+    -------
+    array [R] of bool
+
+    """
+    group, _, valid, groups = row_index(segment)
+    return np.array([holds(channel, order) for channel, order in groups])[group[valid]]
+
+
 def electrical_orders(machine: Machine) -> tuple[float, ...]:
     """Orders a turn at which electrical effects show.
 

@@ -197,7 +197,7 @@ def smoothed(signal: Array, step: float, policy: SensorNoise) -> Array:
     return best
 
 
-def rounding_error(even: Array, step: float, shift: float) -> Array:
+def rounding_error(even: Array, step: float, shift: Array | float) -> Array:
     """What rounding does to a signal.
 
     Parameters

@@ -34,7 +34,7 @@ class Fit:
     values
         Parameters by full name, in their units.
     sigma
-        Noise floor of each segment by group, computed at the values `near`.
+        Noise floor of each weak sample [R] of each segment, computed at the values `near`.
     near
         Values at which reading errors are computed: those of a coasting shaft go with 1/J, and a
         fit could win by making J small.
@@ -151,7 +151,7 @@ def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[A
 
     Returns
     -------
-    tuple of array [groups]
+    tuple of array [R]
         Seeds are fixed, so the same input gives the same floors.
 
     """
@@ -169,7 +169,7 @@ def floors_grown(fit: Fit) -> tuple[Array, ...]:
 
     Returns
     -------
-    tuple of array [groups]
+    tuple of array [R]
         Ratios [1]; the same noise is added in both, and 1 where there are no currents.
 
     """

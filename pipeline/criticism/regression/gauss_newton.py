@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.machine_scale import base_scales
-from pipeline.criticism.data.segment import Segment, row_index
+from pipeline.criticism.data.segment import Segment, rows_where
 from pipeline.criticism.machine.model import PHYSICAL, Model, base_of, zero
 from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine
@@ -257,7 +257,7 @@ def _one_side_first(rough: Fit, side: tuple[str, ...]) -> LinearSystem:
     """
     silent = rough.policy.fit.silent
     sigma_of_side = tuple(
-        np.where([channel in side for channel, _ in row_index(segment)[3]], sigma, silent * sigma)
+        np.where(rows_where(segment, lambda channel, _: channel in side), sigma, silent * sigma)
         for segment, sigma in zip(rough.segments, rough.sigma, strict=True)
     )
     begun = gauss_newton(replace(rough, sigma=sigma_of_side)).fit

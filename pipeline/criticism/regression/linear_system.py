@@ -133,7 +133,7 @@ class LinearSystem:
         window [Kish (1965), Survey Sampling, 5.4: the design effect].
         """
         counts = self.counts
-        noise = (np.concatenate(self.fit.sigma)[self.group] * self.row_weight) ** 2
+        noise = (np.concatenate(self.fit.sigma) * self.row_weight) ** 2
         share = np.bincount(self.group, noise, counts.size) / np.maximum(counts, 1.0)
         return counts / (1.0 + np.maximum(counts - 1.0, 0.0) * (1.0 - share))
 

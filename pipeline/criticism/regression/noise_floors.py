@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from pipeline.criticism.data.traces import parabolas
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
-from pipeline.criticism.operating import Array, Complex, Operating, Values
+from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.criticism.residuals.channels import (
@@ -40,7 +40,7 @@ class Floor:
     Attributes
     ----------
     sigma
-        Noise [groups].
+        Noise of each weak sample [R].
     near
         Values at which reading errors are computed.
     tolerance
@@ -68,7 +68,7 @@ class Floor:
             Both as weak samples of the residual.
 
         """
-        noise: Array = np.hypot(self.sigma[group], reading)
+        noise: Array = np.hypot(self.sigma, reading)
         if self.tolerance is None:
             return noise, noise
         return noise, np.hypot(noise, self.tolerance[group])
@@ -88,44 +88,80 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
 
     Returns
     -------
-    array [groups]
-        Standard deviation of each (channel, order).
+    array [R]
+        Standard deviation of each weak sample.
 
     Notes
     -----
     Noise is added to the recording and the residual computed again; the variance of the change is
-    pooled over the windows. The noise is white, of each sensor's own level; of an angle that is an
-    integrated speed it is a random walk, from anywhere in the turn: what a model has that goes with
-    the angle is noise there. An angle that is rounded, and signals that are coarse, are
-    rounded anew too. The noise of an angle that was smoothed is smoothed alike: what is slow in it
-    stays as it was. What the smoothing changes in the residual counts too: it may have been noise
-    or motion.
+    pooled over the windows of a (channel, order). The noise is white, of each sensor's own level;
+    of an angle that is an integrated speed it is a random walk, from anywhere in the turn: what a
+    model has that goes with the angle is noise there. Signals that are coarse are rounded anew. The
+    noise of an angle that was smoothed is smoothed alike: what is slow in it stays as it was. What
+    the smoothing changes in the residual counts too: it may have been noise or motion. An angle
+    that is rounded is rounded anew as well (`_of_rounding`).
 
     """
     policy = model.policy.noise_floors
     group, _, valid, groups = row_index(segment)
-    unperturbed = projected(segment, residual(segment, model, values))
-    total, count = np.zeros(len(groups)), np.zeros(len(groups))
-    replicate_count = policy.pooled // max(int(valid.sum()) // max(len(groups), 1), 1)
+    group = group[valid]
+    count = np.maximum(np.bincount(group, minlength=len(groups)), 1)
+
+    def weak_residual(recorded: Signals | None = None) -> Array:
+        return projected(segment, residual(segment, model, values, recorded))[valid]
+
+    def pooled(change: Array) -> Array:
+        return np.bincount(group, change**2, len(groups)) / count
+
+    unperturbed = weak_residual()
+    replicate_count = policy.pooled // max(unperturbed.size // max(len(groups), 1), 1)
     replicates = min(max(replicate_count, policy.replicates), policy.pooled)
-    sensors = segment.sensors
-    if sensors.steps:
+    steps = segment.sensors.steps
+    if steps:
         replicates = max(replicates, policy.shifts)
     shifts = _shifts(segment, replicates, seed)
     even = _before_rounding(segment, model.policy.sensor_noise)
+    variance = np.zeros(len(groups))
     for replicate in range(replicates):
-        shift = {name: shifts[name][replicate] for name in sensors.steps}
+        shift = {name: shifts[name][replicate] for name in steps}
         noisy = _noisy(segment, even, shift, np.random.default_rng([seed, replicate]))
-        change = projected(segment, residual(segment, model, values, noisy)) - unperturbed
-        np.add.at(total, group[valid], change[valid] ** 2)
-        np.add.at(count, group[valid], 1.0)
-    variance = total / np.maximum(count, 1.0)
+        variance += pooled(weak_residual(noisy) - unperturbed) / replicates
     if UNSMOOTHED in segment.recorded:
         rough = {**segment.recorded, "theta_mech_rad": segment.recorded[UNSMOOTHED]}
-        change = projected(segment, residual(segment, model, values, rough)) - unperturbed
-        power = np.bincount(group[valid], change[valid] ** 2, len(groups))
-        variance += power / np.maximum(np.bincount(group[valid], minlength=len(groups)), 1)
-    return np.sqrt(variance) + 1e-300
+        variance += pooled(weak_residual(rough) - unperturbed)
+    of_rows: Array = variance[group]
+    if segment.sensors.angle_step_rad:
+        of_rows = of_rows + _of_rounding(segment, even["theta_mech_rad"], weak_residual, policy)
+    return np.sqrt(of_rows) + 1e-300
+
+
+def _of_rounding(
+    segment: Segment,
+    even_rad: Array,
+    weak_residual: Callable[[Signals], Array],
+    policy: NoiseFloors,
+) -> Array:
+    """Variance [R] that the rounding of an angle makes of the weak residual.
+
+    It is each window's own: where the shaft turns by nearly whole steps from sample to sample, the
+    error creeps instead of jumping about, and none of it averages out [Widrow & Kollar (2008), ch.
+    20]. A rounded angle shows neither where between two steps it began nor, to a step a window, how
+    fast it was: both are spread evenly.
+    """
+    sensors, weak = segment.sensors, segment.weak
+    theta, unperturbed = segment.recorded["theta_mech_rad"], weak_residual(segment.recorded)
+    spread = (np.arange(policy.shifts) + 0.5) / policy.shifts - 0.5
+    ramp = np.arange(theta.size) / (theta.size if weak is None else weak.length)
+    paces = 2.0 * np.random.default_rng(policy.shifts).permutation(spread)
+    variance = np.zeros(unperturbed.size)
+    for shift, pace in zip(spread, paces, strict=True):
+        error = _readings_error(
+            even_rad, sensors.angle_step_rad or 0.0, sensors.readings, shift + pace * ramp
+        )
+        moved = theta + parabolas(error, sensors.parabola)
+        change = weak_residual({**segment.recorded, "theta_mech_rad": moved}) - unperturbed
+        variance += change**2 / policy.shifts
+    return variance
 
 
 def _noisy(
@@ -134,7 +170,7 @@ def _noisy(
     shift: Mapping[str, float],
     generator: np.random.Generator,
 ) -> dict[str, Array]:
-    """The recorded columns with other noise of their sensors.
+    """The recorded columns with other noise of their sensors, except for the rounding of an angle.
 
     `even` are those that are rounded anew, as they were before; `shift` the part of a step by which
     coarse signals are moved.
@@ -149,17 +185,11 @@ def _noisy(
     for name, step in sensors.steps.items():
         noisy[name] += rounding_error(even[name], step, shift[name])
     if sensors.angle_step_rad:
-        turn = generator.uniform(-0.5, 0.5)
-        error = _readings_error(
-            even["theta_mech_rad"], sensors.angle_step_rad, sensors.readings, turn
-        )
-        noisy["theta_mech_rad"] = segment.recorded["theta_mech_rad"] + parabolas(
-            error, sensors.parabola
-        )
+        noisy["theta_mech_rad"] = segment.recorded["theta_mech_rad"]
     return noisy
 
 
-def _readings_error(even_rad: Array, step_rad: float, readings: int, shift: float) -> Array:
+def _readings_error(even_rad: Array, step_rad: float, readings: int, shift: Array | float) -> Array:
     """Error [n, rad] of samples that are means of readings in steps of `readings` times their own,
     taken evenly over the sample as the shaft turns.
     """
@@ -218,7 +248,7 @@ def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:
 
 
 def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
-    """A twentieth of the machine's own scale [groups], as weak samples, whatever the noise.
+    """A twentieth of the machine's own scale, as weak samples, whatever the noise.
 
     Parameters
     ----------
@@ -231,18 +261,14 @@ def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
 
     Returns
     -------
-    array [groups]
+    array [R]
         As weak samples.
 
     """
-    _, _, _, groups = row_index(segment)
+    group, _, valid, groups = row_index(segment)
     scales = [channel_scale(segment, channel, model.machine, values) for channel, _ in groups]
-    return (
-        model.policy.noise_floors.rough
-        * window_gain(segment)
-        / reported_unit(segment, values)
-        * np.array(scales)
-    )
+    part = model.policy.noise_floors.rough * window_gain(segment) / reported_unit(segment, values)
+    return part * np.array(scales)[group[valid]]
 
 
 def form_tolerance(

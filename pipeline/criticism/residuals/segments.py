@@ -24,6 +24,8 @@ _REPEATED = {
 }
 """Nuisances of a test whose machine may not be quite that of others; the constant they share and
 the signals of others that show it."""
+_ALTERNATING = 64.0 / 20.0
+"""Variance of the third difference of a rounding that alternates, over that of white noise."""
 
 
 def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
@@ -149,7 +151,8 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
 
     A shaft that turns by nearly whole steps a sample does not show the step itself, and its
     rounding is then periodic in the angle, as an electrical order is. A drive that logs means of
-    n readings has its angle in fractions q of the step, with a noise of q √(n/12).
+    n readings has its angle in fractions q of the step, with a noise of q √(n/12). A single one that
+    alternates may seem to be of `_ALTERNATING`.
     """
     theta, step = segment.recorded.get("theta_mech_rad"), machine.encoder_rad
     theta = segment.recorded.get(UNSMOOTHED, theta)
@@ -166,7 +169,7 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
     readings = 1.0
     if step > 0.0:
         readings = 12.0 * (segment.sensors.noise.get("theta_mech_rad", 0.0) / step) ** 2
-    count = min(max(round(readings), 1), policy.most_readings)
+    count = min(round(readings), policy.most_readings) if readings > _ALTERNATING else 1
     sensors = replace(segment.sensors, angle_step_rad=step, readings=count)
     return replace(segment, sensors=sensors)
 

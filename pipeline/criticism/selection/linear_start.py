@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import row_index
+from pipeline.criticism.data.segment import rows_where
 from pipeline.criticism.effect import Effect, LinearForm
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
@@ -182,7 +182,9 @@ def _fit_from_form(fit: Fit, effect: Effect, form: LinearForm) -> Fit | None:
     silent, machine = fit.policy.fit.silent, fit.machine
     sigmas = tuple(
         np.where(
-            [c == form.channel and k != 0 for c, k in row_index(segment)[3]], silent * sigma, sigma
+            rows_where(segment, lambda channel, order: channel == form.channel and order != 0),
+            silent * sigma,
+            sigma,
         )
         for segment, sigma in zip(fit.segments, fit.sigma, strict=True)
     )

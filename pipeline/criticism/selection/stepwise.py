@@ -455,8 +455,8 @@ def _floor_factors(tried: LinearSystem) -> Array:
     The equations hold the noise of a current times R and L: a fit that makes these smaller makes
     the residual smaller as well. Reference: Fuller, Measurement Error Models (1987), section 1.3.
     """
-    was = np.concatenate(tried.fit.sigma)[tried.group]
-    now = was * np.concatenate(floors_grown(tried.fit))[tried.group]
+    was = np.concatenate(tried.fit.sigma)
+    now = was * np.concatenate(floors_grown(tried.fit))
     power = tried.row_weight**-2
     by_end = np.bincount(tried.group, power + now**2 - was**2, len(tried.labels))
     factors: Array = np.bincount(tried.group, power, len(tried.labels)) / np.maximum(by_end, 1e-300)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Instrument, Segment, Sensors
+from pipeline.criticism.data.segment import Instrument, Segment, Sensors, row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import BASE, STATE, Model
 from pipeline.criticism.operating import Operating
@@ -126,6 +126,11 @@ def log(n: int = 8000, seed: int = 5, noise: float = 0.0) -> Segment:
         sensors=Sensors(sigma),
         fixed={"ambient_k": 0.0},
     )
+
+
+def unit_floor(segment: Segment) -> np.ndarray:
+    """A noise floor of one for each of a segment's weak samples."""
+    return np.ones(int(row_index(segment)[2].sum()))
 
 
 def coasting(n: int = 3000, seed: int = 5) -> Segment:

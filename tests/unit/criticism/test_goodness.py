@@ -24,7 +24,7 @@ from pipeline.criticism.regression.goodness import (
 from pipeline.criticism.regression.identifiability import known_by
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column
-from tests.unit.criticism.machines import BASE, fitted, log, machine
+from tests.unit.criticism.machines import BASE, fitted, log, machine, unit_floor
 
 ROWS = 400
 
@@ -163,7 +163,7 @@ def test_at_standstill_a_voltage_is_measured_by_what_is_there():
         n: 0.2 * running.recorded[n] / np.abs(running.recorded[n]).max() for n in ("vd_v", "vq_v")
     }
     standing = replace(running, recorded={**running.recorded, **still})
-    fit = Fit((running,), Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
+    fit = Fit((running,), Model(machine(), ()), dict(BASE), (unit_floor(running),), dict(BASE))
     volt, torque = (running.channels[n] for n in (0, 2))
     assert material_size(running, volt, fit) == pytest.approx(5e-4 * 20.0)
     assert material_size(standing, volt, fit) == pytest.approx(5e-3 * 0.2)
@@ -175,7 +175,7 @@ def test_at_standstill_a_voltage_is_measured_by_what_is_there():
 def test_what_is_over_the_floor_is_told_even_where_it_is_too_small_to_matter(share, matters):
     """A held-out error far over the floor has to be somewhere."""
     running = log()
-    fit = Fit((running,), Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
+    fit = Fit((running,), Model(machine(), ()), dict(BASE), (unit_floor(running),), dict(BASE))
     system = linear_system(fit)
     place = next(n for n, label in enumerate(system.labels) if label[1:] == ("torque_shaft_nm", 0))
     mine = system.group == place
@@ -215,7 +215,7 @@ def test_a_window_that_no_floor_is_sure_of_hides_no_other_one():
 def test_few_samples_are_over_their_floor_by_chance_far_more_often(count, q, told):
     """Of χ² with 4 degrees of freedom, 36.0 is passed as seldom as 5 by a normal variable."""
     running = log()
-    fit = Fit((running,), Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
+    fit = Fit((running,), Model(machine(), ()), dict(BASE), (unit_floor(running),), dict(BASE))
     system = linear_system(fit)
     place = next(n for n, label in enumerate(system.labels) if label[1:] == ("torque_shaft_nm", 0))
     group = np.full(count, place)
@@ -270,7 +270,7 @@ def test_one_capture_alone_has_the_error_of_its_fit_and_says_so():
 def bent_line(count):
     """A line through a parabola 40 floors deep, and beside it one through a line; noise of one."""
     running = log()
-    fit = Fit((running,), Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
+    fit = Fit((running,), Model(machine(), ()), dict(BASE), (unit_floor(running),), dict(BASE))
     system = linear_system(fit)
     bent, straight = (system.labels.index((0, name, 0)) for name in ("vq_v", "torque_shaft_nm"))
     x = np.linspace(0.0, 1.0, count)
@@ -282,6 +282,7 @@ def bent_line(count):
         columns=(Column("r_ohm", 1.0), Column("j_kgm2", 1.0)),
         matrix=matrix,
         residual=measured + matrix @ np.linalg.lstsq(-matrix, measured, rcond=None)[0],
+        fit=replace(fit, sigma=(np.ones(2 * count),)),
         group=np.repeat([bent, straight], count),
         window=np.tile(np.arange(count), 2),
         unit=np.ones(2 * count),

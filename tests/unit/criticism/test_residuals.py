@@ -157,9 +157,9 @@ def test_the_noise_floor_is_the_scatter_over_seeds():
     for seed in range(6):
         segment = log(noise=1.0, seed=seed)
         group, _, valid, groups = row_index(segment)
-        weak = projected(segment, residual(segment, PLAIN, BASE)) / sigma[group]
+        weak = projected(segment, residual(segment, PLAIN, BASE))[valid] / sigma
         for place, (channel, _) in enumerate(groups):
-            total.setdefault(channel, []).extend(weak[valid & (group == place)] ** 2)
+            total.setdefault(channel, []).extend(weak[group[valid] == place] ** 2)
     for channel, squares in total.items():
         # windows overlap by half, and the floor itself has the scatter of two replicates
         spread = np.sqrt(2.0 / len(squares)) * 2.5

@@ -134,7 +134,7 @@ def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
         labels=((0, "torque_shaft_nm", 0), (1, "torque_shaft_nm", 0)),
         prior_precision=np.zeros(1 + len(model_columns(model))),
         prior_gradient=np.zeros(1 + len(model_columns(model))),
-        fit=Fit((log(), log()), model, dict(BASE), (np.ones(1), np.ones(1)), BASE),
+        fit=Fit((log(), log()), model, dict(BASE), (np.ones(100), np.ones(100)), BASE),
         model_column_count=len(model_columns(model)),
         made_at={},
     )
@@ -163,7 +163,7 @@ def test_evidence_at_an_order_counts_above_its_floor_or_below_it(quiet_chi2):
         labels=((0, "torque_shaft_nm", 0), (0, "torque_shaft_nm", 1)),
         prior_precision=np.zeros(len(columns)),
         prior_gradient=np.zeros(len(columns)),
-        fit=Fit((log(),), model, dict(BASE), (np.ones(2),), BASE),
+        fit=Fit((log(),), model, dict(BASE), (np.ones(200),), BASE),
         model_column_count=len(columns),
         made_at={},
     )

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.segment import Sensors, row_index
+from pipeline.criticism.data.segment import Sensors, projected, row_index
 from pipeline.criticism.data.sensor_noise import (
     coarse_step,
     is_rounded,
@@ -22,6 +22,7 @@ from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.regression.noise_floors import _readings_error, noise_floor
+from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import _by_encoder
 from pipeline.criticism.selection.stepwise import _floor_factors
 from tests.unit.criticism.machines import BASE, coasting, log, machine
@@ -153,6 +154,35 @@ def test_the_floor_holds_what_coarse_rounding_really_does():
     assert (rounding > 0.7 * np.array(errors)).all()
     assert (rounding < 4.0 * np.array(errors)).all()
     assert (by_white < 0.8 * np.array(errors)).all()
+
+
+def test_a_rounded_angle_is_as_loud_in_each_window_as_its_pace_makes_it():
+    """J θ″ of steps of 1.5 mrad as a shaft gathers speed, past one step a sample at 31 rad/s. There
+    the error creeps, and is four times what it is elsewhere.
+    """
+    step, even = 2.0 * np.pi / 4096, log()
+    group, _, valid, groups = row_index(even)
+    mine = group[valid] == groups.index(("torque_shaft_nm", 0))
+    model = Model(machine(), ())
+
+    def weak(theta):
+        recorded = {**even.recorded, "theta_mech_rad": theta}
+        return projected(even, residual(even, model, BASE, recorded))[valid][mine]
+
+    exact, true = even.recorded["theta_mech_rad"], weak(even.recorded["theta_mech_rad"])
+    power = np.zeros(mine.sum())
+    for shift in np.linspace(0.0, 1.0, 40, endpoint=False):
+        theta = step * (np.round(exact / step + shift) - shift)
+        power += (weak(theta) - true) ** 2 / 40.0
+    quiet = dict.fromkeys(even.sensors.noise, 0.0)
+    sensors = Sensors(quiet, angle_step_rad=step)
+    rounded = {**even.recorded, "theta_mech_rad": step * np.round(exact / step)}
+    segment = replace(even, recorded=rounded, sensors=sensors)
+    floor = noise_floor(segment, model, BASE, 1)[mine]
+    assert np.sqrt(power).max() > 4.0 * np.median(np.sqrt(power))
+    assert floor.max() > 3.0 * np.median(floor)
+    assert np.abs(np.log(floor / np.sqrt(power))).max() < np.log(3.0)
+    assert np.mean(power / floor**2) == pytest.approx(1.0, abs=0.3)
 
 
 def test_smoothing_keeps_a_parabola_to_both_ends_and_takes_the_steps_of_its_rounding():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.segment import UNSMOOTHED, row_index
+from pipeline.criticism.data.segment import UNSMOOTHED, Segment, row_index
 from pipeline.criticism.design.planned_tests import planned
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import BASE as CONSTANTS
@@ -15,6 +15,16 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.noise_floors import noise_floor
 from tests.unit.criticism.machines import BASE, log, machine
+
+
+def _of_groups(segment: Segment, rows: np.ndarray) -> dict[tuple[str, float], float]:
+    """What the weak samples of each (channel, order) have in common."""
+    group, _, valid, groups = row_index(segment)
+    return {
+        one: float(rows[group[valid] == place].mean())
+        for place, one in enumerate(groups)
+        if np.any(group[valid] == place)
+    }
 
 
 def test_what_smoothing_an_angle_changes_counts_as_noise_of_each_order() -> None:
@@ -32,14 +42,8 @@ def test_what_smoothing_an_angle_changes_counts_as_noise_of_each_order() -> None
     swing = size * np.sin(omega * segment.ts_s * np.arange(segment.size))
     theta = segment.recorded["theta_mech_rad"]
     rough = replace(segment, recorded={**segment.recorded, UNSMOOTHED: theta + swing})
-    groups = row_index(segment)[3]
-    added = dict(
-        zip(
-            groups,
-            noise_floor(rough, model, values, 1) ** 2 - noise_floor(segment, model, values, 1) ** 2,
-            strict=True,
-        )
-    )
+    change = noise_floor(rough, model, values, 1) ** 2 - noise_floor(segment, model, values, 1) ** 2
+    added = _of_groups(segment, change)
     assert segment.weak is not None
     seen = segment.weak.project((values["j_kgm2"] * omega**2 * swing)[None])[0, :, 0]
     assert np.sqrt(added["torque_shaft_nm", 0]) == pytest.approx(
@@ -64,7 +68,7 @@ def test_the_slow_part_of_an_encoders_noise_stays_in_a_smoothed_angle() -> None:
         noise = {**dict.fromkeys(plain.sensors.noise, 0.0), "theta_mech_rad": size}
         sensors = replace(plain.sensors, noise=noise, steps={}, parabola=parabola)
         found = noise_floor(replace(plain, sensors=sensors), model, values, 1)
-        return float(dict(zip(row_index(plain)[3], found, strict=True))["torque_shaft_nm", 0])
+        return _of_groups(plain, found)["torque_shaft_nm", 0]
 
     left = sigma * np.sqrt(2.25 / 21)
     assert floor(left, 21) == pytest.approx(floor(sigma, 1), rel=0.15)

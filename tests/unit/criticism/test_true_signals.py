@@ -21,7 +21,7 @@ from pipeline.criticism.regression.linearise import base_columns
 from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.selection.discrimination import discriminate
 from pipeline.numerics.projection import projection
-from tests.unit.criticism.machines import BASE, log, machine, operating
+from tests.unit.criticism.machines import BASE, log, machine, operating, unit_floor
 
 LIBRARY = effects()
 TS = 1e-4
@@ -155,7 +155,7 @@ def test_columns_of_a_free_shaft_that_are_kept_go_by_the_new_inertia():
         fit = Fit((coast,), Model(machine(), ()), values, sigma, BASE)
         return linear_system(fit, (), before)
 
-    sigma = (np.ones(4),)
+    sigma = (unit_floor(coast),)
     heavier = {**BASE, "j_kgm2": 2.0 * BASE["j_kgm2"]}
     kept, fresh = around(heavier, around(dict(BASE))), around(heavier)
     for name in ("psi_wb", "b_nm_s_rad"):
