@@ -325,9 +325,9 @@ class Priors:
         why="a few milliohm of switches and leads beside a winding of one ohm",
     )  # fmt: skip
     zero_a: float = derived(
-        5e-4, "machine scales", "offset of the shunts",
-        source="half a step of a 12-bit converter of twice the current; what is beyond is an "
-        "effect's to name",
+        1e-3, "machine scales", "offset of the shunts",
+        source="a step of a 12-bit converter of twice the current; what is beyond is an effect's "
+        "to name",
     )  # fmt: skip
     zero_angle_rad: float = derived(
         1e-3, "rad", "electrical zero of the drive's encoder",

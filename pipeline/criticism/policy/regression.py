@@ -156,6 +156,10 @@ class NoiseFloors:
         1.0, "sample periods", "what a drive's own speed is late by",
         source="the difference of two angles is late by half a period and waits for the next row",
     )  # fmt: skip
+    reversal_periods: float = derived(
+        0.5, "sample periods", "what the instant of a reversal is known to",
+        source="a sample's speed is the mean of the period before and the one behind",
+    )  # fmt: skip
     creep: float = chosen(
         1e-3, "machine scales", "speed below which friction may hold the shaft",
         why="a resting shaft's recorded speed is noise of that size",

@@ -415,6 +415,7 @@ def _of_torque(segment: Segment, model: Model, values: Values) -> Array | float:
     if "standstill" in errors:
         x = operate(segment, segment.recorded, model, values)
         total[:, 0] = np.hypot(total[:, 0], _at_rest(segment, model, values, x))
+        total[:, 0] = np.hypot(total[:, 0], _at_reversals(segment, model, values, x))
     if "pulses" in errors:
         total[:, 0] = np.hypot(total[:, 0], _of_pulses(segment, model, values, x))
     if "current_jumps" in errors:
@@ -516,7 +517,8 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
     slow = policy.creep * model.machine.scales["speed_rad_s"]
     finer = x.theta_rad.size // segment.size
     pace = np.abs(x.omega_rad_s[::finer])
-    creeping = np.flatnonzero(_lasting(pace < slow, round(policy.rest_s / x.ts_s)))
+    resting = _lasting(pace < slow, round(policy.rest_s / x.ts_s))
+    creeping = np.flatnonzero(_with_neighbours(resting))
     if creeping.size < 2:
         return np.zeros(weak.starts.size)
     resting = x.at(finer * creeping)
@@ -528,6 +530,34 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
     grip = np.zeros(segment.size)
     grip[creeping] = 0.5 * np.abs(onward - back) / math.sqrt(3.0)
     return np.abs(weak.project(grip[None])[0, :, 0])
+
+
+def _at_reversals(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
+    """Error [W] of torque that reversals make, as weak samples: a log does not say when between two
+    samples the shaft turned back, and friction with it.
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros(segment.size)
+    finer = x.theta_rad.size // segment.size
+    pace = x.omega_rad_s[::finer]
+    back = np.flatnonzero(pace[1:] * pace[:-1] < 0.0)
+    change = np.zeros(segment.size)
+    if back.size:
+        beside = x.at(finer * np.concatenate([back, back + 1]))
+        drag_nm = evaluate(model, beside, values, frozenset({"torque"})).drag_nm
+        change[back] = drag_nm[back.size :] - drag_nm[: back.size]
+    rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
+    share = model.policy.noise_floors.reversal_periods
+    return share * np.sqrt((change[rows] ** 2) @ (weak.functions[0, 0] ** 2))
+
+
+def _with_neighbours(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Some samples [n] and those beside them, whose speed is a difference across a rest's edge."""
+    beside = which.copy()
+    beside[1:] |= which[:-1]
+    beside[:-1] |= which[1:]
+    return beside
 
 
 def _lasting(which: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
