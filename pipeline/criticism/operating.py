@@ -396,13 +396,13 @@ def between(signal: Any, at: Array) -> Any:
     Parameters
     ----------
     signal
-        Samples [N], real or complex.
+        Samples [N], real or complex; or several such signals [..., N].
     at
         Places [n] in samples from the first; clipped to the record.
 
     Returns
     -------
-    array [n]
+    array [n] or [..., n]
         Through two samples by a cubic whose slopes there are the central differences.
 
     References
@@ -411,10 +411,11 @@ def between(signal: Any, at: Array) -> Any:
     Academic Press, 1974.
 
     """
-    place = np.clip(at, 0.0, signal.size - 1.0)
-    first = np.minimum(place.astype(np.int64), max(signal.size - 2, 0))
+    last = signal.shape[-1] - 1
+    place = np.clip(at, 0.0, float(last))
+    first = np.minimum(place.astype(np.int64), max(last - 1, 0))
     part = place - first
-    points = [signal[np.clip(first + k, 0, signal.size - 1)] for k in (-1, 0, 1, 2)]
+    points = [signal.take(first + k, axis=-1, mode="clip") for k in (-1, 0, 1, 2)]
     before, left, right, after = points
     bend = 2.0 * before - 5.0 * left + 4.0 * right - after
     twist = 3.0 * (left - right) + after - before

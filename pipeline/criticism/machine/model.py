@@ -140,6 +140,8 @@ OPEN_FLUX = "open_flux_share"
 """Nuisance of an open-circuit test beside other tests that turn: a magnet may have lost flux."""
 CURVED = tuple(constant.name for constant in BASE if constant.curved)
 """How the names of nuisances begin along which no residual is linear."""
+OF_SIGNALS = frozenset(c.name for c in BASE if c.hook in ("gain", "log"))
+"""Constants of sensors and logs: a segment observes them as its sensors and `fixed` say."""
 STATE = tuple(constant.name for constant in BASE if constant.hook == "state")
 PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 """The base's constants of the station, and of the motor; the others are nuisances of a log."""
