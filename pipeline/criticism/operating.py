@@ -168,6 +168,22 @@ class Operating(Samples):
         same = columns.keys() >= _MOTION and self.ts_s == other.ts_s
         return replace(self, **columns, cache=dict(other.cache)) if same else self
 
+    def like(self, other: Operating) -> bool:
+        """Whether all columns of the state, and the voltage of its supply, are those of another.
+
+        Parameters
+        ----------
+        other
+            State that this one is `beside`.
+
+        """
+        volts, theirs = self.supply.volts_v, other.supply.volts_v
+        same_volts = volts is theirs or (
+            volts is not None and theirs is not None and np.array_equal(volts, theirs)
+        )
+        columns = (one.name for one in fields(Samples))
+        return same_volts and all(getattr(self, n) is getattr(other, n) for n in columns)
+
     def once(self, column: Any, name: Hashable, make: Callable[[], Made]) -> Made:
         """What depends on one array alone, computed once for all copies of the state that share the
         array.

@@ -439,11 +439,17 @@ class _Sampler:
         """The residual where an effect has moved. An error of a voltage or a torque leaves the
         machine's state, and what its hooks gave, as they are.
         """
-        if effect.hook != "sensor" or effect.angle is not None or effect.current is not None:
+        if effect.hook != "sensor":
             return self._residual(model, moved)
-        after = self.start
-        if any(hook is not None for hook in (effect.voltage, effect.shaft, effect.speed)):
-            after = predicted(self.segment, self.x, self.pieces, model, moved)
+        x, pieces, after = self.x, self.pieces, self.start
+        if effect.angle is not None or effect.current is not None:
+            x = operate(self.segment, self.segment.recorded, model, moved).beside(self.x)
+            if not x.like(self.x):
+                pieces = evaluate(model, x, moved, self.hooks)
+        if pieces is not self.pieces or any(
+            hook is not None for hook in (effect.angle, effect.voltage, effect.shaft, effect.speed)
+        ):
+            after = predicted(self.segment, x, pieces, model, moved)
         return measured(self.segment, self.segment.recorded, model, moved) - after
 
     def _start(self, column: Column, effect: Effect) -> dict[str, float]:
