@@ -131,6 +131,11 @@ class Fit:
         return self.at({c.name: self.values[c.name] + change for c, change in moves})
 
     @property
+    def alone(self) -> Fit:
+        """The model and its values without segments and floors, as a segment's work takes it."""
+        return replace(self, segments=(), sigma=(), tolerance=())
+
+    @property
     def floors(self) -> tuple[Floor, ...]:
         """What the rows of every segment are held against."""
         pairs = zip(self.sigma, self.tolerance or [None] * len(self.sigma), strict=True)
