@@ -16,6 +16,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -519,12 +520,21 @@ def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]
     v T φ; the means are `part` of that below, −j v T φ with v = R i + j ω_e ψ.
 
     """
-    hold_s = x.supply.hold_s
-    turn = x.machine.pole_pairs * x.omega_rad_s * hold_s
-    flux = part * turn * (turn * base_flux(x, values) - 1j * hold_s * values["r_ohm"] * x.i_a)
-    # what no capture determines is zero
-    l_d, l_q = values["ld_h"] or math.inf, values["lq_h"] or math.inf
-    return flux, flux.real / l_d + 1j * flux.imag / l_q
+    r_ohm, l_d, l_q = values["r_ohm"], values["ld_h"], values["lq_h"]
+    hold_s, iq_a, omega = x.supply.hold_s, x.iq_a, x.omega_rad_s
+
+    def made() -> tuple[Any, Array, tuple[Complex, Complex]]:
+        turn = x.machine.pole_pairs * omega * hold_s
+        flux = part * turn * (turn * base_flux(x, values) - 1j * hold_s * r_ohm * x.i_a)
+        # what no capture determines is zero
+        return (
+            iq_a,
+            omega,
+            (flux, flux.real / (l_d or math.inf) + 1j * flux.imag / (l_q or math.inf)),
+        )
+
+    name = ("ripple", part, r_ohm, l_d, l_q, values["psi_wb"], id(iq_a), id(omega))
+    return x.once(x.id_a, name, made)[2]
 
 
 HOOKS = frozenset({"flux", "drop", "torque"})
