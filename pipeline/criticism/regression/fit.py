@@ -14,7 +14,7 @@ from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.bounds import limits_of
-from pipeline.criticism.regression.linearise import Column
+from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.noise_floors import Floor, form_tolerance, noise_floor
 from pipeline.criticism.regression.parallel import on_each
 

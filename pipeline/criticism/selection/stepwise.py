@@ -127,8 +127,8 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
             break
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
         system = reconsidered(_backward(chosen, base))
-        effects = system.fit.model.effects[base:]
-        fit = replace(system.fit, tolerance=tolerances(system.fit, effects))
+        fit, effects = system.fit, system.fit.model.effects[base:]
+        fit = replace(fit, tolerance=tolerances(fit, effects))
         if effects:
             fit = _floored_anew(fit, system)
         if tuple(e.name for e in effects) in {r.added for r in steps}:
@@ -157,8 +157,7 @@ def _may_join(score: Score, inside: Set[object], couplings: bool) -> bool:
 
 
 def _floored_anew(fit: Fit, before: LinearSystem) -> Fit:
-    """The fit by noise floors made anew, now that another effect is in; `before` is the system
-    around it by those of before.
+    """The fit by noise floors made anew, now that another effect is in; `before` by the former.
 
     The tolerance for its form is new, so it is refitted in any case: the next effect is judged
     against this deviance. If some floor changes by half, or something is left over them, and a
@@ -204,8 +203,7 @@ def _chosen(
             acts = _acts(finished)
             if any(cost > least + policy.tie and np.any(acts & where) for least, where in unsure):
                 return None
-            at_end = linear_system(finished.fit)
-            if _is_determined(at_end, wide):
+            if _is_determined(at_end := linear_system(finished.fit), wide):
                 return at_end
             unsure.append((cost, acts))
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
