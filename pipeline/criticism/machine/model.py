@@ -533,7 +533,8 @@ def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]
             (flux, flux.real / (l_d or math.inf) + 1j * flux.imag / (l_q or math.inf)),
         )
 
-    name = ("ripple", part, r_ohm, l_d, l_q, values["psi_wb"], id(iq_a), id(omega))
+    of_state = hold_s, id(iq_a), id(omega)
+    name = ("ripple", part, r_ohm, l_d, l_q, values["psi_wb"], *of_state)
     return x.once(x.id_a, name, made)[2]
 
 

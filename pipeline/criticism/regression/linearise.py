@@ -332,6 +332,8 @@ class _Sampler:
 
     def change(self, column: Column) -> Array | None:
         """d(residual)/d(parameter) [C, n]; None where it is zero throughout."""
+        if not self.observes(column):
+            return None
         if column.effect is None:
             return self._base(column)
         if self.equation.form == "neither":

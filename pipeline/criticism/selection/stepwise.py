@@ -156,7 +156,7 @@ def _may_join(score: Score, inside: Set[object], couplings: bool) -> bool:
     return effect.discriminator is None or (couplings and effect.discriminator not in inside)
 
 
-def _floored_anew(fit: Fit, before: LinearSystem) -> Fit:
+def _floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
     """The fit by noise floors made anew, now that another effect is in; `before` by the former.
 
     The tolerance for its form is new, so it is refitted in any case: the next effect is judged
@@ -172,7 +172,7 @@ def _floored_anew(fit: Fit, before: LinearSystem) -> Fit:
     changed = np.abs(np.log(ratio)).max() >= math.log(policy.floor_ratio)
     if changed:
         fit = replace(fit, sigma=floor, near=fit.values)
-    refitted = gauss_newton(fit, before)
+    refitted = gauss_newton(fit, before=before)
     if not changed and not significant_groups(refitted).any():
         return refitted.fit
     rough = rough_anew(fit)
