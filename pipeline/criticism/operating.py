@@ -168,6 +168,22 @@ class Operating(Samples):
         same = columns.keys() >= _MOTION and self.ts_s == other.ts_s
         return replace(self, **columns, cache=dict(other.cache)) if same else self
 
+    def like(self, other: Operating) -> bool:
+        """Whether all columns of the state, and the voltage of its supply, are those of another.
+
+        Parameters
+        ----------
+        other
+            State that this one is `beside`.
+
+        """
+        volts, theirs = self.supply.volts_v, other.supply.volts_v
+        same_volts = volts is theirs or (
+            volts is not None and theirs is not None and np.array_equal(volts, theirs)
+        )
+        columns = (one.name for one in fields(Samples))
+        return same_volts and all(getattr(self, n) is getattr(other, n) for n in columns)
+
     def once(self, column: Any, name: Hashable, make: Callable[[], Made]) -> Made:
         """What depends on one array alone, computed once for all copies of the state that share the
         array.
@@ -396,13 +412,13 @@ def between(signal: Any, at: Array) -> Any:
     Parameters
     ----------
     signal
-        Samples [N], real or complex.
+        Samples [N], real or complex; or several such signals [..., N].
     at
         Places [n] in samples from the first; clipped to the record.
 
     Returns
     -------
-    array [n]
+    array [n] or [..., n]
         Through two samples by a cubic whose slopes there are the central differences.
 
     References
@@ -411,10 +427,11 @@ def between(signal: Any, at: Array) -> Any:
     Academic Press, 1974.
 
     """
-    place = np.clip(at, 0.0, signal.size - 1.0)
-    first = np.minimum(place.astype(np.int64), max(signal.size - 2, 0))
+    last = signal.shape[-1] - 1
+    place = np.clip(at, 0.0, float(last))
+    first = np.minimum(place.astype(np.int64), max(last - 1, 0))
     part = place - first
-    points = [signal[np.clip(first + k, 0, signal.size - 1)] for k in (-1, 0, 1, 2)]
+    points = [signal.take(first + k, axis=-1, mode="clip") for k in (-1, 0, 1, 2)]
     before, left, right, after = points
     bend = 2.0 * before - 5.0 * left + 4.0 * right - after
     twist = 3.0 * (left - right) + after - before

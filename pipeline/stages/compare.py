@@ -30,7 +30,13 @@ def main(settings: CompareSettings) -> Outcome:
         The keys of `compare` or `diagnose`.
 
     """
-    return each_motor(settings, _judge, "pipeline.criticism.comparison", "comparison")
+    return each_motor(
+        settings,
+        _judge,
+        "pipeline.criticism.comparison",
+        "comparison",
+        "pipeline.io.recordings.comparison",
+    )
 
 
 def _judge(task: Task) -> Judged:
@@ -43,16 +49,20 @@ def _judge(task: Task) -> Judged:
         output / "comparison" / f"{stem}.json", canonical_json(document := comparison.document())
     )
     if comparison.traces:
-        from pipeline.io.recordings.comparison import comparison_bytes
-
+        recorded = task.worker.aside(_recorded, comparison)
         with task.watch.stage("recording"):
-            path = output / "recordings" / f"comparison-{stem}.rrd"
-            write_checksummed(path, comparison_bytes(comparison))
+            write_checksummed(output / "recordings" / f"comparison-{stem}.rrd", recorded())
     with task.watch.stage("page"):
         _write_page(output, comparison)
     return Judged(
         comparison_text(comparison), not comparison.errors, document, _next(task, comparison)
     )
+
+
+def _recorded(comparison: Comparison) -> bytes:
+    from pipeline.io.recordings.comparison import comparison_bytes
+
+    return comparison_bytes(comparison)
 
 
 def _next(task: Task, result: Comparison) -> str:

@@ -14,10 +14,10 @@ from pipeline.criticism.discovery.matching_pursuit import Pursuit, expression
 from pipeline.criticism.discovery.residual_inputs import Port, ports, refined
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.policy import Policy
+from pipeline.criticism.regression.columns import Column, effect_columns
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.criticism.selection.truncation import SHAFT
 from pipeline.records.diagnosis import UnknownStructure
 

@@ -223,8 +223,8 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
         mean = mean * np.exp(1j * segment.instrument.frame * turn)
     commanded = segment.instrument.meter == "gain_commanded"
     if commanded and (lag := values["frame_lag_s"]):
-        mean = mean * np.exp(
-            1j * lag * x.once(x.theta_rad, "behind", lambda: _frame_lag(segment, x))
+        mean = mean * x.once(
+            x.theta_rad, ("behind", lag), lambda: np.exp(1j * lag * _frame_lag(segment, x))
         )
     if commanded and (lead := values["command_lead"]) and x.supply.hold_s:
         mean = mean + lead * x.supply.hold_s / segment.ts_s * np.gradient(mean)

@@ -16,6 +16,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -140,6 +141,8 @@ OPEN_FLUX = "open_flux_share"
 """Nuisance of an open-circuit test beside other tests that turn: a magnet may have lost flux."""
 CURVED = tuple(constant.name for constant in BASE if constant.curved)
 """How the names of nuisances begin along which no residual is linear."""
+OF_SIGNALS = frozenset(c.name for c in BASE if c.hook in ("gain", "log"))
+"""Constants of sensors and logs: a segment observes them as its sensors and `fixed` say."""
 STATE = tuple(constant.name for constant in BASE if constant.hook == "state")
 PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 """The base's constants of the station, and of the motor; the others are nuisances of a log."""
@@ -517,12 +520,22 @@ def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]
     v T φ; the means are `part` of that below, −j v T φ with v = R i + j ω_e ψ.
 
     """
-    hold_s = x.supply.hold_s
-    turn = x.machine.pole_pairs * x.omega_rad_s * hold_s
-    flux = part * turn * (turn * base_flux(x, values) - 1j * hold_s * values["r_ohm"] * x.i_a)
-    # what no capture determines is zero
-    l_d, l_q = values["ld_h"] or math.inf, values["lq_h"] or math.inf
-    return flux, flux.real / l_d + 1j * flux.imag / l_q
+    r_ohm, l_d, l_q = values["r_ohm"], values["ld_h"], values["lq_h"]
+    hold_s, iq_a, omega = x.supply.hold_s, x.iq_a, x.omega_rad_s
+
+    def made() -> tuple[Any, Array, tuple[Complex, Complex]]:
+        turn = x.machine.pole_pairs * omega * hold_s
+        flux = part * turn * (turn * base_flux(x, values) - 1j * hold_s * r_ohm * x.i_a)
+        # what no capture determines is zero
+        return (
+            iq_a,
+            omega,
+            (flux, flux.real / (l_d or math.inf) + 1j * flux.imag / (l_q or math.inf)),
+        )
+
+    of_state = hold_s, id(iq_a), id(omega)
+    name = ("ripple", part, r_ohm, l_d, l_q, values["psi_wb"], *of_state)
+    return x.once(x.id_a, name, made)[2]
 
 
 HOOKS = frozenset({"flux", "drop", "torque"})

@@ -108,6 +108,10 @@ class Selection:
         "rise of deviance from which on the tangent is believed that a term pays",
         why="a term costs a fit to try",
     )  # fmt: skip
+    choice_falls: float = chosen(
+        2.0, "1", "times its fall of deviance to first order that another choice may reach",
+        why="refits fell by up to 1.8 times where that mattered, and a refit costs a fit",
+    )  # fmt: skip
     alternative_share: float = chosen(
         0.5, "1", "share of what an effect explains that an alternative may lose to first order",
         why="the tangent may be wrong, and each refit costs a fit",

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.operating import Array, Values
-from pipeline.criticism.regression.linearise import Column
+from pipeline.criticism.regression.columns import Column
 
 _AT = 1e-9
 """Share of its own size by which a value that stands at a bound may miss it by rounding."""

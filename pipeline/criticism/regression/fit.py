@@ -14,7 +14,7 @@ from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.bounds import limits_of
-from pipeline.criticism.regression.linearise import Column
+from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.noise_floors import Floor, form_tolerance, noise_floor
 from pipeline.criticism.regression.parallel import on_each
 
@@ -129,6 +129,11 @@ class Fit:
         """
         moves = zip(columns, step.tolist(), strict=True)
         return self.at({c.name: self.values[c.name] + change for c, change in moves})
+
+    @property
+    def alone(self) -> Fit:
+        """The model and its values without segments and floors, as a segment's work takes it."""
+        return replace(self, segments=(), sigma=(), tolerance=())
 
     @property
     def floors(self) -> tuple[Floor, ...]:

@@ -19,9 +19,9 @@ from pipeline.criticism.machine.model import PHYSICAL, Model, base_of, zero
 from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.regression.bounds import Best, bounded_step
+from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.regression.noise_floors import rough_floor
 from pipeline.criticism.residuals.segments import sparse
 

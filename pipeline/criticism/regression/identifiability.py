@@ -15,10 +15,10 @@ from pipeline.criticism.machine.model import BASE, PHYSICAL, STATE, Model, base_
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.regression import GaussNewton
 from pipeline.criticism.regression.bounds import limits_of
+from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut, form_error_factor
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.regression.linearise import Column
 from pipeline.numerics.identifiability import (
     REACH,
     Combination,

@@ -15,16 +15,9 @@ from pipeline.criticism.machine.model import COAST_SHARES, CURVED, Model
 from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.regression import NoiseFloors
+from pipeline.criticism.regression.columns import Column, ColumnKey, base_columns, effect_columns
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.linearise import (
-    Column,
-    ColumnKey,
-    Rows,
-    base_columns,
-    effect_columns,
-    linearise,
-    whitened_anew,
-)
+from pipeline.criticism.regression.linearise import Rows, linearise, whitened_anew
 from pipeline.criticism.regression.normal_equations import (
     NormalEquations,
     Prior,

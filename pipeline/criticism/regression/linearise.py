@@ -6,8 +6,9 @@ a group of (channel, order), so that any subset of effects or captures is then s
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,10 @@ from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import (
     CURVED,
     LATE_TORQUE,
+    OF_SIGNALS,
     STATE,
     Model,
     Pieces,
-    base_of,
     clock_gain,
     effect_flux,
     evaluate,
@@ -30,12 +31,12 @@ from pipeline.criticism.machine.model import (
     values_of,
     zero,
 )
-from pipeline.criticism.operating import Array, Complex, Noted, Operating, Values
-from pipeline.criticism.parameter import Machine
+from pipeline.criticism.operating import Array, Complex, Noted, Values
 from pipeline.criticism.policy.regression import NoiseFloors
+from pipeline.criticism.regression.columns import Column, ColumnKey
 from pipeline.criticism.regression.noise_floors import Floor, offsets, reading_error, window_gain
 from pipeline.criticism.residuals.channels import of_acceleration, reported_unit
-from pipeline.criticism.residuals.observability import hooks_in, observes, observes_sensor
+from pipeline.criticism.residuals.observability import constants_in, hooks_in, observes
 from pipeline.criticism.residuals.residual import measured, operate, predicted, residual
 from pipeline.criticism.signals.shaft import TORQUE_RIPPLES
 from pipeline.criticism.signals.voltage import RIPPLES
@@ -45,38 +46,6 @@ _CHUNK = 8
 takes an eighth longer), fewer are more calls."""
 _NOTHING = 1e-40
 """What complex steps leave of a term that is zero."""
-
-
-ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
-"""What separates columns: name, and the shapes that they are at."""
-
-
-@dataclass(frozen=True, slots=True)
-class Column:
-    """One direction of the parameter space.
-
-    Attributes
-    ----------
-    name
-        A base constant, or `effect.parameter`.
-    step
-        Of its finite difference [unit of the parameter].
-    effect
-        The effect; None for a base constant.
-    at
-        Values of the effect's shape parameters while its amplitudes are zero.
-
-    """
-
-    name: str
-    step: float
-    effect: Effect | None = None
-    at: tuple[tuple[str, float], ...] = ()
-
-    @property
-    def key(self) -> ColumnKey:
-        """What separates columns."""
-        return self.name, self.at
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +164,8 @@ def _weak_columns(
 ) -> list[Array]:
     """Weak samples [P][R] of every column, zero where the segment does not observe it."""
     known, nothing = sampler.weak, np.zeros(int(valid.sum()))
-    new = [column for column in columns if known.get(column.key, (None, nothing))[0] != column]
+    observed_columns = {column.key: column for column in columns if sampler.observes(column)}
+    new = [c for key, c in observed_columns.items() if known.get(key, (None, nothing))[0] != c]
     for first in range(0, len(new), _CHUNK):
         changes: dict[ColumnKey, Array | None] = {}
         for column in (part := new[first : first + _CHUNK]):
@@ -214,7 +184,7 @@ def _weak_columns(
     for column in new:
         if (twin := sampler.twin(column)) is not None:
             known[column.key] = column, known[twin][1]
-    return [known[column.key][1] for column in columns]
+    return [known[c.key][1] if c.key in observed_columns else nothing for c in columns]
 
 
 def absorb(rows: Array, unknown: Sequence[Array]) -> None:
@@ -320,13 +290,14 @@ class _Sampler:
         self.segment, self.model, self.values = segment, model, values
         self.weak: dict[ColumnKey, tuple[Column, Array]] = {}
         self.read: dict[str, list[tuple[Column, set[str]]]] = {}
-        self.observes = equation_of(segment).observes
+        self.equation = equation_of(segment).observes
+        self.constants = constants_in(segment, model.machine)
+        self.effects: dict[str, bool] = {}
         self.recorder = equation_of(segment).recorder
         self.x = operate(segment, segment.recorded, model, values)
         self.hooks = hooks_in(segment)
         pieces = self.pieces = evaluate(model, self.x, values, self.hooks)
-        self.effect_pieces: dict[str, Pieces] = {}
-        self.gains = {c.name for c in base_of(model.machine) if c.hook in ("gain", "log")}
+        self.by_hook: dict[str, dict[str, tuple[Any, set[str]]]] = {}
         self.paced: dict[float, Array] = {}
         self.of_nothing: Array | None = None
         self.mean = mean_current(self.x, values)
@@ -349,14 +320,24 @@ class _Sampler:
                 return other.key
         return None
 
+    def observes(self, column: Column) -> bool:
+        """Whether what a column is of is in the equation of the segment."""
+        effect = column.effect
+        if effect is None:
+            return column.name in self.constants
+        if effect.name not in self.effects:
+            of_all = self.equation.form == "neither"
+            self.effects[effect.name] = of_all or observes(self.segment, effect)
+        return self.effects[effect.name]
+
     def change(self, column: Column) -> Array | None:
         """d(residual)/d(parameter) [C, n]; None where it is zero throughout."""
+        if not self.observes(column):
+            return None
         if column.effect is None:
             return self._base(column)
-        if self.observes.form == "neither":
+        if self.equation.form == "neither":
             return self._by_residual(column, column.effect)
-        if not observes(self.segment, column.effect):
-            return None
         if column.effect.hook == "sensor":
             return self._by_residual(column, column.effect)
         return self._hook(column, column.effect)
@@ -365,11 +346,9 @@ class _Sampler:
         """The residual [C, n] with another model or other values."""
         return residual(self.segment, model, values, beside=self.x)
 
-    def _base(self, column: Column) -> Array | None:
-        if column.name in self.gains:
+    def _base(self, column: Column) -> Array:
+        if column.name in OF_SIGNALS or column.name not in self.equation.constants:
             return self._gain(column)
-        if column.name not in self.observes.constants:
-            return None
         step = column.step
         if column.name == "j_kgm2":
             # a coasting shaft goes by 1 / J: a step must be small against what J has come to
@@ -392,24 +371,15 @@ class _Sampler:
             step *= self.values[column.name] / moved[column.name]
         return -(after - self.start) / step
 
-    def _gain(self, column: Column) -> Array | None:
+    def _gain(self, column: Column) -> Array:
         """Along a gain of the station: of the prediction, or what it does to current and heat."""
-        observed = {
-            "gain_torque": observes_sensor(self.segment, "load"),
-            LATE_TORQUE: observes_sensor(self.segment, "load"),
-            "gain_lcr": observes_sensor(self.segment, "lcr"),
-            "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
-            "gain_clock": observes_sensor(self.segment, "clock"),
-            self.segment.instrument.meter: observes_sensor(self.segment, "voltage"),
-            self.segment.instrument.ammeter: observes_sensor(self.segment, "current"),
-        }
-        if not observed.get(column.name, column.name in self.segment.fixed):
-            return None
         if column.name == "gain_clock":
             return self._along_time(column.step)
         moved = {**self.values, column.name: self.values[column.name] + column.step}
-        of_signal = self.segment.instrument.ammeter, LATE_TORQUE
-        if column.name in of_signal or column.name.startswith(CURVED):
+        if column.name == LATE_TORQUE:
+            signals = measured(self.segment, self.segment.recorded, self.model, moved)
+            return (signals - self.start - self.base_residual) / column.step
+        if column.name == self.segment.instrument.ammeter or column.name.startswith(CURVED):
             return (self._residual(self.model, moved) - self.base_residual) / column.step
         after = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(after - self.start) / column.step
@@ -438,11 +408,17 @@ class _Sampler:
         """The residual where an effect has moved. An error of a voltage or a torque leaves the
         machine's state, and what its hooks gave, as they are.
         """
-        if effect.hook != "sensor" or effect.angle is not None or effect.current is not None:
+        if effect.hook != "sensor":
             return self._residual(model, moved)
-        after = self.start
-        if any(hook is not None for hook in (effect.voltage, effect.shaft, effect.speed)):
-            after = predicted(self.segment, self.x, self.pieces, model, moved)
+        x, pieces, after = self.x, self.pieces, self.start
+        if effect.angle is not None or effect.current is not None:
+            x = operate(self.segment, self.segment.recorded, model, moved).beside(self.x)
+            if not x.like(self.x):
+                pieces = evaluate(model, x, moved, self.hooks)
+        if pieces is not self.pieces or any(
+            hook is not None for hook in (effect.angle, effect.voltage, effect.shaft, effect.speed)
+        ):
+            after = predicted(self.segment, x, pieces, model, moved)
         return measured(self.segment, self.segment.recorded, model, moved) - after
 
     def _start(self, column: Column, effect: Effect) -> dict[str, float]:
@@ -462,96 +438,79 @@ class _Sampler:
 
     def _hook(self, column: Column, effect: Effect) -> Array | None:
         start = self._start(column, effect)
-        change = self._pieces(effect, self._moved(column, start))
+        q = values_of(effect, self.model.machine, self._moved(column, start))
         if effect in self.model.effects:
-            if effect.name not in self.effect_pieces:
-                self.effect_pieces[effect.name] = self._pieces(effect, start)
-            before = self.effect_pieces[effect.name]
-            change = Pieces(
-                change.psi_wb - before.psi_wb,
-                change.slope_wb - before.slope_wb,
-                change.drop_v - before.drop_v,
-                change.drag_nm - before.drag_nm,
+            before = self._at_start(effect)
+            change = _difference(
+                self._pieces(
+                    {
+                        name: before[name][0] if column.name not in before[name][1] else hook(q)
+                        for name, hook in self._hooks_of(effect)
+                    }
+                ),
+                self._pieces({name: result for name, (result, _) in before.items()}),
             )
+        else:
+            change = self._pieces({name: hook(q) for name, hook in self._hooks_of(effect)})
         parts = (change.psi_wb, change.slope_wb, change.drop_v, change.drag_nm)
         if not any(part.any() for part in parts):
             return None
         only_drag = effect.hook == "torque" and effect.parallel is None
-        if only_drag and self.observes.torque_in:
+        if only_drag and self.equation.torque_in:
             # a drag is in the torque alone: no voltage needs to be predicted for it
             drag = np.zeros_like(self.start)
-            place = self.segment.channels.index(self.observes.torque_in)
+            place = self.segment.channels.index(self.equation.torque_in)
             drag[place] = change.drag_nm * (1.0 + self.values["gain_torque"]) / column.step
             return drag if np.any(drag) else None
         model = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
-        if self.observes.form == "affine":
+        if self.equation.form == "affine":
             if self.of_nothing is None:
-                zero_pieces = self._pieces_of_nothing()
+                zero_pieces = self._pieces({})
                 self.of_nothing = predicted(self.segment, self.x, zero_pieces, model, self.values)
             after = predicted(self.segment, self.x, change, model, self.values) - self.of_nothing
         else:
             after = predicted(self.segment, self.x, change, model, self.quiet)
         return -after / column.step if np.any(np.abs(after) > _NOTHING) else None
 
-    def _pieces_of_nothing(self) -> Pieces:
+    def _at_start(self, effect: Effect) -> dict[str, tuple[Any, set[str]]]:
+        """What each hook of an effect of the model gives, and the parameters that it read: along
+        another one it stays as it is.
+        """
+        if effect.name not in self.by_hook:
+            results = {}
+            for name, hook in self._hooks_of(effect):
+                read: set[str] = set()
+                q = values_of(effect, self.model.machine, Noted(self.values, read))
+                results[name] = hook(q), read
+            self.by_hook[effect.name] = results
+        return self.by_hook[effect.name]
+
+    def _hooks_of(self, effect: Effect) -> Iterator[tuple[str, Callable[[Values], Any]]]:
+        """The hooks of an effect that the segment observes, as functions of its parameters."""
+        x, drop, torque, parallel = self.x, effect.drop, effect.torque, effect.parallel
+        if effect.coenergy is not None:
+            yield "flux", lambda q: effect_flux(effect, x, q)
+        if drop is not None and "drop" in self.hooks:
+            yield "drop", lambda q: drop(self.mean, q)
+        if torque is not None:
+            yield "drag", lambda q: torque(x, q)
+        if parallel is not None:
+            yield "beside", lambda q: flux_of(parallel(x, q), self.values)
+
+    def _pieces(self, results: Mapping[str, Any]) -> Pieces:
+        """Flux, drops and drags of what hooks gave; zero where there is none."""
         nothing = np.zeros(self.x.omega_rad_s.shape)
         still: Complex = nothing.astype(np.complex128)
-        return Pieces(still, nothing, still, nothing)
-
-    def _pieces(self, effect: Effect, values: Values) -> Pieces:
-        q = values_of(effect, self.model.machine, values)
-        x: Operating = self.x
-        shape = x.omega_rad_s.shape
-        nothing = np.zeros(shape)
-        flux, slope = effect_flux(effect, x, q)
-        zero_drop: Complex = nothing.astype(np.complex128)
-        effect_drop = effect.drop if "drop" in self.hooks else None
-        drop = zero_drop if effect_drop is None else effect_drop(self.mean, q)
-        drag = nothing if effect.torque is None else effect.torque(x, q)
-        if effect.parallel is not None:
-            flux = flux - flux_of(effect.parallel(x, q), self.values)
-        return Pieces(flux, slope, drop, drag)
+        flux, slope = results.get("flux", (still, nothing))
+        if "beside" in results:
+            flux = flux - results["beside"]
+        return Pieces(flux, slope, results.get("drop", still), results.get("drag", nothing))
 
 
-def base_columns(machine: Machine, scales: Mapping[str, float]) -> list[Column]:
-    """One column a base constant, with the step of its finite difference.
-
-    Parameters
-    ----------
-    machine
-        The machine.
-    scales
-        Orders of magnitude by name.
-
-    """
-    sizes = {c.name: machine.scales.get(c.scale, 1.0) for c in base_of(machine)}
-    return [Column(name, 1e-3 * scales.get(name, size)) for name, size in sizes.items()]
-
-
-def effect_columns(
-    effect: Effect, model: Model, at: tuple[tuple[str, float], ...] = ()
-) -> list[Column]:
-    """One column a parameter of an effect.
-
-    Parameters
-    ----------
-    effect
-        The effect.
-    model
-        The model, with the effect or without.
-    at
-        Values of shape parameters while the amplitudes are zero.
-
-    Returns
-    -------
-    list of Column
-        Amplitudes; shapes too once the effect is in the model.
-
-    """
-    inside = effect in model.effects
-    columns = []
-    for p in effect.parameters_of(model.machine):
-        if p.amplitude or (inside and not p.choice):
-            step = max(p.negligible, 1e-2 * p.typical) * model.machine.scale(p)
-            columns.append(Column(f"{effect.name}.{p.name}", step, effect, at))
-    return columns
+def _difference(after: Pieces, before: Pieces) -> Pieces:
+    return Pieces(
+        after.psi_wb - before.psi_wb,
+        after.slope_wb - before.slope_wb,
+        after.drop_v - before.drop_v,
+        after.drag_nm - before.drag_nm,
+    )

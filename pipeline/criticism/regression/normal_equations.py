@@ -149,11 +149,14 @@ class NormalEquations:
         counts = np.bincount(group, minlength=count)
         edges = np.concatenate([[0], np.cumsum(counts)])
         size = sorted_rows.shape[1]
-        upper = _upper(size)
-        normal = np.empty((upper[0].size, count))
+        # of the machine's constants a campaign observes half
+        nonzero = np.flatnonzero(sorted_rows.any(axis=0))
+        sorted_rows, upper = sorted_rows[:, nonzero], _upper(nonzero.size)
+        places = _place(nonzero[upper[0]], nonzero[upper[1]], size)
+        normal = np.zeros((_upper(size)[0].size, count))
         for number in range(count):
             in_group = sorted_rows[edges[number] : edges[number + 1]]
-            normal[:, number] = (in_group.T @ in_group)[upper]
+            normal[places, number] = (in_group.T @ in_group)[upper]
         return cls(counts.astype(float), normal[0], normal[1:size].T, normal[size:], prior, policy)
 
     def only(self, places: NDArray[np.int64]) -> NormalEquations:
@@ -175,7 +178,7 @@ class NormalEquations:
     def _products(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int64]:
         """Where the products of columns are in `normal`."""
         first, second = np.minimum(rows, columns), np.maximum(rows, columns)
-        return first * (2 * self.slope.shape[1] - first - 1) // 2 + second
+        return _place(first, second, self.slope.shape[1])
 
     def moved(self, places: NDArray[np.int64], step: Array) -> NormalEquations:
         """The normal equations at the end of a step; the priors stay where they were.
@@ -262,6 +265,11 @@ def _upper(size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     fit that uses them.
     """
     return np.triu_indices(size)
+
+
+def _place(rows: NDArray[np.int64], columns: NDArray[np.int64], size: int) -> NDArray[np.int64]:
+    """Where entries of an upper triangle, `columns` not below `rows`, are in it by rows."""
+    return rows * (2 * size - rows - 1) // 2 + columns
 
 
 def deviance_of(counts: Array, reduced_chi2: Array) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Hooks
 from pipeline.criticism.library.equations import equation_of
+from pipeline.criticism.machine.model import LATE_TORQUE, OF_SIGNALS
+from pipeline.criticism.parameter import Machine
 
 
 def observes_sensor(segment: Segment, sensor: str) -> bool:
@@ -42,6 +44,32 @@ def observes(segment: Segment, effect: Hooks) -> bool:
     if effect.torque is not None and "torque" in hooks_in(segment):
         return True
     return effect.hook != "torque" and effect.hook in observed.hooks
+
+
+def constants_in(segment: Segment, machine: Machine) -> frozenset[str]:
+    """Constants of the base that are in the equation of a segment, gains of its sensors among them.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    machine
+        Determines which constants there are.
+
+    """
+    instrument = segment.instrument
+    of_sensors = {
+        "gain_torque": observes_sensor(segment, "load"),
+        LATE_TORQUE: observes_sensor(segment, "load"),
+        "gain_lcr": observes_sensor(segment, "lcr"),
+        "offset_temp_k": any(name.startswith("temp_") for name in segment.recorded),
+        "gain_clock": observes_sensor(segment, "clock"),
+        instrument.meter: observes_sensor(segment, "voltage"),
+        instrument.ammeter: observes_sensor(segment, "current"),
+    }
+    of_signals = {*OF_SIGNALS, *machine.stated_u, *machine.unlogged}
+    observed = {name for name in of_signals if of_sensors.get(name, name in segment.fixed)}
+    return frozenset(observed | (set(equation_of(segment).observes.constants) - OF_SIGNALS))
 
 
 def hooks_in(segment: Segment) -> frozenset[str]:

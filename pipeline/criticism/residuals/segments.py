@@ -151,8 +151,8 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
 
     A shaft that turns by nearly whole steps a sample does not show the step itself, and its
     rounding is then periodic in the angle, as an electrical order is. A drive that logs means of
-    n readings has its angle in fractions q of the step, with a noise of q √(n/12). A single one that
-    alternates may seem to be of `_ALTERNATING`.
+    n readings has its angle in fractions q of the step, with a noise of q √(n/12). A single reading
+    that alternates may seem to be of `_ALTERNATING`.
     """
     theta, step = segment.recorded.get("theta_mech_rad"), machine.encoder_rad
     theta = segment.recorded.get(UNSMOOTHED, theta)

@@ -11,7 +11,7 @@ from pipeline.criticism.operating import Values
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
-from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 
 
 def reconsidered(system: LinearSystem) -> LinearSystem:
@@ -26,7 +26,8 @@ def reconsidered(system: LinearSystem) -> LinearSystem:
     -------
     LinearSystem
         The same where nothing is over the floor, or no choice lowers the deviance by
-        `policy.selection.tie`.
+        `policy.selection.tie`. One that would not by `choice_falls` times what it falls to first
+        order is not fitted.
 
     Notes
     -----
@@ -41,10 +42,19 @@ def reconsidered(system: LinearSystem) -> LinearSystem:
             continue
         for other in _choices(effect, system.fit):
             fit = system.fit
-            tried = gauss_newton(replace(fit, values={**fit.values, **other}), before=system)
-            if tried.deviance < system.deviance - fit.policy.selection.tie:
-                system = tried
+            start = replace(fit, values={**fit.values, **other})
+            limit = system.deviance - fit.policy.selection.tie
+            if _lowest(start, system) < limit:
+                tried = gauss_newton(start, before=system)
+                system = tried if tried.deviance < limit else system
     return system
+
+
+def _lowest(start: Fit, before: LinearSystem) -> float:
+    """The deviance that a fit may come down to from a start, judged by the columns of `before`."""
+    begun = linear_system(start, before=before, chord=True)
+    end = begun.normal_equations(begun.model_columns).best().deviance
+    return begun.deviance - start.policy.selection.choice_falls * (begun.deviance - end)
 
 
 def _choices(effect: Effect, fit: Fit) -> Iterator[Values]:

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import rows_where
 from pipeline.criticism.effect import Effect, LinearForm
+from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.regression.linearise import effect_columns
 from pipeline.criticism.selection.score_test import (
     Candidate,
     Score,

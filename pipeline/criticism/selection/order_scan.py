@@ -27,8 +27,10 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.operating import Array, Complex
 from pipeline.criticism.policy.selection import OrderScan
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import material_size
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.projection import Projection, bump
 from pipeline.physics.units import TURN_RAD
@@ -62,13 +64,8 @@ def orders_left(system: LinearSystem) -> tuple[float, ...]:
 
     """
     policy = system.policy.order_scan
-    lines = [
-        (order, log)
-        for segment in system.segments
-        for log in _logs(segment, system)
-        for order in _lines(log, policy)
-        if order not in log.looked_at
-    ]
+    arguments = [(system.fit.alone,)] * len(system.segments)
+    lines = [line for lines in on_each(_lines_in, system.segments, arguments) for line in lines]
     lines.sort(key=lambda line: line[0])
     orders = []
     for cluster in _clustered(lines, policy):
@@ -222,17 +219,27 @@ Line = tuple[float, Log]
 """An order that stands out of a log."""
 
 
-def _logs(segment: Segment, system: LinearSystem) -> Iterator[Log]:
+def _lines_in(segment: Segment, fit: Fit) -> list[Line]:
+    """The orders that stand out of a segment's logs, and that its equation does not look at."""
+    return [
+        (order, log)
+        for log in _logs(segment, fit)
+        for order in _lines(log, fit.policy.order_scan)
+        if order not in log.looked_at
+    ]
+
+
+def _logs(segment: Segment, fit: Fit) -> Iterator[Log]:
     weak, theta = segment.weak, segment.recorded.get("theta_mech_rad")
     if not equation_of(segment).use.currents or weak is None or theta is None:
         return
     if not (weak.orders > 0).any():
         return
     weight = _weight(weak, segment.size)
-    rows = list(_parts(theta, weight, system.policy.order_scan))
+    rows = list(_parts(theta, weight, fit.policy.order_scan))
     if not rows:
         return
-    fit, current = system.fit, segment.recorded["iq_a"]
+    current = segment.recorded["iq_a"]
     residuals = residual(segment, fit.model, fit.values)
     looked_at = frozenset(weak.orders.tolist())
     for channel, one in zip(segment.channels, residuals, strict=True):

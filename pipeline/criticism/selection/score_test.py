@@ -20,9 +20,9 @@ from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.selection import Selection
+from pipeline.criticism.regression.columns import Column, effect_columns
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system, model_columns
-from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.criticism.regression.normal_equations import Descent, NormalEquations, deviance_of
 
 

@@ -126,11 +126,11 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         if chosen is None:
             break
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
-        fit = reconsidered(_backward(chosen, base)).fit
-        effects = fit.model.effects[base:]
+        system = reconsidered(_backward(chosen, base))
+        fit, effects = system.fit, system.fit.model.effects[base:]
         fit = replace(fit, tolerance=tolerances(fit, effects))
         if effects:
-            fit = _floored_anew(fit)
+            fit = _floored_anew(fit, system)
         if tuple(e.name for e in effects) in {r.added for r in steps}:
             break
     return tuple(steps)
@@ -156,8 +156,8 @@ def _may_join(score: Score, inside: Set[object], couplings: bool) -> bool:
     return effect.discriminator is None or (couplings and effect.discriminator not in inside)
 
 
-def _floored_anew(fit: Fit) -> Fit:
-    """The fit by noise floors made anew, now that another effect is in.
+def _floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
+    """The fit by noise floors made anew, now that another effect is in; `before` by the former.
 
     The tolerance for its form is new, so it is refitted in any case: the next effect is judged
     against this deviance. If some floor changes by half, or something is left over them, and a
@@ -172,7 +172,7 @@ def _floored_anew(fit: Fit) -> Fit:
     changed = np.abs(np.log(ratio)).max() >= math.log(policy.floor_ratio)
     if changed:
         fit = replace(fit, sigma=floor, near=fit.values)
-    refitted = gauss_newton(fit)
+    refitted = gauss_newton(fit, before=before)
     if not changed and not significant_groups(refitted).any():
         return refitted.fit
     rough = rough_anew(fit)
@@ -203,8 +203,8 @@ def _chosen(
             acts = _acts(finished)
             if any(cost > least + policy.tie and np.any(acts & where) for least, where in unsure):
                 return None
-            if _is_determined(linear_system(finished.fit), wide):
-                return finished
+            if _is_determined(at_end := linear_system(finished.fit), wide):
+                return at_end
             unsure.append((cost, acts))
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
     return None

@@ -257,21 +257,24 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
     """
     if late := segment.fixed.get(LATE_SPEED, 0.0) * values[LATE_SPEED]:
         x = _in_time(segment, x, late)
-    zero = zero_angle(segment, values, model.machine.pole_pairs * x.omega_rad_s)
+    zero = zero_angle(segment, x, values)
     if not any(effect.angle is not None for effect in model.effects):
-        return _turned_back(x, zero) if zero.any() else x
-    error, policy = zero, model.policy.cutting
+        turn = frame_turn(segment, x, model, values)
+        return x if zero is None or turn is None else _turned_back(x, zero, turn)
+    zero, policy = np.zeros(x.omega_rad_s.shape) if zero is None else zero, model.policy.cutting
+    error = zero
     for _ in range(policy.angle_rounds):
         nearer = replace(x, theta_rad=x.theta_rad - error / model.machine.pole_pairs)
         error = zero + angle_error(nearer, model, values)
     turned, finer = error / model.machine.pole_pairs, x.theta_rad.size // segment.size
     slower = x.omega_rad_s - _speed(turned, segment.ts_s, finer, policy)
-    return replace(_turned_back(x, error), omega_rad_s=slower)
+    return replace(_turned_back(x, error, np.exp(1j * error)), omega_rad_s=slower)
 
 
-def _turned_back(x: Operating, error: Array | float) -> Operating:
-    """The state less an error [n or one for all, rad] of its electrical angle; the speed stays."""
-    ahead = np.exp(1j * error)
+def _turned_back(x: Operating, error: Array, ahead: Complex) -> Operating:
+    """The state less an error [n, rad] of its electrical angle, which is `ahead` as a unit vector
+    [n]; the speed stays.
+    """
     current, volts = x.i_a * ahead, x.supply.volts_v
     return replace(
         x,
@@ -457,12 +460,15 @@ def ahead_in(
         return None
     places = at.astype(np.int64)
 
+    def whole() -> tuple[Array, Array]:
+        columns = np.stack(list(log.values()))
+        return columns, columns.take(places, axis=-1, mode="clip")
+
+    columns, now = segment.once(rows, "whole", None, whole)
+
     def ahead(delay_s: float) -> tuple[Complex, Array, Array]:
-        later = at + delay_s / segment.ts_s
-        change = {
-            name: between(column, later) - column.take(places, mode="clip")
-            for name, column in log.items()
-        }
+        later = between(columns, at + delay_s / segment.ts_s)
+        change = dict(zip(log, later - now, strict=True))
         zero = np.zeros(at.size)
         current = change.get("id_a", zero) + 1j * change.get("iq_a", zero)
         return current, change.get("torque_shaft_nm", zero), pole_pairs * change["theta_mech_rad"]
@@ -515,7 +521,7 @@ def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values)
     return recorded.i_a
 
 
-def zero_angle(segment: Segment, values: Values, omega_e_rad_s: Array) -> Array:
+def zero_angle(segment: Segment, x: Operating, values: Values) -> Array | None:
     """Recorded less true electrical angle of a drive's encoder that has its zero elsewhere and is
     read later than the currents.
 
@@ -523,20 +529,53 @@ def zero_angle(segment: Segment, values: Values, omega_e_rad_s: Array) -> Array:
     ----------
     segment
         Any segment.
+    x
+        State with its speed [n].
     values
         Parameters by full name.
-    omega_e_rad_s
-        Electrical speed [n].
 
     Returns
     -------
-    array [n]
-        In rad; 0 unless it is a drive's log of both currents.
+    array [n] or None
+        In rad; None unless it is a drive's log of both currents, and where all of it is zero.
 
     """
-    if not _both_axes(segment):
-        return np.zeros(omega_e_rad_s.size)
-    return values["zero_angle_rad"] - values["late_angle_s"] * omega_e_rad_s
+    zero_rad, late_s = values["zero_angle_rad"], values["late_angle_s"]
+    if not (zero_rad or late_s) or not _both_axes(segment):
+        return None
+    return zero_rad - late_s * (x.machine.pole_pairs * x.omega_rad_s)
+
+
+def frame_turn(segment: Segment, x: Operating, model: Model, values: Values) -> Complex | None:
+    """What turns a vector from the frame of the recorded angle into that of the true one.
+
+    Parameters
+    ----------
+    segment
+        Any segment.
+    x
+        State at which the errors of the angle are evaluated [n].
+    model
+        Effects of the angle.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [n], complex, or None
+        Unit vectors; None where the angle has no error.
+
+    """
+
+    def turn() -> Complex | None:
+        zero = zero_angle(segment, x, values)
+        return None if zero is None else np.exp(1j * zero)
+
+    if not any(effect.angle is not None for effect in model.effects):
+        name = "frame", values["zero_angle_rad"], values["late_angle_s"]
+        return x.once(x.omega_rad_s, name, turn)
+    zero, error = zero_angle(segment, x, values), angle_error(x, model, values)
+    return np.exp(1j * (error if zero is None else zero + error))
 
 
 def _both_axes(segment: Segment) -> bool:

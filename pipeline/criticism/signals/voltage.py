@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import Model, Pieces, values_of
 from pipeline.criticism.operating import Array, Complex, Operating, Values
-from pipeline.criticism.signals.true_state import angle_error, zero_angle
+from pipeline.criticism.signals.true_state import frame_turn
 
 _EIGHTH_ORDER = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)
 """Weights of a slope: of the differences of samples one, two, three and four to either side."""
@@ -103,11 +103,8 @@ def recorded_voltage(
         if effect.voltage is not None:
             q = values_of(effect, model.machine, values)
             voltage = effect.voltage(voltage, x, q, segment.instrument.name)
-    if in_frame:
-        error = zero_angle(segment, values, x.machine.pole_pairs * x.omega_rad_s)
-        if any(effect.angle is not None for effect in model.effects):
-            error = error + angle_error(x, model, values)
-        voltage = voltage * np.exp(-1j * error)
+    if in_frame and (turn := frame_turn(segment, x, model, values)) is not None:
+        voltage = voltage * np.conj(turn)
     return voltage * (1.0 + values[segment.instrument.meter])
 
 

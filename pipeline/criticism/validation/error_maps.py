@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.validation import Validation
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.cell_means import mean_map, visits_of
@@ -271,13 +272,12 @@ def angle_maps(fit: Fit) -> tuple[ErrorMap, ...]:
         "theta_elec_rad": fit.policy.validation.angle_cells,
         "theta_mech_rad": _mechanical_cells(fit.model),
     }
-    first = 0
-    for segment in fit.segments:
-        if segment.weak is None or not _turns(segment):
-            continue
-        for signal, variable, part in _by_angle(segment, fit, cells, first):
+    turning = [segment for segment in fit.segments if _turns(segment)]
+    windows = [0 if s.weak is None else s.weak.starts.size for s in turning]
+    arguments = [(fit.alone, cells, sum(windows[:n])) for n in range(len(turning))]
+    for of_segment in on_each(_by_angle, turning, arguments):
+        for signal, variable, part in of_segment:
             parts.setdefault((signal, variable), []).append(part)
-        first += segment.weak.starts.size
     maps = []
     for (signal, variable), pieces in sorted(parts.items()):
         error, sigma, cell, window = (np.concatenate(part) for part in zip(*pieces, strict=True))
@@ -304,10 +304,11 @@ def _mechanical_cells(model: Model) -> int:
 
 def _by_angle(
     segment: Segment, fit: Fit, cells: Mapping[str, int], first: int
-) -> Iterator[tuple[str, str, tuple[Array, Array, Array, Array]]]:
-    weak = segment.weak
+) -> list[tuple[str, str, tuple[Array, Array, Array, Array]]]:
+    """Signal, variable and parts [n] of a map: errors, noise, cells and windows."""
+    weak, parts = segment.weak, []
     if weak is None:
-        return
+        return []
     residuals = residual(segment, fit.model, fit.values)
     theta = segment.recorded["theta_mech_rad"]
     starts = disjoint(weak.starts, weak.length)
@@ -329,7 +330,8 @@ def _by_angle(
             cell = np.minimum((share * cells[variable]).astype(np.int64), cells[variable] - 1)
             error = inside.ravel()
             part = (error, np.full(error.size, noise), cell.astype(float), window.astype(float))
-            yield reported_signal(segment, channel), variable, part
+            parts.append((reported_signal(segment, channel), variable, part))
+    return parts
 
 
 def disjoint(starts: NDArray[np.int64], length: int) -> NDArray[np.int64]:

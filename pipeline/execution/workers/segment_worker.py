@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import importlib
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, ExitStack, contextmanager
+from functools import partial
 from multiprocessing import parent_process
 from multiprocessing.util import Finalize
-from typing import Any
+from typing import Any, TypeVar
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.regression.parallel import Work, by_threads, done_by, in_order
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 
+Made = TypeVar("Made")
 _log = logging.getLogger(__name__)
 _SEGMENTS: dict[int, Segment] = {}
 """In the worker: the segments that it was sent, by number."""
@@ -83,6 +85,39 @@ class SegmentWorker:
             return by_threads(work, segments, arguments)
         return tuple(done[n] for n in range(len(segments)))
 
+    def aside(self, work: Callable[..., Made], *arguments: Any) -> Callable[[], Made]:
+        """Begins other work in the process, while this one goes on.
+
+        Parameters
+        ----------
+        work
+            What is done; importable in a worker.
+        *arguments
+            Its arguments.
+
+        Returns
+        -------
+        callable
+            Waits for the result; does the work here where the process cannot.
+
+        """
+        here = partial(work, *arguments)
+        if self._executor is None:
+            return here
+        try:
+            future = self._executor.submit(work, *arguments)
+        except Exception:  # noqa: BLE001 - the process is gone; an error of the work comes up here
+            return here
+
+        def result() -> Made:
+            try:
+                return future.result()
+            except Exception as error:  # noqa: BLE001 - an error of the work itself is raised again
+                _log.info("work is done here instead: %s", error)
+                return here()
+
+        return result
+
     def _place(self, segments: Sequence[Segment]) -> dict[int, Segment]:
         """Gives new segments to either process, the largest first; those that the worker gets."""
         local, remote = self._placed
@@ -98,13 +133,15 @@ class SegmentWorker:
 
 
 @contextmanager
-def segment_worker(effects_path: str | None) -> Iterator[SegmentWorker]:
+def segment_worker(effects_path: str | None, *modules: str) -> Iterator[SegmentWorker]:
     """A worker that has loaded the effects; no process where only one core may be used.
 
     Parameters
     ----------
     effects_path
         Folder of the user's effects; None without any.
+    *modules
+        Further modules that it imports while it waits for work.
 
     """
     if core_count() < 2:
@@ -112,6 +149,8 @@ def segment_worker(effects_path: str | None) -> Iterator[SegmentWorker]:
         return
     with open_pool("local", Cluster())(1) as pool:
         pool.executor.submit(_load_effects, effects_path)
+        for module in modules:
+            pool.executor.submit(_load, module)
         yield SegmentWorker(pool.executor)
 
 
@@ -144,6 +183,10 @@ def _load_effects(effects_path: str | None) -> None:
 
     effects(effects_path)
     importlib.import_module("pipeline.criticism.diagnosis")
+
+
+def _load(module: str) -> None:
+    importlib.import_module(module)
 
 
 def _map(

@@ -12,7 +12,7 @@ from typing import Any
 from pipeline.api.options import check_constants
 from pipeline.criticism.policy.policy import policy_changes
 from pipeline.execution.tasks.start import start_constants
-from pipeline.execution.workers.segment_worker import segment_worker
+from pipeline.execution.workers.segment_worker import SegmentWorker, segment_worker
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.storage.publish import output_folder
@@ -40,7 +40,9 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One motor to judge: its captures of `folder`, the model, where to write, whose seconds."""
+    """One motor to judge: its captures of `folder`, the model, where to write, whose seconds, and
+    the worker that may do something aside.
+    """
 
     campaign: Campaign
     spec: ModelSpec
@@ -48,12 +50,15 @@ class Task:
     folder: str
     output: Path
     watch: Stopwatch
+    worker: SegmentWorker
 
 
 Judge = Callable[[Task], Judged]
 
 
-def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str) -> Outcome:
+def each_motor(
+    settings: CompareSettings, judge: Judge, needs: str, folder: str, recording: str
+) -> Outcome:
     """Runs `judge` on every motor of `input`; it writes under the folder that it is given.
 
     While workers read the captures, the module that the judge `needs` is imported. `folder` is
@@ -69,6 +74,8 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str)
         Dotted name of the module that `judge` needs.
     folder
         Folder under the output that results are written to.
+    recording
+        Dotted name of the module that the worker records the result with.
 
     """
     input_folder(settings.input)
@@ -80,7 +87,10 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str)
     check_constants(settings.constants)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     watch, output = Stopwatch(), output_folder(settings.output)
-    with waiting("reading") as line, segment_worker(settings.effects_path) as worker:
+    with (
+        waiting("reading") as line,
+        segment_worker(settings.effects_path, recording) as worker,
+    ):
         with watch.stage("read"):
             # a daemon, so that an interrupt need not wait for it
             aside = Thread(target=import_module, args=(needs,), daemon=True)
@@ -97,7 +107,7 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str)
             line.say(f"{printable(campaign.motor_id)}, motor {number} of {len(stated)}")
             with worker.campaign():
                 start = start_constants(campaign)
-                task = Task(campaign, spec, start, settings.input, output, watch)
+                task = Task(campaign, spec, start, settings.input, output, watch, worker)
                 judged.append(judge(task))
     undecided = not judged or any(motor.undecided for motor in judged)
     outcome = outcome_of(

@@ -9,10 +9,10 @@ import pytest
 
 from pipeline.criticism.discovery.changed_within import _Rows, _scanned, changed_within
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.regression.linearise import Column
 from tests.unit.criticism.machines import BASE, log, machine
 
 P, TS, N = 7, 5e-5, 8000

@@ -10,9 +10,9 @@ import pytest
 from pipeline.criticism.data.segment import row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
-from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error
 from pipeline.criticism.regression.normal_equations import Prior
 from tests.unit.criticism.machines import BASE, log, machine

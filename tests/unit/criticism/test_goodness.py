@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.criticism.diagnosis import _as_reported
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import (
@@ -23,7 +24,6 @@ from pipeline.criticism.regression.goodness import (
 )
 from pipeline.criticism.regression.identifiability import known_by
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.regression.linearise import Column
 from tests.unit.criticism.machines import BASE, fitted, log, machine, unit_floor
 
 ROWS = 400

@@ -11,13 +11,14 @@ from pipeline.criticism.data.segment import Cache, row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.linear_system import (
     _reusable_columns,
     linear_system,
     model_columns,
 )
-from pipeline.criticism.regression.linearise import _Sampler, absorb, effect_columns, whitened_anew
+from pipeline.criticism.regression.linearise import _Sampler, absorb, whitened_anew
 from pipeline.criticism.regression.noise_floors import offsets
 from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.selection.score_test import candidates

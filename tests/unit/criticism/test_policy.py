@@ -73,5 +73,11 @@ def test_a_command_hands_it_on(tmp_path):
         model=ModelSettings(name="ideal"),
         policy={"selection": {"tie": 9.0}},
     )
-    each_motor(settings, judge, "pipeline.criticism.diagnosis", "diagnosis")
+    each_motor(
+        settings,
+        judge,
+        "pipeline.criticism.diagnosis",
+        "diagnosis",
+        "pipeline.io.recordings.ladder",
+    )
     assert [spec.policy for spec in seen] == [(("selection.tie", 9.0),)]

@@ -13,7 +13,8 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, mean_current, zero
 from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.linearise import effect_columns, linearise
+from pipeline.criticism.regression.columns import effect_columns
+from pipeline.criticism.regression.linearise import linearise
 from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.signals.shaft import averaged

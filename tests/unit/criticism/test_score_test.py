@@ -10,9 +10,9 @@ import pytest
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
-from pipeline.criticism.regression.linearise import effect_columns
 from pipeline.criticism.selection.score_test import (
     Candidate,
     Score,

@@ -187,9 +187,9 @@ def test_the_fit_is_looked_at_anew_whatever_joins(monkeypatch):
     """An unbalance had driven J to six times what it is, and the fit stayed there with it."""
     asked = []
 
-    def spy(fit):
+    def spy(fit, before):
         asked.append(fit.model.effects[-1].name)
-        return _floored_anew(fit)
+        return _floored_anew(fit, before)
 
     monkeypatch.setattr("pipeline.criticism.selection.stepwise._floored_anew", spy)
     steps = search(fitted((with_drag(curved(0.1)), with_drag(curved(0.1), 6))), LIBRARY)

@@ -18,7 +18,7 @@ from pipeline.criticism.machine.model import Model, values_of
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.bounds import bounded_step, limits_of
-from pipeline.criticism.regression.linearise import Column
+from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec

@@ -16,7 +16,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.machine.torsion import Law, Shaft, law_of_twist
 from pipeline.criticism.machine.two_masses import discriminator, side_of
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.linearise import effect_columns
+from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.selection.discrimination import settled
 from tests.unit.criticism.machines import BASE, machine, operating
 

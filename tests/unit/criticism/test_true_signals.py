@@ -15,9 +15,9 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, evaluate, zero
 from pipeline.criticism.operating import Operating, Values
 from pipeline.criticism.parameter import Parameter
+from pipeline.criticism.regression.columns import base_columns
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.regression.linearise import base_columns
 from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.selection.discrimination import discriminate
 from pipeline.numerics.projection import projection

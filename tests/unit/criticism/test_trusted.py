@@ -12,11 +12,11 @@ from pipeline.criticism.diagnosis import _ranking, _share_of_fall
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.identifiability import significantly_nonzero, together_nonzero
 from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
-from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.search import Ladder, ladder_from
 from pipeline.criticism.selection.requested_model import BaseFit
 from pipeline.criticism.selection.score_test import Candidate, Score

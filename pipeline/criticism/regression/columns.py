@@ -1,0 +1,85 @@
+"""Directions of the parameter space that a residual is differentiated along."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.machine.model import Model, base_of
+from pipeline.criticism.parameter import Machine
+
+ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
+"""What separates columns: name, and the shapes that they are at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One direction of the parameter space.
+
+    Attributes
+    ----------
+    name
+        A base constant, or `effect.parameter`.
+    step
+        Of its finite difference [unit of the parameter].
+    effect
+        The effect; None for a base constant.
+    at
+        Values of the effect's shape parameters while its amplitudes are zero.
+
+    """
+
+    name: str
+    step: float
+    effect: Effect | None = None
+    at: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def key(self) -> ColumnKey:
+        """What separates columns."""
+        return self.name, self.at
+
+
+def base_columns(machine: Machine, scales: Mapping[str, float]) -> list[Column]:
+    """One column a base constant, with the step of its finite difference.
+
+    Parameters
+    ----------
+    machine
+        The machine.
+    scales
+        Orders of magnitude by name.
+
+    """
+    sizes = {c.name: machine.scales.get(c.scale, 1.0) for c in base_of(machine)}
+    return [Column(name, 1e-3 * scales.get(name, size)) for name, size in sizes.items()]
+
+
+def effect_columns(
+    effect: Effect, model: Model, at: tuple[tuple[str, float], ...] = ()
+) -> list[Column]:
+    """One column a parameter of an effect.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    model
+        The model, with the effect or without.
+    at
+        Values of shape parameters while the amplitudes are zero.
+
+    Returns
+    -------
+    list of Column
+        Amplitudes; shapes too once the effect is in the model.
+
+    """
+    inside = effect in model.effects
+    columns = []
+    for p in effect.parameters_of(model.machine):
+        if p.amplitude or (inside and not p.choice):
+            step = max(p.negligible, 1e-2 * p.typical) * model.machine.scale(p)
+            columns.append(Column(f"{effect.name}.{p.name}", step, effect, at))
+    return columns
