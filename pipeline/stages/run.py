@@ -17,7 +17,7 @@ from pipeline.execution.caches.keys import batch_parts, key_of, motor_parts
 from pipeline.execution.caches.run_cache import Batch, RunCache
 from pipeline.execution.caches.stamp import configuration_digest
 from pipeline.execution.caches.versions import RUN, tools
-from pipeline.execution.jobs import ModelTest, MotorJob, MotorResult, WarmUp
+from pipeline.execution.jobs import HeldJob, ModelTest, MotorJob, MotorResult, WarmUp
 from pipeline.execution.outputs.publishing import (
     fleet_of,
     other_motors,
@@ -58,7 +58,7 @@ from pipeline.records.outcome import Outcome, Stopwatch, faults_of, first_that_a
 from pipeline.report.text.progress import progress
 from pipeline.report.text.waiting import waiting
 from pipeline.settings import RunSettings
-from pipeline.stages.steps.beside import beside_motors, due_jobs
+from pipeline.stages.steps.beside import begun_ahead, beside_motors, due_jobs
 from pipeline.stages.steps.registry import opened
 
 PROGRESS = ".work"
@@ -122,20 +122,22 @@ def main(settings: RunSettings) -> Outcome:
     return replace(outcome, result=sheets, faults=faults_of(findings_of(Path(output))))
 
 
-def process_motor(job: MotorJob | ModelTest | WarmUp) -> MotorResult | None:
+def process_motor(job: MotorJob | HeldJob | ModelTest | WarmUp) -> MotorResult | None:
     """One motor, in a worker: what it needs is imported there and not in the driver.
 
     Parameters
     ----------
     job
-        What to do with one motor, and how; its residual test alone, beside it; or nothing but the
-        imports.
+        What to do with one motor, and how, at once or behind a gate; its residual test alone,
+        beside it; or nothing but the imports.
 
     """
     from pipeline.stages.steps import motor
 
     if isinstance(job, MotorJob):
         return motor.process_motor(job)
+    if isinstance(job, HeldJob):
+        return motor.process_motor(job.job, job.gate)
     if isinstance(job, ModelTest):
         motor.test_model(job.job)
     else:
@@ -154,7 +156,7 @@ def _run(
 ) -> Outcome:
     """One run; `surveyed` is called when every file was looked at, before anything is written.
 
-    With `ahead` the residual tests that would be made beside the motors begin before it is called;
+    With `ahead` motors and the residual tests beside them begin before it is called; until then
     they write to the cache alone.
     """
     watch = Stopwatch()
@@ -162,20 +164,21 @@ def _run(
     limits = limits_file(settings.limits, settings.config_dir)
     sources = source_maps(settings.source, settings.config_dir)
     cache = RunCache(folder, output, on=settings.cache)
-    with waiting("looking at the files of " + settings.input), watch.stage("survey"):
-        ask = partial(_answers, settings, sources, workers, cache)
-        files = survey(folder, sources, ask, recover=settings.recover)
-        plain = _jobs(settings, files, limits)
-        if ahead:
-            jobs = _with_revoked(plain, _revocations(registry))
-            beside = beside_motors(settings, due_jobs(jobs, cache), workers.count)
-            workers.begin_tasks(process_motor, beside)
-        surveyed()
-    batch = _batch_key(settings, plain, files, registry)
-    if (cached := _cached_outcome(settings, registry, cache, batch)) is not None:
-        return replace(cached, timings=watch.table())
-    means = workers, cache, watch, memory
-    return _computed(settings, registry, means, files, plain, begun=ahead)
+    with ExitStack() as stack:
+        with waiting("looking at the files of " + settings.input), watch.stage("survey"):
+            ask = partial(_answers, settings, sources, workers, cache)
+            files = survey(folder, sources, ask, recover=settings.recover)
+            plain = _jobs(settings, files, limits)
+            begun = None
+            if ahead:
+                due = due_jobs(_with_revoked(plain, _revocations(registry)), cache)
+                begun = stack.enter_context(begun_ahead(settings, due, workers, process_motor))
+            surveyed()
+        batch = _batch_key(settings, plain, files, registry)
+        if (cached := _cached_outcome(settings, registry, cache, batch)) is not None:
+            return replace(cached, timings=watch.table())
+        means = workers, cache, watch, memory
+        return _computed(settings, registry, means, files, plain, begun)
 
 
 def _computed(
@@ -184,17 +187,16 @@ def _computed(
     means: tuple[WorkerPool, RunCache, Stopwatch, SheetMemory],
     survey: Survey,
     plain: Sequence[MotorJob],
-    *,
-    begun: bool = False,
+    begun: Sequence[HeldJob] | None,
 ) -> Outcome:
     """Motors worked on, registered and published; `plain` are the jobs without revocations, `begun`
-    is whether the tests beside them have begun.
+    the motors that were begun with the tests beside them, None where nothing was.
     """
     (workers, cache, watch, memory), output = means, Path(settings.output)
     revoked = _revocations(registry)
     jobs = _with_revoked(plain, revoked)
     with watch.stage("motors"):
-        motors, died = _process(settings, jobs, workers, cache, begun=begun)
+        motors, died = _process(settings, jobs, workers, cache, begun)
     others = other_motors(output, [job.motor_id for job in jobs], prune=settings.prune)
     with watch.stage("registry"):
         registered = _register(registry, output, motors)
@@ -397,8 +399,7 @@ def _process(
     jobs: Sequence[MotorJob],
     workers: WorkerPool,
     cache: RunCache,
-    *,
-    begun: bool,
+    begun: Sequence[HeldJob] | None,
 ) -> tuple[list[MotorResult], tuple[MachineError, ...]]:
     """The results in the order of the jobs, and an error for each unfinished one."""
     ends: list[Any] = [None] * len(jobs)
@@ -407,14 +408,18 @@ def _process(
             ends[number] = MotorResult(job.motor_id, done, {})
     due = [number for number, end in enumerate(ends) if end is None]
     motors = [jobs[number] for number in due]
-    beside = [] if begun else beside_motors(settings, motors, workers.count)
+    beside = beside_motors(settings, motors, workers.count) if begun is None else []
+    tasks = [next((held for held in begun or () if held.job == job), job) for job in motors]
 
     def advance(at: int, _: MotorResult | None) -> None:
         if at < len(due):
             bar.advance(at)
 
     with progress([_size(settings, job) for job in motors]) as bar:
-        outcomes = workers.map_tasks(process_motor, [*motors, *beside], advance)
+        for held in tasks:
+            if isinstance(held, HeldJob):
+                held.gate.open()
+        outcomes = workers.map_tasks(process_motor, [*tasks, *beside], advance)
     for number, end in zip(due, outcomes, strict=False):
         ends[number] = end
     died = tuple(end for end in ends if isinstance(end, MachineError))
