@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,6 +25,7 @@ from pipeline.execution.outputs.publishing import (
     removed_note,
     with_folder_names,
 )
+from pipeline.execution.outputs.registration import Registered, register
 from pipeline.execution.outputs.sheet_memory import SheetMemory
 from pipeline.execution.outputs.statuses import (
     findings_of,
@@ -37,6 +36,7 @@ from pipeline.execution.outputs.statuses import (
 from pipeline.execution.tasks.survey_tasks import survey_with
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
+from pipeline.io.ingest.entry import Entry
 from pipeline.io.ingest.files import input_folder, size_bytes
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.identification import Answer, Question, identify_by_head
@@ -52,8 +52,7 @@ from pipeline.records.comparison import ModelSpec
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
-from pipeline.records.ledger import Event, Revocation
-from pipeline.records.naming import printable
+from pipeline.records.ledger import Revocation
 from pipeline.records.outcome import Outcome, Stopwatch, faults_of, first_that_applies
 from pipeline.report.text.progress import progress
 from pipeline.report.text.waiting import waiting
@@ -62,18 +61,7 @@ from pipeline.stages.steps.beside import begun_ahead, beside_motors, due_jobs
 from pipeline.stages.steps.registry import opened
 
 PROGRESS = ".work"
-COMMITTED = 50
-"""Datasheets in a commit of the registry, at most."""
 Revocations = Mapping[str, tuple[Revocation, ...]]
-
-
-@dataclass(frozen=True, slots=True)
-class Registered:
-    """The result of registering the datasheets: exit code, a line of text, error lines."""
-
-    code: int = 0
-    text: str = ""
-    errors: tuple[str, ...] = ()
 
 
 def main(settings: RunSettings) -> Outcome:
@@ -199,7 +187,7 @@ def _computed(
         motors, died = _process(settings, jobs, workers, cache, begun)
     others = other_motors(output, [job.motor_id for job in jobs], prune=settings.prune)
     with watch.stage("registry"):
-        registered = _register(registry, output, motors)
+        registered = register(registry, output, motors, memory)
         # before the statuses are read: a later decision is not in them
         batch = _batch_key(settings, plain, survey, registry)
         histories = histories_of(registry)
@@ -254,43 +242,6 @@ def _contents(
     )
 
 
-def _register(
-    registry: Registry | None, output: Path, results: Sequence[MotorResult]
-) -> Registered:
-    """Publishes the datasheets in commits of limited size, so that memory stays bounded, those that
-    were worked on first.
-
-    A registry that fails leaves the outputs complete.
-    """
-    by_work = sorted(results, key=lambda result: not result.seconds)
-    names = [n for r in by_work for n, _ in r.finished.files if n.startswith("datasheets/")]
-    if registry is None or not names:
-        return Registered()
-    added = known = 0
-    errors: tuple[str, ...] = ()
-    for first in range(0, len(names), COMMITTED):
-        some = names[first : first + COMMITTED]
-        try:
-            receipt = registry.publish(((output / n).read_bytes() for n in some), datetime.now(UTC))
-        except MachineError as error:
-            return Registered(error.exit_code, errors=(*errors, f"error: {error}"))
-        added, known = added + len(receipt.added), known + len(receipt.known)
-        errors += tuple(_conflict(event, registry.place) for event in receipt.conflicts)
-    text = f"registry {registry.place}: {added} new, {known} known"
-    return Registered(1 if errors else 0, text, errors)
-
-
-def _conflict(event: Event, place: str) -> str:
-    """The error line of a version that is registered with other content, with what to do."""
-    motor, version = printable(event.motor_id), event.version[:12]
-    return (
-        f"error: motor {motor}: version {version} is registered with other content; the same work "
-        "gave other bytes, so the registered one stays; if that one is wrong, "
-        f"`registry revoke {shlex.quote(motor)} version={version} by=NAME why=REASON "
-        f"registry={shlex.quote(place)}` and run again: the new bytes become a version of their own"
-    )
-
-
 def _answers(
     settings: RunSettings,
     sources: Mapping[str, SourceMap],
@@ -322,15 +273,20 @@ def _jobs(settings: RunSettings, survey: Survey, limits: Path) -> list[MotorJob]
     required, model_gates = release_conditions(limits)
     changes = policy_changes(settings.policy)
     model = ModelSpec(settings.model.name, tuple(settings.model.effects), policy=changes)
+    by_maps = {_source_names(entries): entries for entries in survey.motors.values()}
+    digests = {
+        names: configuration_digest(
+            settings, required, [e.source for e in entries], model_gates=model_gates
+        )
+        for names, entries in by_maps.items()
+    }
     jobs = [
         MotorJob(
             motor_id=motor_id,
             entries=entries,
             input=settings.input,
             output=settings.output,
-            config_sha256=configuration_digest(
-                settings, required, [e.source for e in entries], model_gates=model_gates
-            ),
+            config_sha256=digests[_source_names(entries)],
             required=required,
             release=settings.release,
             report=settings.report,
@@ -349,6 +305,11 @@ def _jobs(settings: RunSettings, survey: Survey, limits: Path) -> list[MotorJob]
         for motor_id, entries in survey.motors.items()
     ]
     return [_keyed(job) for job in jobs] if settings.cache else jobs
+
+
+def _source_names(entries: Sequence[Entry]) -> frozenset[str | None]:
+    """The names of the source maps that captures are read by; None for the contract's own form."""
+    return frozenset(None if entry.source is None else entry.source.name for entry in entries)
 
 
 def _keyed(job: MotorJob) -> MotorJob:

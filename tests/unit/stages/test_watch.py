@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -21,7 +22,7 @@ from pipeline.execution.outputs import sheet_memory
 from pipeline.execution.outputs.sheet_memory import SheetMemory
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.arrivals import Arrivals, snapshot
-from pipeline.io.registry.store import Registry
+from pipeline.io.registry.store import Receipt, Registry
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.ledger import Selection
@@ -318,6 +319,14 @@ def test_passes_leave_what_a_run_by_itself_leaves(
     folder.mkdir()
     (output / "comparison").mkdir(parents=True)
     read: list[str] = []
+    published: list[str] = []
+    publish = Registry.publish
+
+    def publishing(self: Registry, documents: Iterable[bytes], now: datetime) -> Receipt:
+        given = list(documents)
+        published.extend(json.loads(document)["motor_id"] for document in given)
+        return publish(self, given, now)
+
     whole = sheet_memory.datasheet_from
 
     def reading(data: bytes, name: str) -> Datasheet:
@@ -328,6 +337,7 @@ def test_passes_leave_what_a_run_by_itself_leaves(
         return [work(task) for task in tasks]
 
     monkeypatch.setattr(sheet_memory, "datasheet_from", reading)
+    monkeypatch.setattr(Registry, "publish", publishing)
     monkeypatch.setattr(WorkerPool, "map_tasks", here)
     keys = RunSettings(input=str(folder), output=str(output), recordings=False, residual_test=False)
     workers = WorkerPool(lambda _: nullcontext(), 1, output / ".work")
@@ -335,9 +345,11 @@ def test_passes_leave_what_a_run_by_itself_leaves(
 
     def a_pass(*changed: str) -> None:
         read.clear()
+        published.clear()
         run._run(keys, registry, workers, memory)
         memory.forget_others()
         assert read == [f"{motor_id}.json" for motor_id in changed]
+        assert published == list(changed)
         by_watch = written(output)
         (output / ".cache" / "run.json").unlink()
         run._run(keys, registry, workers, SheetMemory())
