@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,7 @@ from pipeline.execution.caches.keys import batch_parts, key_of, motor_parts
 from pipeline.execution.caches.run_cache import Batch, RunCache
 from pipeline.execution.caches.stamp import configuration_digest
 from pipeline.execution.caches.versions import RUN, tools
-from pipeline.execution.jobs import ModelTest, MotorJob, MotorResult, WarmUp
+from pipeline.execution.jobs import HeldJob, ModelTest, MotorJob, MotorResult, WarmUp
 from pipeline.execution.outputs.publishing import (
     fleet_of,
     other_motors,
@@ -27,6 +25,7 @@ from pipeline.execution.outputs.publishing import (
     removed_note,
     with_folder_names,
 )
+from pipeline.execution.outputs.registration import Registered, register
 from pipeline.execution.outputs.sheet_memory import SheetMemory
 from pipeline.execution.outputs.statuses import (
     findings_of,
@@ -37,6 +36,7 @@ from pipeline.execution.outputs.statuses import (
 from pipeline.execution.tasks.survey_tasks import survey_with
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
+from pipeline.io.ingest.entry import Entry
 from pipeline.io.ingest.files import input_folder, size_bytes
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.identification import Answer, Question, identify_by_head
@@ -52,28 +52,16 @@ from pipeline.records.comparison import ModelSpec
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
-from pipeline.records.ledger import Event, Revocation
-from pipeline.records.naming import printable
+from pipeline.records.ledger import Revocation
 from pipeline.records.outcome import Outcome, Stopwatch, faults_of, first_that_applies
 from pipeline.report.text.progress import progress
 from pipeline.report.text.waiting import waiting
 from pipeline.settings import RunSettings
-from pipeline.stages.steps.beside import beside_motors, due_jobs
+from pipeline.stages.steps.beside import begun_ahead, beside_motors, due_jobs
 from pipeline.stages.steps.registry import opened
 
 PROGRESS = ".work"
-COMMITTED = 50
-"""Datasheets in a commit of the registry, at most."""
 Revocations = Mapping[str, tuple[Revocation, ...]]
-
-
-@dataclass(frozen=True, slots=True)
-class Registered:
-    """The result of registering the datasheets: exit code, a line of text, error lines."""
-
-    code: int = 0
-    text: str = ""
-    errors: tuple[str, ...] = ()
 
 
 def main(settings: RunSettings) -> Outcome:
@@ -122,20 +110,22 @@ def main(settings: RunSettings) -> Outcome:
     return replace(outcome, result=sheets, faults=faults_of(findings_of(Path(output))))
 
 
-def process_motor(job: MotorJob | ModelTest | WarmUp) -> MotorResult | None:
+def process_motor(job: MotorJob | HeldJob | ModelTest | WarmUp) -> MotorResult | None:
     """One motor, in a worker: what it needs is imported there and not in the driver.
 
     Parameters
     ----------
     job
-        What to do with one motor, and how; its residual test alone, beside it; or nothing but the
-        imports.
+        What to do with one motor, and how, at once or behind a gate; its residual test alone,
+        beside it; or nothing but the imports.
 
     """
     from pipeline.stages.steps import motor
 
     if isinstance(job, MotorJob):
         return motor.process_motor(job)
+    if isinstance(job, HeldJob):
+        return motor.process_motor(job.job, job.gate)
     if isinstance(job, ModelTest):
         motor.test_model(job.job)
     else:
@@ -154,7 +144,7 @@ def _run(
 ) -> Outcome:
     """One run; `surveyed` is called when every file was looked at, before anything is written.
 
-    With `ahead` the residual tests that would be made beside the motors begin before it is called;
+    With `ahead` motors and the residual tests beside them begin before it is called; until then
     they write to the cache alone.
     """
     watch = Stopwatch()
@@ -162,20 +152,21 @@ def _run(
     limits = limits_file(settings.limits, settings.config_dir)
     sources = source_maps(settings.source, settings.config_dir)
     cache = RunCache(folder, output, on=settings.cache)
-    with waiting("looking at the files of " + settings.input), watch.stage("survey"):
-        ask = partial(_answers, settings, sources, workers, cache)
-        files = survey(folder, sources, ask, recover=settings.recover)
-        plain = _jobs(settings, files, limits)
-        if ahead:
-            jobs = _with_revoked(plain, _revocations(registry))
-            beside = beside_motors(settings, due_jobs(jobs, cache), workers.count)
-            workers.begin_tasks(process_motor, beside)
-        surveyed()
-    batch = _batch_key(settings, plain, files, registry)
-    if (cached := _cached_outcome(settings, registry, cache, batch)) is not None:
-        return replace(cached, timings=watch.table())
-    means = workers, cache, watch, memory
-    return _computed(settings, registry, means, files, plain, begun=ahead)
+    with ExitStack() as stack:
+        with waiting("looking at the files of " + settings.input), watch.stage("survey"):
+            ask = partial(_answers, settings, sources, workers, cache)
+            files = survey(folder, sources, ask, recover=settings.recover)
+            plain = _jobs(settings, files, limits)
+            begun = None
+            if ahead:
+                due = due_jobs(_with_revoked(plain, _revocations(registry)), cache)
+                begun = stack.enter_context(begun_ahead(settings, due, workers, process_motor))
+            surveyed()
+        batch = _batch_key(settings, plain, files, registry)
+        if (cached := _cached_outcome(settings, registry, cache, batch)) is not None:
+            return replace(cached, timings=watch.table())
+        means = workers, cache, watch, memory
+        return _computed(settings, registry, means, files, plain, begun)
 
 
 def _computed(
@@ -184,20 +175,19 @@ def _computed(
     means: tuple[WorkerPool, RunCache, Stopwatch, SheetMemory],
     survey: Survey,
     plain: Sequence[MotorJob],
-    *,
-    begun: bool = False,
+    begun: Sequence[HeldJob] | None,
 ) -> Outcome:
     """Motors worked on, registered and published; `plain` are the jobs without revocations, `begun`
-    is whether the tests beside them have begun.
+    the motors that were begun with the tests beside them, None where nothing was.
     """
     (workers, cache, watch, memory), output = means, Path(settings.output)
     revoked = _revocations(registry)
     jobs = _with_revoked(plain, revoked)
     with watch.stage("motors"):
-        motors, died = _process(settings, jobs, workers, cache, begun=begun)
+        motors, died = _process(settings, jobs, workers, cache, begun)
     others = other_motors(output, [job.motor_id for job in jobs], prune=settings.prune)
     with watch.stage("registry"):
-        registered = _register(registry, output, motors)
+        registered = register(registry, output, motors, memory)
         # before the statuses are read: a later decision is not in them
         batch = _batch_key(settings, plain, survey, registry)
         histories = histories_of(registry)
@@ -252,43 +242,6 @@ def _contents(
     )
 
 
-def _register(
-    registry: Registry | None, output: Path, results: Sequence[MotorResult]
-) -> Registered:
-    """Publishes the datasheets in commits of limited size, so that memory stays bounded, those that
-    were worked on first.
-
-    A registry that fails leaves the outputs complete.
-    """
-    by_work = sorted(results, key=lambda result: not result.seconds)
-    names = [n for r in by_work for n, _ in r.finished.files if n.startswith("datasheets/")]
-    if registry is None or not names:
-        return Registered()
-    added = known = 0
-    errors: tuple[str, ...] = ()
-    for first in range(0, len(names), COMMITTED):
-        some = names[first : first + COMMITTED]
-        try:
-            receipt = registry.publish(((output / n).read_bytes() for n in some), datetime.now(UTC))
-        except MachineError as error:
-            return Registered(error.exit_code, errors=(*errors, f"error: {error}"))
-        added, known = added + len(receipt.added), known + len(receipt.known)
-        errors += tuple(_conflict(event, registry.place) for event in receipt.conflicts)
-    text = f"registry {registry.place}: {added} new, {known} known"
-    return Registered(1 if errors else 0, text, errors)
-
-
-def _conflict(event: Event, place: str) -> str:
-    """The error line of a version that is registered with other content, with what to do."""
-    motor, version = printable(event.motor_id), event.version[:12]
-    return (
-        f"error: motor {motor}: version {version} is registered with other content; the same work "
-        "gave other bytes, so the registered one stays; if that one is wrong, "
-        f"`registry revoke {shlex.quote(motor)} version={version} by=NAME why=REASON "
-        f"registry={shlex.quote(place)}` and run again: the new bytes become a version of their own"
-    )
-
-
 def _answers(
     settings: RunSettings,
     sources: Mapping[str, SourceMap],
@@ -320,15 +273,20 @@ def _jobs(settings: RunSettings, survey: Survey, limits: Path) -> list[MotorJob]
     required, model_gates = release_conditions(limits)
     changes = policy_changes(settings.policy)
     model = ModelSpec(settings.model.name, tuple(settings.model.effects), policy=changes)
+    by_maps = {_source_names(entries): entries for entries in survey.motors.values()}
+    digests = {
+        names: configuration_digest(
+            settings, required, [e.source for e in entries], model_gates=model_gates
+        )
+        for names, entries in by_maps.items()
+    }
     jobs = [
         MotorJob(
             motor_id=motor_id,
             entries=entries,
             input=settings.input,
             output=settings.output,
-            config_sha256=configuration_digest(
-                settings, required, [e.source for e in entries], model_gates=model_gates
-            ),
+            config_sha256=digests[_source_names(entries)],
             required=required,
             release=settings.release,
             report=settings.report,
@@ -347,6 +305,11 @@ def _jobs(settings: RunSettings, survey: Survey, limits: Path) -> list[MotorJob]
         for motor_id, entries in survey.motors.items()
     ]
     return [_keyed(job) for job in jobs] if settings.cache else jobs
+
+
+def _source_names(entries: Sequence[Entry]) -> frozenset[str | None]:
+    """The names of the source maps that captures are read by; None for the contract's own form."""
+    return frozenset(None if entry.source is None else entry.source.name for entry in entries)
 
 
 def _keyed(job: MotorJob) -> MotorJob:
@@ -397,8 +360,7 @@ def _process(
     jobs: Sequence[MotorJob],
     workers: WorkerPool,
     cache: RunCache,
-    *,
-    begun: bool,
+    begun: Sequence[HeldJob] | None,
 ) -> tuple[list[MotorResult], tuple[MachineError, ...]]:
     """The results in the order of the jobs, and an error for each unfinished one."""
     ends: list[Any] = [None] * len(jobs)
@@ -407,14 +369,18 @@ def _process(
             ends[number] = MotorResult(job.motor_id, done, {})
     due = [number for number, end in enumerate(ends) if end is None]
     motors = [jobs[number] for number in due]
-    beside = [] if begun else beside_motors(settings, motors, workers.count)
+    beside = beside_motors(settings, motors, workers.count) if begun is None else []
+    tasks = [next((held for held in begun or () if held.job == job), job) for job in motors]
 
     def advance(at: int, _: MotorResult | None) -> None:
         if at < len(due):
             bar.advance(at)
 
     with progress([_size(settings, job) for job in motors]) as bar:
-        outcomes = workers.map_tasks(process_motor, [*motors, *beside], advance)
+        for held in tasks:
+            if isinstance(held, HeldJob):
+                held.gate.open()
+        outcomes = workers.map_tasks(process_motor, [*tasks, *beside], advance)
     for number, end in zip(due, outcomes, strict=False):
         ends[number] = end
     died = tuple(end for end in ends if isinstance(end, MachineError))

@@ -20,6 +20,7 @@ import pytest
 from pipeline.execution.workers.pools import Pool, local_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.guard import ReadLimits, reading
+from pipeline.io.storage.gate import Gate
 from pipeline.records.errors import CaptureError, MachineError
 
 pytestmark = pytest.mark.workers
@@ -117,6 +118,34 @@ def test_a_task_that_breaks_is_reported_and_the_others_are_done(
     assert isinstance(two, MachineError)
     assert two.message == "task breaks could not be finished: RecursionError: too deep"
     assert "UserWarning: from the worker" in caplog.text
+
+
+def behind(gate: Gate) -> int | None:
+    return os.getpid() if gate.passed() else None
+
+
+def test_a_task_that_was_begun_is_not_begun_again(workers: WorkerPool) -> None:
+    """Expected: `map_tasks` waits for it; one whose gate is dropped ends, and nothing is left."""
+    wanted, unwanted = workers.gate(), workers.gate()
+    for gate in (wanted, unwanted):
+        gate.close()
+    workers.begin_tasks(behind, [wanted, unwanted])
+    futures = [begun.future for begun in workers._begun]
+    assert not any(future.done() for future in futures)
+    unwanted.drop()
+    assert futures[1].result().value is None
+    wanted.open()
+    assert workers.map_tasks(behind, [wanted]) == [futures[0].result().value]
+    assert isinstance(futures[0].result().value, int)
+    assert not workers.map_tasks(behind, [unwanted])[0]
+
+
+def test_a_task_that_was_begun_and_lost_its_worker_is_done(
+    workers: WorkerPool, tmp_path: Path
+) -> None:
+    task = Reads(("once",), str(tmp_path))
+    workers.begin_tasks(read, [task])
+    assert workers.map_tasks(read, [task]) == [["once: read"]]
 
 
 def test_workers_end_with_their_driver(tmp_path: Path) -> None:

@@ -15,11 +15,12 @@ from concurrent.futures import as_completed
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 from pipeline.execution.workers.pools import OpenPool, Pool
 from pipeline.execution.workers.task import LOGGER, Report, perform
 from pipeline.io.ingest.guard import CrashReport, crash_report
+from pipeline.io.storage.gate import Gate
 from pipeline.records.errors import MachineError, PipelineError
 
 RERUN = "finished work is cached: run the same command again to continue"
@@ -56,6 +57,14 @@ class Task(Protocol):
         ...
 
 
+class Begun(NamedTuple):
+    """A task that a worker has begun, and its progress file."""
+
+    task: Any
+    future: Any
+    progress: Path
+
+
 @dataclass
 class WorkerPool:
     """The workers of one command, started when first needed; a context manager.
@@ -69,6 +78,8 @@ class WorkerPool:
     _run: str = field(default_factory=lambda: f"{os.getpid()}-{secrets.token_hex(4)}")
     _pool: Pool | None = None
     _stack: ExitStack = field(default_factory=ExitStack)
+    _begun: list[Begun] = field(default_factory=list)
+    _gates: int = 0
 
     def __enter__(self) -> Self:
         return self
@@ -125,7 +136,10 @@ class WorkerPool:
         return answers
 
     def begin_tasks(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> None:
-        """Begins tasks that nothing waits for: what they do is kept elsewhere, or is done again.
+        """Begins tasks, in place of those that were begun before.
+
+        `map_tasks` waits for those that it is given as well. Nothing waits for the others: what
+        they do is kept elsewhere, or is done again.
 
         Parameters
         ----------
@@ -136,10 +150,17 @@ class WorkerPool:
 
         """
         pool = self._workers()
+        self._begun.clear()
         for index, task in enumerate(tasks):
-            progress = str(self.progress_folder / f"{self._run}-ahead-{index}")
+            progress = self.progress_folder / f"{self._run}-ahead-{index}"
             with suppress(*pool.died):
-                pool.executor.submit(perform, function, task, progress)
+                future = pool.executor.submit(perform, function, task, str(progress))
+                self._begun.append(Begun(task, future, progress))
+
+    def gate(self) -> Gate:
+        """A gate of its own, not closed yet."""
+        self._gates += 1
+        return Gate(str(self.progress_folder / f"{self._run}-gate-{self._gates}"))
 
     def _run_round(
         self,
@@ -185,25 +206,34 @@ class WorkerPool:
         indices: Sequence[int],
     ) -> Iterator[tuple[int, Report | CrashReport]]:
         """The outcome of each task: its report, or the crash report of its worker."""
-        futures = {}
+        futures: dict[Any, tuple[int, Path]] = {}
         refused: list[int] = []
         for index in indices:
-            progress = str(self._progress_file(index))
+            progress = self._progress_file(index)
+            if (begun := self._taken(tasks[index])) is not None:
+                futures[begun.future] = index, begun.progress
+                continue
             try:
-                futures[pool.executor.submit(perform, function, tasks[index], progress)] = index
+                future = pool.executor.submit(perform, function, tasks[index], str(progress))
+                futures[future] = index, progress
             except pool.died:  # a worker died while tasks were being submitted
                 refused.append(index)
         for future in as_completed(futures):
-            index = futures.pop(future)
-            yield index, self._outcome(pool, future, index)
+            index, progress = futures.pop(future)
+            yield index, self._outcome(pool, future, progress)
         for index in refused:
             yield index, CrashReport(begun=False)
 
-    def _outcome(self, pool: Pool, future: Any, index: int) -> Report | CrashReport:
+    def _taken(self, task: Any) -> Begun | None:
+        """The task where it was begun and nothing waits for it yet."""
+        number = next((n for n, begun in enumerate(self._begun) if begun.task is task), None)
+        return None if number is None else self._begun.pop(number)
+
+    def _outcome(self, pool: Pool, future: Any, progress: Path) -> Report | CrashReport:
         try:
             report: Report = future.result()
         except pool.died:
-            return crash_report(self._progress_file(index))
+            return crash_report(progress)
         except pool.lost as error:
             raise MachineError(f"the scheduler was lost ({type(error).__name__})", RERUN) from error
         log = logging.getLogger(LOGGER)

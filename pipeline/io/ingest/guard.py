@@ -153,6 +153,8 @@ def reading(path: str, size_bytes: int, limits: ReadLimits) -> Iterator[None]:
 
     """
     progress = _PROGRESS.descriptor
+    if sys.platform.startswith("linux"):
+        _begin_libraries()
     if progress is not None:
         os.pwrite(progress, path.encode("utf-8", "surrogatepass") + b"\n", 0)
         os.lseek(progress, 0, os.SEEK_END)
@@ -225,7 +227,6 @@ def _memory(most_bytes: int) -> Iterator[None]:
         return
     import resource
 
-    _begin_libraries()
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     pages = int(Path("/proc/self/statm").read_bytes().split()[5])
     limit = pages * resource.getpagesize() + most_bytes
@@ -241,7 +242,7 @@ def _memory(most_bytes: int) -> Iterator[None]:
 @cache
 def _begin_libraries() -> None:
     """Starts the threads that reading needs: one that cannot be started under the limit may leave
-    the others waiting for it until the time is up, and their memory is no file's.
+    the others waiting for it until the time is up, and their memory and time are no file's.
     """
     import polars as pl
 

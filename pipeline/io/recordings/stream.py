@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 import rerun as rr
+import rerun_bindings as bindings
 from numpy.typing import NDArray
 from rerun import RecordingStream
 from rerun.blueprint import Blueprint
@@ -92,12 +93,14 @@ def recording(
 
     """
     rr.set_strict_mode(True)
+    # a stream that nobody holds any more keeps two threads and its buffers until this is called
+    bindings.flush_and_cleanup_orphaned_recordings()
     shown = drawable(name)
     home, recording_id = ids or (application(shown), digest(identity))
     stream = rr.RecordingStream(home, recording_id=recording_id, send_properties=False)
     with _kept_in_memory(stream) as finished:
         if layout is not None:
-            stream.send_blueprint(layout, make_active=True, make_default=True)
+            _send_layout(stream, home, layout)
         stream.send_recording_name(shown)
         recorded = Recording(stream)
         yield recorded
@@ -114,7 +117,13 @@ def _kept_in_memory(stream: RecordingStream) -> Iterator[Callable[[], bytes]]:
     """
     if not _has_nameless_files():
         memory = stream.memory_recording()
-        yield memory.drain_as_bytes
+
+        def drained() -> bytes:
+            content = memory.drain_as_bytes()
+            stream.disconnect()
+            return content
+
+        yield drained
         return
     with os.fdopen(os.memfd_create("recording"), "rb") as file:
 
@@ -124,6 +133,24 @@ def _kept_in_memory(stream: RecordingStream) -> Iterator[Callable[[], bytes]]:
 
         stream.save(OPEN_FILES / str(file.fileno()))
         yield finished
+
+
+def _send_layout(stream: RecordingStream, home: str, layout: Blueprint) -> None:
+    """Makes a layout the active and the default one of the application `home`.
+
+    As Rerun's `send_blueprint` does, which leaves the stream of the layout connected to its memory:
+    the two hold each other, and two threads, for as long as the process lives.
+    """
+    own = RecordingStream._from_native(
+        bindings.new_blueprint(
+            application_id=home, make_default=False, make_thread_default=False, default_enabled=True
+        )
+    )
+    own.set_time("blueprint", sequence=0)
+    layout._log_to_stream(own)
+    storage = own.memory_recording().storage
+    bindings.send_blueprint(storage, True, True, recording=stream.to_native())
+    own.disconnect()
 
 
 def _has_nameless_files() -> bool:

@@ -17,6 +17,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from pipeline.io.storage.identity import Identity, identity
 from pipeline.io.storage.publish import sync_folder, write_synced
 from pipeline.records.errors import MachineError
 from pipeline.records.naming import file_stem
@@ -153,6 +154,17 @@ class Exports:
         except FileNotFoundError:
             return None
         return content
+
+    def identity(self, key: Key) -> Identity | None:
+        """What changes when the file of a version does; None where there is none on a disk.
+
+        Parameters
+        ----------
+        key
+            Motor and version.
+
+        """
+        return None if self.folder is None else identity(self.folder / place_of(key))
 
     def names(self) -> list[str]:
         """Every file's place below the registry, sorted; of a disk only."""

@@ -26,6 +26,7 @@ from pipeline.io.registry.rows import (
 from pipeline.io.registry.table import EventTable, Row
 from pipeline.io.registry.verification import Verification, verify
 from pipeline.io.storage.datasheets import datasheet_of
+from pipeline.io.storage.identity import Identity
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import PipelineError, UsageError
 from pipeline.records.ledger import (
@@ -58,6 +59,8 @@ class Registry:
         self.place = place
         self._table = EventTable(place, options)
         self._exports = Exports(place, options)
+        self._settled_files: dict[Key, tuple[str, Identity]] = {}
+        self._settled_at = -1
 
     def publish(self, documents: Iterable[Mapping[str, Any] | bytes], now: datetime) -> Receipt:
         """Registers datasheets in one commit, each version once.
@@ -101,7 +104,36 @@ class Registry:
         except PipelineError:
             self._withdraw(prepared)
             raise
-        return self._settled(sheets, before, added)
+        receipt = self._settled(sheets, before, added)
+        if added:
+            self._table.merge_small()
+        return receipt
+
+    def unsettled(self, contents: Mapping[Key, str]) -> set[Key]:
+        """The versions to publish: all but those that this object has published before.
+
+        The table must hold as many commits as then, and the file of a version be the same file with
+        the same times. So what somebody took away is published again.
+
+        Parameters
+        ----------
+        contents
+            Digest of each version's content.
+
+        Returns
+        -------
+        set of Key
+            All versions where the registry is no folder of this machine.
+
+        """
+        commit = self.last_commit()
+        if commit is None or commit < self._settled_at:
+            return set(contents)
+        return {
+            key
+            for key, sha256 in contents.items()
+            if self._settled_files.get(key) != (sha256, self._exports.identity(key))
+        }
 
     def _withdraw(self, prepared: Iterable[Key]) -> None:
         """Takes away the pending files whose rows are certainly not in the table."""
@@ -127,6 +159,10 @@ class Registry:
         self._exports.settle_all(
             {key: sheet.content for key, sheet in sheets.items() if key in settled}
         )
+        self._settled_at = -1 if (commit := self.last_commit()) is None else commit
+        for key in settled:
+            if (identity := self._exports.identity(key)) is not None:
+                self._settled_files[key] = sheets[key].sha256, identity
         known.sort(key=lambda event: event.sequence)
         conflicts.sort(key=lambda event: event.sequence)
         return Receipt(tuple(added), tuple(known), tuple(conflicts))
@@ -183,6 +219,7 @@ class Registry:
         if self._table.events() is None:
             raise self._missing()
         _, added = self._table.append(append)
+        self._table.merge_small()
         decided = versions[0]
         return replace(decided, decisions=(*decided.decisions, *added)), bool(added)
 
@@ -229,6 +266,7 @@ class Registry:
         if self._table.events() is None:
             raise self._missing()
         _, added = self._table.append(append)
+        self._table.merge_small()
         return len(added)
 
     def events(self) -> list[Event]:

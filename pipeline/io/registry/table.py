@@ -176,7 +176,6 @@ class EventTable:
                 version = table.version()
                 if self._committed(table, rows):
                     self._sync(table.version())
-                    self._merge_small(table)
                     return before, [event for event, _ in rows]
                 table = self._opened() or self._created()
                 if table.version() == version or time.monotonic() > give_up:
@@ -277,18 +276,28 @@ class EventTable:
             return False
         return True
 
-    def _merge_small(self, table: DeltaTable) -> None:
-        """Merges small files where there are many; a writer that does so too may be faster."""
+    def merge_small(self) -> None:
+        """Merges small files where there are many; a writer that does so too may be faster.
+
+        Raises
+        ------
+        MachineError
+            The table cannot be read.
+
+        """
         import polars as pl
         from deltalake.exceptions import DeltaError
 
         if self._stand_in is not None:
             return
-        sizes = pl.DataFrame(table.get_add_actions(flatten=True))["size_bytes"].to_list()
-        if sum(size < SMALL_BYTES for size in sizes) > MOST_FILES:
-            with suppress(DeltaError):
-                table.optimize.compact(target_size=SMALL_BYTES)
-                self._sync(table.version())
+        with self._failures():
+            if (table := self._opened()) is None:
+                return
+            sizes = pl.DataFrame(table.get_add_actions(flatten=True))["size_bytes"].to_list()
+            if sum(size < SMALL_BYTES for size in sizes) > MOST_FILES:
+                with suppress(DeltaError):
+                    table.optimize.compact(target_size=SMALL_BYTES)
+                    self._sync(table.version())
 
     def _sync(self, version: int) -> None:
         """Waits until the disk has a commit and the files it added."""

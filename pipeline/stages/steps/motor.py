@@ -21,6 +21,7 @@ from pipeline.execution.tasks import work
 from pipeline.execution.tasks.model_tests import judged_model
 from pipeline.execution.tasks.start import starts_from_fits
 from pipeline.execution.workers.segment_worker import open_own, shared_or_in_order
+from pipeline.io.storage.gate import Gate
 from pipeline.io.storage.publish import canonical_json, together
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
@@ -48,7 +49,7 @@ Write = Callable[[str, bytes], str]
 """Writes a file of a motor, and gives its sha256."""
 
 
-def process_motor(job: MotorJob) -> MotorResult:
+def process_motor(job: MotorJob, gate: Gate | None = None) -> MotorResult | None:
     """Reads, validates, fits, checks and writes one motor; refused captures become findings.
 
     When all its files are on the disk, this is noted, so that a batch that was stopped goes on.
@@ -57,10 +58,19 @@ def process_motor(job: MotorJob) -> MotorResult:
     ----------
     job
         What to do with one motor, and how.
+    gate
+        No file is written before it opens; None for none.
+
+    Returns
+    -------
+    MotorResult or None
+        None where the gate was dropped.
 
     """
     watch = Stopwatch()
-    finished = _finish(job, watch)
+    finished = _finish(job, watch, gate)
+    if finished is None:
+        return None
     if job.key is not None and not job.refused:
         note_motor(Path(job.output), job.motor_id, job.key, finished)
     return MotorResult(job.motor_id, finished, watch.seconds, lasting=not job.refused)
@@ -93,8 +103,8 @@ def warm_up(start: WarmUp) -> None:
     datasheet_code()
 
 
-def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
-    """Writes the files of one motor, all of them or nothing.
+def _finish(job: MotorJob, watch: Stopwatch, gate: Gate | None) -> Finished | None:
+    """Writes the files of one motor, all of them or nothing; None where the gate was dropped.
 
     What needs no verdict on the model comes before it: the verdict is what takes longest, and where
     a worker would be idle it is made there meanwhile.
@@ -112,6 +122,8 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
     draft = work.assemble(job, campaign, checked, stamp)
     with watch.stage("performance"):
         performance = performance_at(campaign, draft, job.operate)
+    if gate is not None and not gate.passed():
+        return None
     with _files(job) as (write, files):
         if job.recordings:
             with watch.stage("recordings"):

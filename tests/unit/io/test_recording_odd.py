@@ -18,6 +18,7 @@ from pipeline.stages.steps.replay import replay
 from tests.unit.stages.test_replay import make_sheet
 
 NAN = float("nan")
+THREADS = Path("/proc/self/task")
 DQ = ("vd_v", "vq_v", "id_a", "iq_a", "theta_mech_rad", "torque_shaft_nm")
 
 
@@ -48,6 +49,17 @@ def made(tables: tuple[pl.DataFrame, ...], motor_id: str = "m") -> Capture:
     meta = CaptureMeta(motor_id, "drive", pole_pairs=4)
     masks = [Mask("rate", 0, np.arange(tables[0].height) % 3 > 0)] if tables else []
     return Capture("a/odd 1.mcap", "0" * 64, "verified", meta, tables, tuple(masks))
+
+
+@pytest.mark.skipif(not THREADS.is_dir(), reason="the system lists no threads")
+def test_recordings_leave_no_threads_behind() -> None:
+    """A stream of Rerun keeps two threads and its buffers, also when nothing refers to it."""
+    capture = made((dq(2000, 1.0),))
+    recording_bytes(capture, ())
+    before = len(list(THREADS.iterdir()))
+    for _ in range(5):
+        recording_bytes(capture, ())
+    assert len(list(THREADS.iterdir())) <= before
 
 
 @pytest.mark.parametrize("kind", ODD)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
@@ -73,6 +74,26 @@ def test_a_version_enters_once(registry: Registry, tmp_path: Path) -> None:
     mixed = registry.publish([document("a", 1), document("a", 2)], NOON + HOUR)
     assert [event.revision for event in mixed.added] == [2]
     assert registry.publish([], NOON).added == ()
+
+
+def test_what_was_published_and_is_still_there_need_not_be_again(
+    registry: Registry, tmp_path: Path
+) -> None:
+    """Where a file, the table or all of it was taken away, or the content is another, it must."""
+    folder, keys = tmp_path / "registry", [(name, version_of(name, 1)) for name in "ab"]
+    receipt = registry.publish([document("a", 1), document("b", 1)], NOON)
+    contents = {event.key: str(event.content_sha256) for event in receipt.added}
+    assert sorted(contents) == keys
+    assert registry.unsettled(contents) == set()
+    assert Registry(str(folder)).unsettled(contents) == set(keys), "another object knows nothing"
+    assert registry.unsettled({keys[0]: "0" * 64}) == {keys[0]}
+    assert registry.unsettled({("c", "0" * 64): "0" * 64}) == {("c", "0" * 64)}
+    (folder / place_of(keys[0])).unlink()
+    assert registry.unsettled(contents) == {keys[0]}
+    registry.publish([document("a", 1)], NOON)
+    assert registry.unsettled(contents) == set()
+    shutil.rmtree(folder / "_delta_log")
+    assert registry.unsettled(contents) == set(keys)
 
 
 def test_other_content_under_a_registered_version_changes_nothing(

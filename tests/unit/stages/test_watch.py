@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -21,7 +22,7 @@ from pipeline.execution.outputs import sheet_memory
 from pipeline.execution.outputs.sheet_memory import SheetMemory
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.arrivals import Arrivals, snapshot
-from pipeline.io.registry.store import Registry
+from pipeline.io.registry.store import Receipt, Registry
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.ledger import Selection
@@ -29,7 +30,7 @@ from pipeline.records.outcome import Outcome
 from pipeline.settings import RunSettings
 from pipeline.stages import run
 from pipeline.stages.steps import motor, watch
-from pipeline.stages.steps.watch import Watch
+from pipeline.stages.steps.watch import FolderChangedError, Watch
 
 DEMO = Path(__file__).parents[3] / "data" / "demo"
 
@@ -207,10 +208,10 @@ def test_a_signal_between_two_passes_ends_the_next(settings: RunSettings) -> Non
     assert len(passes) == 3
 
 
-def test_the_residual_test_begins_while_the_folder_settles(
+def test_a_motor_and_its_residual_test_begin_while_the_folder_settles(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Expected: it is begun once, before the folder has settled; nothing but the cache is written
+    """Expected: each is begun once, before the folder has settled; nothing but the cache is written
     until it has.
     """
     folder, output = tmp_path / "in", tmp_path / "out"
@@ -226,7 +227,7 @@ def test_the_residual_test_begins_while_the_folder_settles(
         return [function(task) for task in tasks]
 
     def settled() -> None:
-        assert begun == ["the residual test of motor G52-0601"]
+        assert begun == ["the residual test of motor G52-0601", "motor G52-0601"]
         assert {path.name for path in output.iterdir()} <= {".cache", ".work"}
 
     monkeypatch.setattr(WorkerPool, "begin_tasks", begin)
@@ -237,6 +238,54 @@ def test_the_residual_test_begins_while_the_folder_settles(
     run._run(keys, None, workers, SheetMemory(), settled, ahead=True)
     assert (output / "datasheets" / "G52-0601.json").is_file()
     assert [name for name in worked if "G52" in name] == ["motor G52-0601"]
+
+
+def test_a_motor_that_was_begun_writes_nothing_where_the_folder_does_not_settle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor does one that was revoked meanwhile: its job is another one by then."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    folder, output = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    output.mkdir()
+    resistance(folder, "a", 0.6)
+    begun: list[Any] = []
+    worked: list[Any] = []
+
+    def begin(_: object, __: object, tasks: Sequence[Any]) -> None:
+        begun.extend(tasks)
+
+    def here(_: object, work: Callable[[Any], Any], tasks: Sequence[Any], __: Any = None) -> Any:
+        worked.extend(task for task in tasks if "survey" not in task.name)
+        return [work(task) for task in tasks]
+
+    monkeypatch.setattr(WorkerPool, "begin_tasks", begin)
+    monkeypatch.setattr(WorkerPool, "map_tasks", here)
+    keys = RunSettings(input=str(folder), output=str(output), recordings=False, residual_test=False)
+    workers = WorkerPool(lambda _: nullcontext(), 2, output / ".work")
+    registry = Registry(str(output / "registry"))
+
+    def moved() -> None:
+        raise FolderChangedError
+
+    with pytest.raises(FolderChangedError):
+        run._run(keys, registry, workers, SheetMemory(), moved, ahead=True)
+    (held,) = begun
+    assert run.process_motor(held) is None
+    assert not (output / "datasheets").exists()
+    run._run(keys, registry, workers, SheetMemory())
+    (output / "datasheets" / "a.json").unlink()
+
+    def revoked() -> None:
+        last = Selection("a", revision=1)
+        registry.decide("revoke", last, "A. Smith", "wrong", datetime(2026, 1, 1, tzinfo=UTC))
+
+    begun.clear()
+    worked.clear()
+    run._run(keys, registry, workers, SheetMemory(), revoked, ahead=True)
+    (held,) = begun
+    assert worked == [replace(held.job, revoked=worked[0].revoked, key=worked[0].key)]
+    assert run.process_motor(held) is None
 
 
 def resistance(folder: Path, motor_id: str, r_ohm: float) -> None:
@@ -270,6 +319,14 @@ def test_passes_leave_what_a_run_by_itself_leaves(
     folder.mkdir()
     (output / "comparison").mkdir(parents=True)
     read: list[str] = []
+    published: list[str] = []
+    publish = Registry.publish
+
+    def publishing(self: Registry, documents: Iterable[bytes], now: datetime) -> Receipt:
+        given = list(documents)
+        published.extend(json.loads(document)["motor_id"] for document in given)
+        return publish(self, given, now)
+
     whole = sheet_memory.datasheet_from
 
     def reading(data: bytes, name: str) -> Datasheet:
@@ -280,6 +337,7 @@ def test_passes_leave_what_a_run_by_itself_leaves(
         return [work(task) for task in tasks]
 
     monkeypatch.setattr(sheet_memory, "datasheet_from", reading)
+    monkeypatch.setattr(Registry, "publish", publishing)
     monkeypatch.setattr(WorkerPool, "map_tasks", here)
     keys = RunSettings(input=str(folder), output=str(output), recordings=False, residual_test=False)
     workers = WorkerPool(lambda _: nullcontext(), 1, output / ".work")
@@ -287,9 +345,11 @@ def test_passes_leave_what_a_run_by_itself_leaves(
 
     def a_pass(*changed: str) -> None:
         read.clear()
+        published.clear()
         run._run(keys, registry, workers, memory)
         memory.forget_others()
         assert read == [f"{motor_id}.json" for motor_id in changed]
+        assert published == list(changed)
         by_watch = written(output)
         (output / ".cache" / "run.json").unlink()
         run._run(keys, registry, workers, SheetMemory())
