@@ -517,8 +517,8 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
     slow = policy.creep * model.machine.scales["speed_rad_s"]
     finer = x.theta_rad.size // segment.size
     pace = np.abs(x.omega_rad_s[::finer])
-    resting = _lasting(pace < slow, round(policy.rest_s / x.ts_s))
-    creeping = np.flatnonzero(_with_neighbours(resting))
+    rests = _lasting(pace < slow, round(policy.rest_s / x.ts_s))
+    creeping = np.flatnonzero(_with_neighbours(rests))
     if creeping.size < 2:
         return np.zeros(weak.starts.size)
     resting = x.at(finer * creeping)
