@@ -3,6 +3,8 @@ VENV := .venv
 PY := $(VENV)/bin/python
 READY := $(VENV)/requirements.lock
 export OPENBLAS_NUM_THREADS := 1
+# Each process that a test starts would compile the project anew: a second or two.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo demo-data test test-slow lint docs lock screenshots stories recovery mutants clean
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -14,6 +15,10 @@ from pipeline.__main__ import THREADS
 
 for name in THREADS:  # before anything imports numpy
     os.environ.setdefault(name, "1")
+
+# As in the workers of the project: by the default of 700 new objects, looking for garbage takes a
+# quarter of the time in which tests are collected.
+gc.set_threshold(100_000)
 
 hypothesis.settings.register_profile(
     "project", deadline=None, derandomize=True, database=None, print_blob=True
