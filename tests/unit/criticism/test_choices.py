@@ -61,7 +61,7 @@ def test_a_choice_that_falls_far_short_to_first_order_is_not_fitted(monkeypatch)
     ended = gauss_newton(Fit(segments, MODEL, TRUE, floors(segments, MODEL, TRUE), TRUE))
     over = np.ones(len(ended.labels), dtype=bool)
     monkeypatch.setattr(
-        "pipeline.criticism.selection.choices.significant_groups", lambda system: over
+        "pipeline.criticism.selection.choices.significant_groups", lambda _: over
     )
     monkeypatch.setattr("pipeline.criticism.selection.choices.gauss_newton", None)
     assert reconsidered(ended) is ended
