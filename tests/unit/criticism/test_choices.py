@@ -60,8 +60,6 @@ def test_a_choice_that_falls_far_short_to_first_order_is_not_fitted(monkeypatch)
     segments = (rippling(1), rippling(2))
     ended = gauss_newton(Fit(segments, MODEL, TRUE, floors(segments, MODEL, TRUE), TRUE))
     over = np.ones(len(ended.labels), dtype=bool)
-    monkeypatch.setattr(
-        "pipeline.criticism.selection.choices.significant_groups", lambda _: over
-    )
+    monkeypatch.setattr("pipeline.criticism.selection.choices.significant_groups", lambda _: over)
     monkeypatch.setattr("pipeline.criticism.selection.choices.gauss_newton", None)
     assert reconsidered(ended) is ended
