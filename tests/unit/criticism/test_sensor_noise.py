@@ -126,6 +126,23 @@ def test_the_mean_of_rounded_readings_has_their_noise_and_not_that_of_its_fracti
     assert np.std(anew) > 2.0 * coarse / 6.0 / np.sqrt(12.0)
 
 
+def test_a_rounding_that_beats_with_the_sampling_is_no_mean_of_readings():
+    """At a quarter of all paces its third differences are as loud as those of two readings' noise,
+    next to half a step a sample as those of four.
+    """
+    step, rows, loud, means = 2.0 * np.pi / 1024, np.arange(6000), 0, 0
+    paces = np.linspace(0.05, 12.03, 100)
+    for pace in paces:
+        theta = np.round(pace * rows + 0.013 * np.sin(0.003 * rows)) * step
+        noise = sensor_noise(theta, SENSORS, steady=True)
+        loud += 12.0 * (noise / step) ** 2 > 1.5
+        sensors = Sensors({"theta_mech_rad": noise}, angle_step_rad=step)
+        segment = replace(log(), recorded={"theta_mech_rad": theta}, sensors=sensors)
+        means += _by_encoder(segment, machine()).sensors.readings > 1
+    assert loud > 0.15 * paces.size
+    assert means <= 0.03 * paces.size
+
+
 def test_a_noisy_angle_has_no_step():
     theta = np.linspace(0.0, 9.0, 8000) + np.random.default_rng(2).normal(0.0, 1e-3, 8000)
     assert rounding_step(theta, SENSORS) == 0.0
