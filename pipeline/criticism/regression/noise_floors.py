@@ -18,6 +18,7 @@ from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
 from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.policy.sensors import SensorNoise
+from pipeline.criticism.regression.standstill import at_rest, at_reversals
 from pipeline.criticism.residuals.channels import (
     channel_of,
     channel_scale,
@@ -414,8 +415,8 @@ def _of_torque(segment: Segment, model: Model, values: Values) -> Array | float:
         total = _encoder_lines(segment, values, policy)
     if "standstill" in errors:
         x = operate(segment, segment.recorded, model, values)
-        total[:, 0] = np.hypot(total[:, 0], _at_rest(segment, model, values, x))
-        total[:, 0] = np.hypot(total[:, 0], _at_reversals(segment, model, values, x))
+        total[:, 0] = np.hypot(total[:, 0], at_rest(segment, model, values, x))
+        total[:, 0] = np.hypot(total[:, 0], at_reversals(segment, model, values, x))
     if "pulses" in errors:
         total[:, 0] = np.hypot(total[:, 0], _of_pulses(segment, model, values, x))
     if "current_jumps" in errors:
@@ -502,71 +503,6 @@ def _jumps(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array
     bend[bend < policy.jump * noise] = 0.0
     rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
     return policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
-
-
-def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
-    """Error [W] that friction may make where the shaft rests or creeps, as weak samples of torque.
-
-    Whatever the log says of its speed, a shaft that sticks is held by anything between plus and
-    minus its friction [Armstrong-Hélouvry (1991), ch. 4]: T/√3, a rectangle's standard deviation.
-    """
-    weak = segment.weak
-    if weak is None:
-        return np.zeros(segment.size)
-    policy = model.policy.noise_floors
-    slow = policy.creep * model.machine.scales["speed_rad_s"]
-    finer = x.theta_rad.size // segment.size
-    pace = np.abs(x.omega_rad_s[::finer])
-    rests = _lasting(pace < slow, round(policy.rest_s / x.ts_s))
-    creeping = np.flatnonzero(_with_neighbours(rests))
-    if creeping.size < 2:
-        return np.zeros(weak.starts.size)
-    resting = x.at(finer * creeping)
-    drag = frozenset({"torque"})
-    onward, back = (
-        evaluate(model, replace(resting, omega_rad_s=pace), values, drag).drag_nm
-        for pace in (np.full(creeping.size, speed) for speed in (slow, -slow))
-    )
-    grip = np.zeros(segment.size)
-    grip[creeping] = 0.5 * np.abs(onward - back) / math.sqrt(3.0)
-    return np.abs(weak.project(grip[None])[0, :, 0])
-
-
-def _at_reversals(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
-    """Error [W] of torque that reversals make, as weak samples: a log does not say when between two
-    samples the shaft turned back, and friction with it.
-    """
-    weak = segment.weak
-    if weak is None:
-        return np.zeros(segment.size)
-    finer = x.theta_rad.size // segment.size
-    pace = x.omega_rad_s[::finer]
-    back = np.flatnonzero(pace[1:] * pace[:-1] < 0.0)
-    change = np.zeros(segment.size)
-    if back.size:
-        beside = x.at(finer * np.concatenate([back, back + 1]))
-        drag_nm = evaluate(model, beside, values, frozenset({"torque"})).drag_nm
-        change[back] = drag_nm[back.size :] - drag_nm[: back.size]
-    rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
-    share = model.policy.noise_floors.reversal_periods
-    return share * np.sqrt((change[rows] ** 2) @ (weak.functions[0, 0] ** 2))
-
-
-def _with_neighbours(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Some samples [n] and those beside them, whose speed is a difference across a rest's edge."""
-    beside = which.copy()
-    beside[1:] |= which[:-1]
-    beside[:-1] |= which[1:]
-    return beside
-
-
-def _lasting(which: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
-    """The samples [n] that are in a run of at least so many: a reversal on the way is no rest."""
-    edges = np.flatnonzero(np.diff(which.astype(np.int8), prepend=0, append=0))
-    lasting = np.zeros(which.size, dtype=bool)
-    for first, end in edges.reshape(-1, 2).tolist():
-        lasting[first:end] = end - first >= least
-    return lasting
 
 
 def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Array:

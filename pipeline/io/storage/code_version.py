@@ -35,6 +35,7 @@ DISTRIBUTIONS: Mapping[str, str] = {
     "google": "protobuf",
     "hydra": "hydra-core",
     "rerun": "rerun-sdk",
+    "rerun_bindings": "rerun-sdk",
     "yaml": "PyYAML",
 }
 """Distributions that bear another name than what is imported of them."""

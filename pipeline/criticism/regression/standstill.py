@@ -1,0 +1,114 @@
+"""What friction may do where a log does not show how the shaft moves: at rest, and turning back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.machine.model import Model, evaluate
+from pipeline.criticism.operating import Array, Operating, Values
+
+
+def at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
+    """Error of torque that friction may make where the shaft rests or creeps.
+
+    Parameters
+    ----------
+    segment
+        A log, whole.
+    model, values
+        What friction there is.
+    x
+        State of the machine.
+
+    Returns
+    -------
+    array [W]
+        [N·m], as weak samples.
+
+    Notes
+    -----
+    Whatever the log says of its speed, a shaft that sticks is held by anything between plus and
+    minus its friction: T/√3, a rectangle's standard deviation.
+
+    References
+    ----------
+    Armstrong-Hélouvry, Control of Machines with Friction (1991), ch. 4.
+
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros(segment.size)
+    policy = model.policy.noise_floors
+    slow = policy.creep * model.machine.scales["speed_rad_s"]
+    finer = x.theta_rad.size // segment.size
+    pace = np.abs(x.omega_rad_s[::finer])
+    rests = _lasting(pace < slow, round(policy.rest_s / x.ts_s))
+    creeping = np.flatnonzero(_with_neighbours(rests))
+    if creeping.size < 2:
+        return np.zeros(weak.starts.size)
+    resting = x.at(finer * creeping)
+    drag = frozenset({"torque"})
+    onward, back = (
+        evaluate(model, replace(resting, omega_rad_s=pace), values, drag).drag_nm
+        for pace in (np.full(creeping.size, speed) for speed in (slow, -slow))
+    )
+    grip = np.zeros(segment.size)
+    grip[creeping] = 0.5 * np.abs(onward - back) / math.sqrt(3.0)
+    return np.abs(weak.project(grip[None])[0, :, 0])
+
+
+def at_reversals(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
+    """Error of torque that reversals make: a log does not say when between two samples the shaft
+    turned back, and friction with it.
+
+    Parameters
+    ----------
+    segment
+        A log, whole.
+    model, values
+        What friction there is.
+    x
+        State of the machine.
+
+    Returns
+    -------
+    array [W]
+        [N·m], as weak samples.
+
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros(segment.size)
+    finer = x.theta_rad.size // segment.size
+    pace = x.omega_rad_s[::finer]
+    back = np.flatnonzero(pace[1:] * pace[:-1] < 0.0)
+    change = np.zeros(segment.size)
+    if back.size:
+        beside = x.at(finer * np.concatenate([back, back + 1]))
+        drag_nm = evaluate(model, beside, values, frozenset({"torque"})).drag_nm
+        change[back] = drag_nm[back.size :] - drag_nm[: back.size]
+    rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
+    share = model.policy.noise_floors.reversal_periods
+    return share * np.sqrt((change[rows] ** 2) @ (weak.functions[0, 0] ** 2))
+
+
+def _with_neighbours(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Some samples [n] and those beside them, whose speed is a difference across a rest's edge."""
+    beside = which.copy()
+    beside[1:] |= which[:-1]
+    beside[:-1] |= which[1:]
+    return beside
+
+
+def _lasting(which: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
+    """The samples [n] that are in a run of at least so many: a reversal on the way is no rest."""
+    edges = np.flatnonzero(np.diff(which.astype(np.int8), prepend=0, append=0))
+    lasting = np.zeros(which.size, dtype=bool)
+    for first, end in edges.reshape(-1, 2).tolist():
+        lasting[first:end] = end - first >= least
+    return lasting
