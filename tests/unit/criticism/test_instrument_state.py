@@ -72,6 +72,14 @@ def test_a_usual_offset_is_a_nuisance_and_a_large_one_a_name(times, named):
         assert fit.values["late_angle_s"] == pytest.approx(LATE_S, rel=0.3)
 
 
+def test_the_usual_offset_is_a_step_of_a_converter_of_twice_the_current():
+    """12 bits from minus to plus twice the largest current that was logged, here 16 A."""
+    priors = Model(machine(), ()).priors()
+    step_a = (2.0 * 16.0 + 2.0 * 16.0) / 2**12
+    for name in ("zero_alpha_a", "zero_beta_a"):
+        assert priors[name] == (0.0, pytest.approx(step_a, rel=0.05))
+
+
 @pytest.mark.parametrize(("late_s", "told"), [(4e-6, False), (2e-5, True)])
 def test_an_encoder_that_is_read_late_is_no_name_and_told_where_it_is_far_off(late_s, told):
     motor = replace(design("gimbal-5208"), effects={})

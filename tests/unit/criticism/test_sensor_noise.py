@@ -202,6 +202,31 @@ def test_a_rounded_angle_is_as_loud_in_each_window_as_its_pace_makes_it():
     assert np.mean(power / floor**2) == pytest.approx(1.0, abs=0.3)
 
 
+def test_an_angle_that_hides_its_pace_is_as_loud_as_what_it_may_hide():
+    """One step a sample, all along: the rounded angle is a straight line wherever it begins. The
+    shaft may have been a step a window faster or slower, and its rounding then creeps.
+    """
+    step, even = 2.0 * np.pi / 4096, log()
+    group, _, valid, groups = row_index(even)
+    mine = group[valid] == groups.index(("torque_shaft_nm", 0))
+    model, rows = Model(machine(), ()), np.arange(even.size)
+
+    def weak(theta):
+        recorded = {**even.recorded, "theta_mech_rad": theta}
+        return projected(even, residual(even, model, BASE, recorded))[valid][mine]
+
+    power, random = np.zeros(mine.sum()), np.random.default_rng(8)
+    for _ in range(60):
+        pace = 1.0 + random.uniform(-1.0, 1.0) / even.weak.length
+        exact = pace * rows + random.uniform(0.0, 1.0)
+        power += (weak(step * np.round(exact)) - weak(step * exact)) ** 2 / 60.0
+    quiet = dict.fromkeys(even.sensors.noise, 0.0)
+    locked = {**even.recorded, "theta_mech_rad": step * rows}
+    segment = replace(even, recorded=locked, sensors=Sensors(quiet, angle_step_rad=step))
+    floor = noise_floor(segment, model, BASE, 1)[mine]
+    assert np.sqrt(np.mean(floor**2) / np.mean(power)) == pytest.approx(1.0, abs=0.3)
+
+
 def test_smoothing_keeps_a_parabola_to_both_ends_and_takes_the_steps_of_its_rounding():
     t = np.linspace(-1.0, 2.0, 1500)
     bent, step = 3.0 * t**2 - t, 0.01
