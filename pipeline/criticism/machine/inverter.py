@@ -264,7 +264,7 @@ def _switching(x: Operating, eps_rad: Array) -> tuple[_Slopes, Array, Array | No
 
 def _falling(rows: Array) -> Array:
     """Three numbers [3, n] of each sample, the largest first: a sort along so short an axis takes
-    forty times as long.
+    two to ten times as long.
     """
     upper, lower = np.maximum(rows[0], rows[1]), np.minimum(rows[0], rows[1])
     middle = np.maximum(lower, np.minimum(upper, rows[2]))
