@@ -22,7 +22,7 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import HeldOut, over_floor
+from pipeline.criticism.regression.goodness import HeldOut, of_motor, over_floor
 from pipeline.criticism.regression.identifiability import against_stated, reported_combinations
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import hum_notes
@@ -318,7 +318,8 @@ def _verdict_of(end: SearchResult, not_excited: Sequence[Unexcited]) -> Verdict:
     """The verdict at the end of the ladder; `not_excited` are effects that nothing shows."""
     if end.freed or (end.remainders and not end.ladder.explains(end.remainders)):
         return "unknown"
-    if end.ladder.steps[-1].added:
+    last = end.ladder.steps[-1]
+    if any(of_motor(last.system, name) for name in last.added):
         return "missing"
     return "insufficient" if not_excited else "adequate"
 

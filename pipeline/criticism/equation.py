@@ -48,6 +48,9 @@ class Channel:
     offset
         What a sensor may be off by in a whole capture: a share of its noise, the zero of a bench
         voltmeter as well, or nothing.
+    counts
+        Whether the motor answers for an error in it: not for one of a column that another overrules
+        (contract: where the angle is there, the angle counts).
 
     """
 
@@ -58,6 +61,7 @@ class Channel:
     acceleration: bool = False
     as_torque: bool = False
     offset: Literal["noise", "voltmeter", "none"] = "noise"
+    counts: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,14 +132,17 @@ def headline(result: Diagnosis) -> str:
     names = [ranked[name].headline or name for name in result.missing if name in ranked]
     missing = f"{sentence(_listed(names))}. {_fall(result)}" if names else ""
     if result.verdict == "insufficient":
-        return "The captures do not decide it; what to record is named below."
+        undecided = "The captures do not decide it; what to record is named below."
+        return f"{missing} {undecided}".strip()
     if result.verdict == "unknown":
         one = result.unknown
         shown = "" if one is None else f": {in_words(one.shape).replace(': ', ', ', 1)}"
         return f"{missing} Something is missing that no known effect explains{shown}.".strip()
     if result.verdict == "adequate":
         floors = f", to {number(result.ladder[-1].held_out)} noise floors" if result.ladder else ""
-        return f"The model explains these captures down to the noise{floors}; nothing is missing."
+        more = "nothing else" if names else "nothing"
+        explained = f"The model explains these captures down to the noise{floors}"
+        return f"{missing} {explained}; {more} is missing.".strip()
     return missing
 
 

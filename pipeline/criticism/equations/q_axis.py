@@ -41,7 +41,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     -----
     The d current is taken as zero, which is what a drive that logs the q axis alone controls it to.
     With an angle, the voltage is predicted from its speed, and the drive's own speed, which comes
-    late, is compared with it; `sample_delay` is how late.
+    late, is compared with it; `sample_delay` is how late. The motor has no part in that.
 
     """
     log = None if capture.has(*_BOTH_AXES) else drive_log(capture, machine)
@@ -139,7 +139,7 @@ EQUATION = Equation(
     words="v_q = Im(R i + drops + dψ/dt + j ω_e ψ)",
     tests=("drive", "heat_run"),
     columns=("t_s", "vq_v", "iq_a"),
-    channels=(Channel("vq_v", "voltage_v"), Channel(SPEED, "speed_rad_s")),
+    channels=(Channel("vq_v", "voltage_v"), Channel(SPEED, "speed_rad_s", counts=False)),
     cut=cut,
     state=state,
     measured=measured,

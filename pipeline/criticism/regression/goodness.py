@@ -322,6 +322,27 @@ def over_floor(system: LinearSystem, large: bool = False) -> tuple[Remainder, ..
     )
 
 
+def of_motor(system: LinearSystem, name: str) -> bool:
+    """Whether an effect of a fit moves a signal that counts: the motor's, or its station's.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    name
+        The effect.
+
+    """
+    columns = [
+        place
+        for place in system.model_columns
+        if system.columns[place].name.partition(".")[0] == name
+    ]
+    moves = np.any(system.matrix[:, columns] != 0.0, axis=1)
+    counts = [channel_of(system.segments[n], channel).counts for n, channel, _ in system.labels]
+    return bool((moves & np.array(counts)[system.group]).any())
+
+
 def significant_groups(system: LinearSystem) -> NDArray[np.bool_]:
     """Groups that a fit leaves over their floor, as `remainder` judges it.
 
@@ -434,9 +455,12 @@ def material_size(segment: Segment, channel: str, fit: Fit, large: bool = False)
     Notes
     -----
     Of a log at standstill the machine's own voltage is no measure: all of it is R times current.
+    In a column that does not count no error is the motor's.
 
     """
     observed, policy = channel_of(segment, channel), fit.policy.goodness
+    if not observed.counts:
+        return math.inf
     scale = channel_scale(segment, channel, fit.model.machine, fit.values)
     size = (policy.material if observed.scale else policy.material_bench) * scale
     if observed.scale and observed.beside and not large:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import polars as pl
 import pytest
+from scipy.signal import lfilter, lfiltic
 
 from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.diagnosis import diagnose
@@ -22,6 +24,7 @@ from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.design import EXACT, Bench
 from pipeline.simulator.truth import truth
+from pipeline.views.ladder import headline
 from tests.simulated import campaign_of, design
 from tests.unit.criticism.machines import BASE, operating
 
@@ -37,8 +40,10 @@ PLAN = (
 )
 
 
-def telemetry(capture: Capture, late: float) -> Capture:
-    """Of a drive's log every tenth row: q voltages as means around it, a speed `late` rows late."""
+def telemetry(capture: Capture, late: float, low_pass: float) -> Capture:
+    """Of a drive's log every tenth row: q voltages as means around it, a speed `late` rows late and
+    behind a low-pass of so many rows.
+    """
     if capture.meta.test != "drive":
         return capture
     (table,) = capture.tables
@@ -51,14 +56,18 @@ def telemetry(capture: Capture, late: float) -> Capture:
     slow["vq_v"] = np.convolve(table["vq_v"].to_numpy(), mean, "same")[at]
     theta, back = table["theta_mech_rad"].to_numpy(), round(late * EVERY)
     speed = (theta[at - back + half] - theta[at - back - half]) / PERIOD_S
+    stays = math.exp(-1.0 / low_pass) if low_pass else 0.0
+    at_once = lfiltic([1.0 - stays], [1.0, -stays], speed[:1])
+    speed = lfilter([1.0 - stays], [1.0, -stays], speed, zi=at_once)[0]
     slow["omega_mech_rad_s"] = np.round(speed, 3)
     meta = replace(capture.meta, voltage_timing="centred", pwm_hz=1e4)
     return replace(capture, tables=(pl.DataFrame(slow),), meta=meta)
 
 
-def recorded(late: float, seed: int = 3) -> Campaign:
+def recorded(late: float, low_pass: float = 0.0, seed: int = 3) -> Campaign:
     whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), seed, PLAN))
-    return replace(whole, captures=tuple(telemetry(one, late) for one in whole.captures))
+    captures = tuple(telemetry(one, late, low_pass) for one in whole.captures)
+    return replace(whole, captures=captures)
 
 
 def test_the_back_emf_follows_the_angle_where_a_drives_own_speed_is_late() -> None:
@@ -82,6 +91,18 @@ def test_a_speed_of_three_periods_ago_is_named_with_its_delay() -> None:
     found = result.ranking[0].parameters
     assert found["delay_s"][0] == pytest.approx(3.0 * PERIOD_S, rel=0.02)
     assert found["of_speed"][0] == 1.0
+
+
+@pytest.mark.parametrize("low_pass", [0.0, 25.0])
+def test_no_fault_of_its_own_speed_is_the_motors_where_the_angle_counts(low_pass: float) -> None:
+    """A delay is named and a long low-pass is not; neither decides what the motor lacks."""
+    result = diagnose(recorded(3.0, low_pass), ModelSpec(), Constants())
+    assert result.verdict == "insufficient"
+    assert result.ladder[0].held_out > 1.5
+    assert set(result.missing) <= {"sample_delay"}
+    assert not any(one.matters for one in result.remainder)
+    assert headline(result).endswith("what to record is named below.")
+    assert ("off in time" in headline(result)) == bool(result.missing)
 
 
 def test_a_period_of_a_late_speed_is_in_its_floor_and_in_no_other() -> None:
