@@ -25,6 +25,12 @@ from pipeline.estimation.uncertainty.instruments import (
 )
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import Plateau, find_plateaus
+from pipeline.numerics.quantisation import (
+    noise_after_rounding,
+    noise_before_rounding,
+    resolution,
+    rounding_rms,
+)
 from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import OHMMETER, of_ohmmeter
 from pipeline.records.capture import Array, Campaign, Capture, CaptureMeta
@@ -55,6 +61,8 @@ class Point:
         Metadata of the capture.
     temp_logged
         Whether the temperature was recorded and not assumed.
+    u_temp_k
+        Standard error of the mean temperature by noise and rounding; 0 where it was not logged.
 
     """
 
@@ -67,6 +75,7 @@ class Point:
     u_i: float
     meta: CaptureMeta
     temp_logged: bool = True
+    u_temp_k: float = 0.0
 
     @property
     def temperature_source(self) -> str:
@@ -177,7 +186,9 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> Ite
     columns = pair_signals(capture, pair, *((column,) if column else ()))
     temps = np.full(columns["t_s"].size, temp_degc)
     logged = column is not None and bool(np.isfinite(columns[column]).any())
+    readings = temps
     if column is not None and logged:
+        readings = capture.arrays(column)[column]
         temps = bridged(columns["t_s"], columns[column])
     for plateau in _settled(capture, columns["i_a"]):
         v, i = columns["v_v"][plateau.rows], columns["i_a"][plateau.rows]
@@ -188,7 +199,8 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> Ite
             continue
         means = (float(v.mean()) - rising, float(i.mean()))
         errors = (math.hypot(errors[0], rising / math.sqrt(3.0)), errors[1])
-        yield Point(index, pair, *means, temp, *errors, capture.meta, logged)
+        u_temp_k = _error_of_temperature(readings, plateau.size / temps.size) if logged else 0.0
+        yield Point(index, pair, *means, temp, *errors, capture.meta, logged, u_temp_k)
 
 
 def _captures(campaign: Campaign) -> tuple[Capture, ...]:
@@ -247,6 +259,16 @@ def uncertainties_of(points: Sequence[Point], captures: Sequence[Capture]) -> di
 def _standard_error(samples: Array) -> float:
     scatter = float(samples.std(ddof=1))
     return scatter * math.sqrt(autocorrelation_time(samples) / samples.size)
+
+
+def _error_of_temperature(readings: Array, share: float) -> float:
+    """Standard error [K] of the mean temperature over a share [1] of the capture, by the noise and
+    the steps of the thermometer's own readings: a slow one has a part of a reading there.
+    """
+    step = resolution(readings)
+    noise = noise_after_rounding(readings, step)
+    rounding = rounding_rms(step, noise_before_rounding(noise, step))
+    return math.hypot(noise / math.sqrt(share * np.isfinite(readings).sum()), rounding)
 
 
 def shifted(points: Sequence[Point], shift: Shift) -> list[Point]:

@@ -173,9 +173,10 @@ def fit_direct_current(
 
     Notes
     -----
-    Weights from both standard errors, u² = u_V² + (R u_I)² (York 1966, for errors small against
-    the span). The covariance holds the scatter alone, widened where the points scatter more than
-    their own noise explains (Birge 1932); the prior's share is for the caller to add.
+    Weights from all standard errors, u² = u_V² + (R u_I)² + (α V u_T)² (York 1966, for errors
+    small against the span). The covariance holds the scatter alone, widened where the points
+    scatter more than their own noise explains (Birge 1932); the prior's share is for the caller to
+    add.
 
     References
     ----------
@@ -187,7 +188,7 @@ def fit_direct_current(
     alpha = prior
     width = columns.size + 1
     v = np.array([p.v_v for p in points])
-    sigma = np.array([_noise_v(p) for p in points])
+    sigma = np.array([_noise_v(p, prior) for p in points])
     for _ in range(4):
         design = np.array([terminal_voltage(p, columns, alpha) for p in points])
         rows = np.vstack([design, np.eye(1, width, width - 1)])
@@ -214,9 +215,10 @@ def fit_direct_current(
     )
 
 
-def _noise_v(p: Point) -> float:
+def _noise_v(p: Point, alpha_1_k: float) -> float:
     # No meter resolves more than a millionth; a smaller weight lets rounding outweigh the prior.
-    return max(math.hypot(p.u_v, p.v_v / p.i_a * p.u_i), 1e-12 + 1e-6 * abs(p.v_v))
+    noise_v = math.hypot(p.u_v, p.v_v / p.i_a * p.u_i, alpha_1_k * p.v_v * p.u_temp_k)
+    return max(noise_v, 1e-12 + 1e-6 * abs(p.v_v))
 
 
 def _birge(normalised: Array, dof: int) -> float:

@@ -16,6 +16,7 @@ from pipeline.estimation.estimators import (
 )
 from pipeline.estimation.registry import fit_all
 from pipeline.records.capture import Campaign
+from tests.recovery.simulated import BENCH, recorded
 from tests.unit.estimation.signals import capture, estimates, near
 
 
@@ -123,6 +124,20 @@ def test_scatter_between_plateaus_has_the_plateaus_freedom(contact_v, dof):
     table = whole.tables[0].with_columns(pl.col("vab_v") + np.repeat(jitter, 200))
     found = estimates(resistance.ESTIMATOR, replace(whole, tables=(table,)))["r_ab_ohm"]
     assert next(p.dof for p in found.budget if p.source == "scatter:resistance:r_ab_ohm") == dof
+
+
+@pytest.mark.parametrize("temperature_hz", [None, 10.0])
+def test_a_noisy_thermometer_makes_no_imbalance(temperature_hz):
+    """Nine motors of equal phases, 0.1 K of noise: their imbalance is of the size of its u."""
+    quiet = {"voltage_noise_rel": 1e-5, "current_noise_rel": 1e-5, "temperature_noise_degc": 0.1}
+    bench = replace(BENCH, **quiet, temperature_hz=temperature_hz)
+    plan = [(f"r_{pair}", "resistance", {"pair": pair}) for pair in PAIRS]
+    found = []
+    for seed in range(9):
+        campaign = recorded(plan, seed, bench=bench)[0]
+        found.append(estimates(resistance.ESTIMATOR, *campaign.captures)["resistance_imbalance"])
+    mean_square = np.mean([(e.number / e.u) ** 2 for e in found])
+    assert 0.3 < mean_square < 2.0
 
 
 def test_no_plateau_names_the_experiment():
