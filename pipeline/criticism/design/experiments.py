@@ -23,7 +23,8 @@ from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.linearise import linearise
-from pipeline.criticism.regression.noise_floors import Floor, noise_floor
+from pipeline.criticism.regression.noise_floors import Floor
+from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.selection.score_test import Candidate, placed
 from pipeline.records.diagnosis import Separation
 

@@ -105,6 +105,15 @@ class NoiseFloors:
         16, "1", "shifts at which a coarse signal is rounded anew, at the least",
         why="all its rounding can do depends on the shift",
     )  # fmt: skip
+    few: int = chosen(
+        4, "1", "times that noise and rounding are added where only a ratio is asked for",
+        why="the same noise is in both; four shifts of a rounding tell whether it matters",
+    )  # fmt: skip
+    unseen: float = chosen(
+        0.01, "1", "variance of an angle's rounding over that of noise, to which all windows are "
+        "taken to have the same",
+        why="it adds half a per cent to a floor, and ten times as much where it creeps",
+    )  # fmt: skip
     reading: float = chosen(
         5e-5, "1", "error of a reading that no sensor is better than",
         why="smaller, and structure of no concern names effects; larger, and effects hide",

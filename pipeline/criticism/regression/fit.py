@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.segment import Segment, row_index
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.operating import Array, Values
@@ -15,7 +15,8 @@ from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.columns import Column
-from pipeline.criticism.regression.noise_floors import Floor, form_tolerance, noise_floor
+from pipeline.criticism.regression.noise_floors import Floor, form_tolerance
+from pipeline.criticism.regression.noise_propagation import noise_floor, noise_growth
 from pipeline.criticism.regression.parallel import on_each
 
 _SEED = 20260302
@@ -178,16 +179,16 @@ def floors_grown(fit: Fit) -> tuple[Array, ...]:
         Ratios [1]; the same noise is added in both, and 1 where there are no currents.
 
     """
-    arguments = fit.model, fit.values
-    by_segment = [(*arguments, sigma, _SEED + n) for n, sigma in enumerate(fit.sigma)]
-    return on_each(_floor_grown, fit.segments, by_segment)
+    seeds = range(_SEED, _SEED + len(fit.segments))
+    arguments = [(fit.model, fit.values, fit.near, seed) for seed in seeds]
+    return on_each(_floor_grown, fit.segments, arguments)
 
 
-def _floor_grown(segment: Segment, model: Model, values: Values, sigma: Array, seed: int) -> Array:
+def _floor_grown(segment: Segment, model: Model, values: Values, near: Values, seed: int) -> Array:
     """One but where there are currents, whose noise is in the equations times what is fitted."""
     if _CURRENTS.isdisjoint(segment.recorded):
-        return np.ones(sigma.size)
-    return noise_floor(segment, model, values, seed) / sigma
+        return np.ones(np.count_nonzero(row_index(segment)[2]))
+    return noise_growth(segment, model, values, near, seed)
 
 
 def tolerances(fit: Fit, added: Sequence[Effect]) -> tuple[Array, ...]:

@@ -1,23 +1,20 @@
-"""What no model of a bench gets right to: noise of the sensors, reading errors, offsets, form."""
+"""What no model of a bench gets right to: reading errors, offsets, form, beside sensors' noise."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import UNSMOOTHED, Segment, projected, row_index
-from pipeline.criticism.data.sensor_noise import rounding_error, smoothed, unrounded
-from pipeline.criticism.data.traces import parabolas
+from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
-from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
+from pipeline.criticism.operating import Array, Complex, Operating, Values
 from pipeline.criticism.policy.regression import NoiseFloors
-from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.criticism.regression.standstill import at_rest, at_reversals
 from pipeline.criticism.residuals.channels import (
     channel_of,
@@ -73,179 +70,6 @@ class Floor:
         if self.tolerance is None:
             return noise, noise
         return noise, np.hypot(noise, self.tolerance[group])
-
-
-def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
-    """What the sensors' noise alone makes of the weak residual.
-
-    Parameters
-    ----------
-    segment
-        With the noise and steps of its columns.
-    model, values
-        At which the residual is computed.
-    seed
-        Of the noise.
-
-    Returns
-    -------
-    array [R]
-        Standard deviation of each weak sample.
-
-    Notes
-    -----
-    Noise is added to the recording and the residual computed again; the variance of the change is
-    pooled over the windows of a (channel, order). The noise is white, of each sensor's own level;
-    of an angle that is an integrated speed it is a random walk, from anywhere in the turn: what a
-    model has that goes with the angle is noise there. Signals that are coarse are rounded anew. The
-    noise of an angle that was smoothed is smoothed alike: what is slow in it stays as it was. What
-    the smoothing changes in the residual counts too: it may have been noise or motion. An angle
-    that is rounded is rounded anew as well (`_of_rounding`).
-
-    """
-    policy = model.policy.noise_floors
-    group, _, valid, groups = row_index(segment)
-    group = group[valid]
-    count = np.maximum(np.bincount(group, minlength=len(groups)), 1)
-
-    def weak_residual(recorded: Signals | None = None) -> Array:
-        return projected(segment, residual(segment, model, values, recorded))[valid]
-
-    def pooled(change: Array) -> Array:
-        return np.bincount(group, change**2, len(groups)) / count
-
-    unperturbed = weak_residual()
-    replicate_count = policy.pooled // max(unperturbed.size // max(len(groups), 1), 1)
-    replicates = min(max(replicate_count, policy.replicates), policy.pooled)
-    steps = segment.sensors.steps
-    if steps:
-        replicates = max(replicates, policy.shifts)
-    shifts = _shifts(segment, replicates, seed)
-    even = _before_rounding(segment, model.policy.sensor_noise)
-    variance = np.zeros(len(groups))
-    for replicate in range(replicates):
-        shift = {name: shifts[name][replicate] for name in steps}
-        noisy = _noisy(segment, even, shift, np.random.default_rng([seed, replicate]))
-        variance += pooled(weak_residual(noisy) - unperturbed) / replicates
-    if UNSMOOTHED in segment.recorded:
-        rough = {**segment.recorded, "theta_mech_rad": segment.recorded[UNSMOOTHED]}
-        variance += pooled(weak_residual(rough) - unperturbed)
-    of_rows: Array = variance[group]
-    if segment.sensors.angle_step_rad:
-        of_rows = of_rows + _of_rounding(segment, even["theta_mech_rad"], weak_residual, policy)
-    return np.sqrt(of_rows) + 1e-300
-
-
-def _of_rounding(
-    segment: Segment,
-    even_rad: Array,
-    weak_residual: Callable[[Signals], Array],
-    policy: NoiseFloors,
-) -> Array:
-    """Variance [R] that the rounding of an angle makes of the weak residual.
-
-    It is each window's own: where the shaft turns by nearly whole steps from sample to sample, the
-    error creeps instead of jumping about, and none of it averages out [Widrow & Kollar (2008), ch.
-    20]. A rounded angle shows neither where between two steps it began nor, to a step a window, how
-    fast it was: both are spread evenly.
-    """
-    sensors, weak = segment.sensors, segment.weak
-    theta, unperturbed = segment.recorded["theta_mech_rad"], weak_residual(segment.recorded)
-    spread = (np.arange(policy.shifts) + 0.5) / policy.shifts - 0.5
-    ramp = np.arange(theta.size) / (theta.size if weak is None else weak.length)
-    paces = 2.0 * np.random.default_rng(policy.shifts).permutation(spread)
-    variance = np.zeros(unperturbed.size)
-    for shift, pace in zip(spread, paces, strict=True):
-        error = _readings_error(
-            even_rad, sensors.angle_step_rad or 0.0, sensors.readings, shift + pace * ramp
-        )
-        moved = theta + parabolas(error, sensors.parabola)
-        change = weak_residual({**segment.recorded, "theta_mech_rad": moved}) - unperturbed
-        variance += change**2 / policy.shifts
-    return variance
-
-
-def _noisy(
-    segment: Segment,
-    even: Mapping[str, Array],
-    shift: Mapping[str, float],
-    generator: np.random.Generator,
-) -> dict[str, Array]:
-    """The recorded columns with other noise of their sensors, except for the rounding of an angle.
-
-    `even` are those that are rounded anew, as they were before; `shift` the part of a step by which
-    coarse signals are moved.
-    """
-    sensors = segment.sensors
-    noisy = {
-        name: column + _smoothed(segment, name, generator.normal(size=column.size))
-        for name, column in segment.recorded.items()
-    }
-    if sensors.speed_noise_rad_s is not None:
-        noisy["theta_mech_rad"] += generator.uniform(0.0, 2.0 * math.pi)
-    for name, step in sensors.steps.items():
-        noisy[name] += rounding_error(even[name], step, shift[name])
-    if sensors.angle_step_rad:
-        noisy["theta_mech_rad"] = segment.recorded["theta_mech_rad"]
-    return noisy
-
-
-def _readings_error(even_rad: Array, step_rad: float, readings: int, shift: Array | float) -> Array:
-    """Error [n, rad] of samples that are means of readings in steps of `readings` times their own,
-    taken evenly over the sample as the shaft turns.
-    """
-    turned, coarse = np.gradient(even_rad), readings * step_rad
-    places = (np.arange(readings) + 0.5) / readings - 0.5
-    errors = [rounding_error(even_rad + place * turned, coarse, shift) for place in places]
-    return np.mean(errors, axis=0)
-
-
-def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
-    """Coarse signals and a rounded angle as they may have been before they were rounded; an angle
-    that was smoothed stays as it is.
-    """
-    sensors = segment.sensors
-    even = {
-        name: smoothed(unrounded(segment.recorded[name], step), step, policy)
-        for name, step in sensors.steps.items()
-    }
-    if sensors.angle_step_rad:
-        theta = segment.recorded["theta_mech_rad"]
-        rough = sensors.parabola == 1
-        even["theta_mech_rad"] = smoothed(theta, sensors.angle_step_rad, policy) if rough else theta
-    return even
-
-
-def _smoothed(segment: Segment, name: str, normal: Array) -> Array:
-    """Noise of a column from standard normal numbers [n]; that of a smoothed angle is smoothed, and
-    that of an integrated speed is a random walk.
-    """
-    width = segment.sensors.parabola if name == "theta_mech_rad" else 1
-    speed_noise = segment.sensors.speed_noise_rad_s
-    if name == "theta_mech_rad" and speed_noise is not None:
-        walk = speed_noise * segment.ts_s * np.cumsum(normal)
-        return walk if width == 1 else parabolas(walk, width)
-    if width == 1:
-        return _white(segment, name) * normal
-    smooth = parabolas(normal, width)
-    return _white(segment, name) / math.sqrt(2.25 / width) * smooth
-
-
-def _white(segment: Segment, name: str) -> float:
-    """Standard deviation of a column's noise, without the rounding that follows the signal."""
-    rounding = segment.sensors.steps.get(name, 0.0) / math.sqrt(12.0)
-    return math.sqrt(max(segment.sensors.noise.get(name, 0.0) ** 2 - rounding**2, 0.0))
-
-
-def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:
-    """Parts of a step [count] by which coarse signals are moved to be rounded anew.
-
-    They are evenly spread, since the error of a steady signal depends on the shift alone, and every
-    signal has them in an order of its own.
-    """
-    even = (np.arange(count) + 0.5) / count - 0.5
-    generator = np.random.default_rng([seed, count])
-    return {name: generator.permutation(even) for name in segment.sensors.steps}
 
 
 def rough_floor(segment: Segment, model: Model, values: Values) -> Array:

@@ -17,7 +17,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors
-from pipeline.criticism.regression.noise_floors import noise_floor
+from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.score_test import candidates, widened
 from tests.unit.criticism.machines import BASE, log, machine

@@ -13,7 +13,8 @@ from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
-from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error
+from pipeline.criticism.regression.noise_floors import Floor, reading_error
+from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.regression.normal_equations import Prior
 from tests.unit.criticism.machines import BASE, log, machine
 

@@ -11,7 +11,8 @@ from pipeline.criticism.data.segment import Instrument, Sensors
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.linearise import absorb, linearise
 from pipeline.criticism.regression.mains_hum import Hum, hum_notes, hum_of, with_hum
-from pipeline.criticism.regression.noise_floors import Floor, noise_floor
+from pipeline.criticism.regression.noise_floors import Floor
+from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine
 

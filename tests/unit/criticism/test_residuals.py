@@ -15,7 +15,8 @@ from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.linearise import linearise
-from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error
+from pipeline.criticism.regression.noise_floors import Floor, reading_error
+from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.signals.shaft import averaged
 from pipeline.criticism.signals.true_state import finer_of

@@ -21,7 +21,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.criticism.regression.noise_floors import _readings_error, noise_floor
+from pipeline.criticism.regression.noise_propagation import _readings_error, noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import _by_encoder
 from pipeline.criticism.selection.stepwise import _floor_factors
@@ -253,3 +253,35 @@ def test_noise_of_a_current_counts_by_the_constants_that_it_goes_through():
     factors = _floor_factors(system)
     assert factors.min() >= 1.0 - 1e-9
     assert 1.2 < factors[volts].max() <= 4.0 + 1e-9
+
+
+def _of_an_encoder(step, noise):
+    """A drive's log whose angle is in steps, beside so much noise of its other columns."""
+    even = log()
+    noise = {**dict.fromkeys(even.sensors.noise, noise), "theta_mech_rad": 0.0}
+    theta = step * np.round(even.recorded["theta_mech_rad"] / step)
+    recorded = {**even.recorded, "theta_mech_rad": theta}
+    return replace(even, recorded=recorded, sensors=Sensors(noise, angle_step_rad=step))
+
+
+def test_a_rounding_below_the_noise_is_pooled_and_changes_no_floor():
+    segment, plain = _of_an_encoder(2.0 * np.pi / 2**20, 0.1), Model(machine(), ())
+    group, _, valid, groups = row_index(segment)
+    mine = group[valid] == groups.index(("torque_shaft_nm", 0))
+    each = replace(DEFAULT, noise_floors=replace(DEFAULT.noise_floors, unseen=0.0))
+    pooled, exact = (
+        noise_floor(segment, m, BASE, 1)[mine]
+        for m in (plain, Model(replace(machine(), policy=each), ()))
+    )
+    assert np.ptp(pooled) == 0.0 < np.ptp(exact)
+    assert pooled == pytest.approx(exact, rel=0.01)
+
+
+def test_a_rounding_counts_by_the_inertia_that_it_goes_through():
+    """Halved J halves what the steps of an angle do to a torque."""
+    segment, model = _of_an_encoder(2.0 * np.pi / 4096, 0.0), Model(machine(), ())
+    lighter = {**BASE, "j_kgm2": 0.5 * BASE["j_kgm2"], "psi_wb": 0.5 * BASE["psi_wb"]}
+    fit = Fit((segment,), model, lighter, floors((segment,), model, BASE), BASE)
+    group, _, valid, groups = row_index(segment)
+    torque = group[valid] == groups.index(("torque_shaft_nm", 0))
+    assert floors_grown(fit)[0][torque] == pytest.approx(0.5, rel=0.02)

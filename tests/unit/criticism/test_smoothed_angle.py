@@ -13,7 +13,7 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import BASE as CONSTANTS
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors
-from pipeline.criticism.regression.noise_floors import noise_floor
+from pipeline.criticism.regression.noise_propagation import noise_floor
 from tests.unit.criticism.machines import BASE, log, machine
 
 

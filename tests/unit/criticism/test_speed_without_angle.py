@@ -15,7 +15,8 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.noise_floors import noise_floor, window_gain
+from pipeline.criticism.regression.noise_floors import window_gain
+from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec

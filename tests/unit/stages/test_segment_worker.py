@@ -13,7 +13,8 @@ import pytest
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
-from pipeline.criticism.regression.noise_floors import form_tolerance, noise_floor
+from pipeline.criticism.regression.noise_floors import form_tolerance
+from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.regression.parallel import by_threads, in_order, on_each
 from pipeline.criticism.residuals.segments import segments
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool

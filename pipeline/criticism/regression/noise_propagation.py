@@ -1,0 +1,269 @@
+"""How the noise of sensors propagates into a residual: the floor of each weak sample."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import UNSMOOTHED, Segment, projected, row_index
+from pipeline.criticism.data.sensor_noise import rounding_error, smoothed, unrounded
+from pipeline.criticism.data.traces import parabolas
+from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.operating import Array, Signals, Values
+from pipeline.criticism.policy.sensors import SensorNoise
+from pipeline.criticism.residuals.residual import residual
+
+
+def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
+    """What the sensors' noise alone makes of the weak residual.
+
+    Parameters
+    ----------
+    segment
+        With the noise and steps of its columns.
+    model, values
+        At which the residual is computed.
+    seed
+        Of the noise.
+
+    Returns
+    -------
+    array [R]
+        Standard deviation of each weak sample.
+
+    Notes
+    -----
+    Noise is added to the recording and the residual computed again; the variance of the change is
+    pooled over the windows of a (channel, order). The noise is white, of each sensor's own level;
+    of an angle that is an integrated speed it is a random walk, from anywhere in the turn: what a
+    model has that goes with the angle is noise there. Signals that are coarse are rounded anew. The
+    noise of an angle that was smoothed is smoothed alike: what is slow in it stays as it was. What
+    the smoothing changes in the residual counts too: it may have been noise or motion. An angle
+    that is rounded is rounded anew as well (`_of_rounding`).
+
+    """
+    policy, recording = model.policy.noise_floors, _Recording.of(segment, model, values)
+    replicates = max(policy.replicates, min(policy.pooled // recording.windows, policy.pooled))
+    if segment.sensors.steps:
+        replicates = max(replicates, policy.shifts)
+    variance = recording.pooled(recording.changes(seed, replicates))
+    if UNSMOOTHED in segment.recorded:
+        rough = {**segment.recorded, "theta_mech_rad": segment.recorded[UNSMOOTHED]}
+        variance += recording.pooled([recording.change(rough)])
+    of_rows: Array = variance[recording.group]
+    if segment.sensors.angle_step_rad:
+        of_rows = of_rows + _of_rounding(recording, variance)
+    return np.sqrt(of_rows) + 1e-300
+
+
+def noise_growth(segment: Segment, model: Model, values: Values, near: Values, seed: int) -> Array:
+    """Noise floor of a segment over the one at other values.
+
+    Parameters
+    ----------
+    segment
+        With the noise and steps of its columns.
+    model, values
+        At which the residual is computed.
+    near
+        The other values; an effect without a value is not there.
+    seed
+        Of the noise.
+
+    Returns
+    -------
+    array [R]
+        Ratio [1], the same in each (channel, order). The same noise is added in both, so that a few
+        samples of it tell.
+
+    """
+    there = {name.partition(".")[0] for name in near}
+    model_near = model.without(*(e.name for e in model.effects if e.name not in there))
+    known = segment.cache.get("noise near")
+    if known is None or known[:3] != (model_near, near, seed):
+        before = _noise_of_few(segment, model_near, near, seed)
+        known = segment.cache["noise near"] = model_near, dict(near), seed, before
+    ratio: Array = np.sqrt(_noise_of_few(segment, model, values, seed) / known[3])
+    group, _, valid, _ = row_index(segment)
+    return ratio[group[valid]]
+
+
+def _noise_of_few(segment: Segment, model: Model, values: Values, seed: int) -> Array:
+    """Variance of the weak residual [groups] by a few samples of its noise and roundings."""
+    for effect in model.effects:
+        values = {**zero(effect, model), **values}
+    recording, few = _Recording.of(segment, model, values), model.policy.noise_floors.few
+    return recording.pooled([*recording.changes(seed, few), *recording.roundings(few)]) + 1e-300
+
+
+@dataclass(frozen=True, slots=True)
+class _Recording:
+    """A recording whose columns may be other by the noise of their sensors.
+
+    `even`: coarse columns as they were before they were rounded; `group` [R] of each weak sample,
+    `counts` of each group; `unperturbed` [R]: the weak residual as recorded.
+    """
+
+    segment: Segment
+    model: Model
+    values: Values
+    even: Mapping[str, Array]
+    group: NDArray[np.int64]
+    counts: Array
+    unperturbed: Array
+
+    @classmethod
+    def of(cls, segment: Segment, model: Model, values: Values) -> _Recording:
+        group, _, valid, groups = row_index(segment)
+        group = group[valid]
+        counts = np.maximum(np.bincount(group, minlength=len(groups)), 1).astype(float)
+        even = _before_rounding(segment, model.policy.sensor_noise)
+        unperturbed = projected(segment, residual(segment, model, values))[valid]
+        return cls(segment, model, values, even, group, counts, unperturbed)
+
+    @property
+    def windows(self) -> int:
+        """Weak samples of a group, on average."""
+        return max(self.unperturbed.size // max(self.counts.size, 1), 1)
+
+    def change(self, recorded: Signals) -> Array:
+        """What other columns make of the weak residual [R]."""
+        _, _, valid, _ = row_index(self.segment)
+        changed = residual(self.segment, self.model, self.values, recorded)
+        return projected(self.segment, changed)[valid] - self.unperturbed
+
+    def pooled(self, changes: Iterable[Array]) -> Array:
+        """Mean square [groups] of changes of the weak residual."""
+        means = [np.bincount(self.group, one**2, self.counts.size) / self.counts for one in changes]
+        return np.mean(means, axis=0) if means else np.zeros(self.counts.size)
+
+    def changes(self, seed: int, count: int) -> Iterator[Array]:
+        """Changes of the weak residual [R] by noise, but for the rounding of an angle."""
+        shifts = _shifts(self.segment, count, seed)
+        for replicate in range(count):
+            shift = {name: shifts[name][replicate] for name in self.segment.sensors.steps}
+            generator = np.random.default_rng([seed, replicate])
+            yield self.change(_noisy(self.segment, self.even, shift, generator))
+
+    def roundings(self, count: int) -> Iterator[Array]:
+        """Changes of the weak residual [R] by the rounding of an angle, none where it is not.
+
+        A rounded angle shows neither where between two steps it began nor, to a step a window, how
+        fast it was: both are spread evenly.
+        """
+        sensors, weak = self.segment.sensors, self.segment.weak
+        if not sensors.angle_step_rad:
+            return
+        theta, even = self.segment.recorded["theta_mech_rad"], self.even["theta_mech_rad"]
+        ramp = np.arange(theta.size) / (theta.size if weak is None else weak.length)
+        spread = (np.arange(count) + 0.5) / count - 0.5
+        paces = 2.0 * np.random.default_rng(count).permutation(spread)
+        for shift, pace in zip(spread, paces, strict=True):
+            error = _readings_error(
+                even, sensors.angle_step_rad, sensors.readings, shift + pace * ramp
+            )
+            moved_rad = theta + parabolas(error, sensors.parabola)
+            yield self.change({**self.segment.recorded, "theta_mech_rad": moved_rad})
+
+
+def _of_rounding(recording: _Recording, noise: Array) -> Array:
+    """Variance [R] that the rounding of an angle makes of the weak residual, beside that of the
+    `noise` [groups].
+
+    It is each window's own: where the shaft turns by nearly whole steps from sample to sample, the
+    error creeps instead of jumping about, and none of it averages out [Widrow & Kollar (2008), ch.
+    20]. Where a few roundings show next to nothing beside the noise, their mean will do.
+    """
+    policy = recording.model.policy.noise_floors
+    few = recording.pooled(recording.roundings(policy.few))
+    if np.all(few <= policy.unseen * noise):
+        return few[recording.group]
+    changes = recording.roundings(policy.shifts)
+    return np.mean([change**2 for change in changes], axis=0)
+
+
+def _noisy(
+    segment: Segment,
+    even: Mapping[str, Array],
+    shift: Mapping[str, float],
+    generator: np.random.Generator,
+) -> dict[str, Array]:
+    """The recorded columns with other noise of their sensors, except for the rounding of an angle.
+
+    `even` are those that are rounded anew, as they were before; `shift` the part of a step by which
+    coarse signals are moved.
+    """
+    sensors = segment.sensors
+    noisy = {
+        name: column + _smoothed(segment, name, generator.normal(size=column.size))
+        for name, column in segment.recorded.items()
+    }
+    if sensors.speed_noise_rad_s is not None:
+        noisy["theta_mech_rad"] += generator.uniform(0.0, 2.0 * math.pi)
+    for name, step in sensors.steps.items():
+        noisy[name] += rounding_error(even[name], step, shift[name])
+    if sensors.angle_step_rad:
+        noisy["theta_mech_rad"] = segment.recorded["theta_mech_rad"]
+    return noisy
+
+
+def _readings_error(even_rad: Array, step_rad: float, readings: int, shift: Array | float) -> Array:
+    """Error [n, rad] of samples that are means of readings in steps of `readings` times their own,
+    taken evenly over the sample as the shaft turns.
+    """
+    turned, coarse = np.gradient(even_rad), readings * step_rad
+    places = (np.arange(readings) + 0.5) / readings - 0.5
+    errors = [rounding_error(even_rad + place * turned, coarse, shift) for place in places]
+    return np.mean(errors, axis=0)
+
+
+def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
+    """Coarse signals and a rounded angle as they may have been before they were rounded; an angle
+    that was smoothed stays as it is.
+    """
+    sensors = segment.sensors
+    even = {
+        name: smoothed(unrounded(segment.recorded[name], step), step, policy)
+        for name, step in sensors.steps.items()
+    }
+    if sensors.angle_step_rad:
+        theta = segment.recorded["theta_mech_rad"]
+        rough = sensors.parabola == 1
+        even["theta_mech_rad"] = smoothed(theta, sensors.angle_step_rad, policy) if rough else theta
+    return even
+
+
+def _smoothed(segment: Segment, name: str, normal: Array) -> Array:
+    """Noise of a column from standard normal numbers [n]; that of a smoothed angle is smoothed, and
+    that of an integrated speed is a random walk.
+    """
+    width = segment.sensors.parabola if name == "theta_mech_rad" else 1
+    speed_noise = segment.sensors.speed_noise_rad_s
+    if name == "theta_mech_rad" and speed_noise is not None:
+        walk = speed_noise * segment.ts_s * np.cumsum(normal)
+        return walk if width == 1 else parabolas(walk, width)
+    if width == 1:
+        return _white(segment, name) * normal
+    smooth = parabolas(normal, width)
+    return _white(segment, name) / math.sqrt(2.25 / width) * smooth
+
+
+def _white(segment: Segment, name: str) -> float:
+    """Standard deviation of a column's noise, without the rounding that follows the signal."""
+    rounding = segment.sensors.steps.get(name, 0.0) / math.sqrt(12.0)
+    return math.sqrt(max(segment.sensors.noise.get(name, 0.0) ** 2 - rounding**2, 0.0))
+
+
+def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:
+    """Parts of a step [count] by which coarse signals are moved to be rounded anew.
+
+    They are evenly spread, since the error of a steady signal depends on the shift alone, and every
+    signal has them in an order of its own.
+    """
+    even = (np.arange(count) + 0.5) / count - 0.5
+    generator = np.random.default_rng([seed, count])
+    return {name: generator.permutation(even) for name in segment.sensors.steps}
