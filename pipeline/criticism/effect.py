@@ -161,6 +161,7 @@ class Evidence:
     `alternatives`: other effects, each with the test or calibration that discriminates it from
     this. `rare`: benches seldom have it, so that of two that tie the other is named. `in_place_of`:
     a nuisance, zero in a model with the effect, and the parameter that is it at an unusual size.
+    `friction`: with the other drags of the model it takes power from the shaft in either sense.
     """
 
     tests: tuple[str, ...]
@@ -168,6 +169,7 @@ class Evidence:
     signals: tuple[str, ...] = ()
     rare: bool = False
     in_place_of: tuple[str, str] | None = None
+    friction: bool = False
     alternatives: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -29,6 +29,7 @@ EFFECT = Effect(
         "constant_load": "several speeds in both senses, and a hold at rest: a load stays",
         "torque_offset": "coasts in both senses, which no transducer sees",
     },
+    friction=True,
     torque=_torque,
     headline="friction that differs by direction, by {coulomb_nm} and at the highest speed "
     "{viscous_nm} more",

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.effect_tables import at_rest, over_all_ranges
-from pipeline.criticism.machine.model import base_flux
+from pipeline.criticism.machine.model import Model, base_flux, evaluate, values_of
 from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.records.diagnosis import ReportedParameter
@@ -69,10 +69,54 @@ def friction_parts(
     }
 
 
+def drives(effect: Effect, model: Model, values: Values) -> bool:
+    """Whether an effect that is friction would push the shaft at some speed.
+
+    Parameters
+    ----------
+    effect
+        The effect; a load may drive, so one that is no `friction` is not looked at.
+    model, values
+        With the effect.
+
+    Returns
+    -------
+    bool
+        True where it differs between the senses by more than the drag that both have in common, its
+        negligible size beside.
+
+    Notes
+    -----
+    Friction has the sense of rotation. Its even part over speed is a difference between senses; its
+    odd part, with all other frictions, is their mean. Other even drags, such as a load or waves of
+    the angle, drop out of that mean.
+
+    """
+    if not effect.friction or effect.torque is None:
+        return False
+    machine = model.machine
+    speeds = _speeds(machine)
+    x = at_rest(
+        over_all_ranges(machine, values), 2 * _SPEEDS, omega_rad_s=np.append(speeds, -speeds)
+    )
+    drag = evaluate(model, x, values, frozenset({"torque"})).drag_nm
+    own = effect.torque(x, values_of(effect, machine, values))
+    mean = 0.5 * (drag[:_SPEEDS] - drag[_SPEEDS:])
+    difference = 0.5 * np.abs(own[:_SPEEDS] + own[_SPEEDS:])
+    negligible = [p.negligible * machine.scale(p) for p in effect.parameters_of(machine)]
+    return bool((difference - mean).max() > max(negligible))
+
+
+def _speeds(machine: Machine) -> Array:
+    """Speeds [n, rad/s], even up to the highest."""
+    highest: float = machine.scales["speed_rad_s"]
+    return highest * (np.arange(_SPEEDS) + 0.5) / _SPEEDS
+
+
 def _projected(effect: Effect, values: Values, machine: Machine) -> Array:
     """T_c [N·m] and b [N·m·s/rad] of the drag."""
     highest = machine.scales["speed_rad_s"]
-    speeds = highest * (np.arange(_SPEEDS) + 0.5) / _SPEEDS
+    speeds = _speeds(machine)
     x = at_rest(over_all_ranges(machine, _MAGNET_ALONE), _SPEEDS, omega_rad_s=speeds)
     x.psi_wb, x.torque_em_nm = base_flux(x, _MAGNET_ALONE), np.zeros(_SPEEDS)
     assert effect.torque is not None

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
+from pipeline.criticism.library.friction_parts import drives
 from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown, tolerances
@@ -217,7 +218,7 @@ def _refit_best(
 
     Each must pass all of:
 
-    1. it matters at its refitted size;
+    1. it matters at its refitted size, and as a friction drives the shaft in neither sense;
     2. the deviance falls by more than its penalty;
     3. predicted from all other captures, it falls by `held_out_penalties`, even if the forms of
        effects `added` with the same hook are a little wrong (`form_error`);
@@ -362,8 +363,7 @@ def _is_determined(system: LinearSystem, before: LinearSystem) -> bool:
 
 def _same_hook(effect: Effect, added: Sequence[Effect]) -> list[Effect]:
     """The found effects that act where an effect does: fluxes and drops in voltages, or drags."""
-    voltage = ("flux", "drop")
-    acts = voltage if effect.hook in voltage else (effect.hook,)
+    acts = ("flux", "drop") if effect.hook in ("flux", "drop") else (effect.hook,)
     return [other for other in added if other.hook in acts and effect.hook != "sensor"]
 
 
@@ -503,7 +503,7 @@ def material(fit: Fit, effect: Effect) -> bool:
 
 
 def shaped(fit: Fit, effect: Effect) -> bool:
-    """Whether every shape of an effect is over its negligible size.
+    """Whether every shape of an effect is over its negligible size, and a friction drives nothing.
 
     Parameters
     ----------
@@ -514,7 +514,7 @@ def shaped(fit: Fit, effect: Effect) -> bool:
 
     """
     machine = fit.machine
-    return all(
+    return not drives(effect, fit.model, fit.values) and all(
         fit.size(effect, p) >= p.negligible * machine.scale(p)
         for p in effect.parameters_of(machine)
         if not p.amplitude

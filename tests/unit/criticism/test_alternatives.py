@@ -9,11 +9,22 @@ import pytest
 
 from pipeline.criticism.effect import Discrimination
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.regression.fit import Fit, floors
+from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.selection.alternatives import alternatives_to
 from pipeline.criticism.selection.score_test import candidates, widened
 from pipeline.criticism.selection.stepwise import search
-from tests.unit.criticism.machines import LIBRARY, asking_for, curved, fitted, with_drag
+from tests.unit.criticism.machines import (
+    BASE,
+    LIBRARY,
+    asking_for,
+    curved,
+    fitted,
+    machine,
+    with_drag,
+)
 
 
 def test_a_rival_is_told_where_the_captures_cannot_part_them():
@@ -50,6 +61,37 @@ def test_a_rival_is_told_whatever_size_it_comes_out_at():
     offered = candidates({**LIBRARY, "brake": twin}, fit.model)
     system = widened(fit, offered)
     assert alternatives_to("windage", system, offered) == ("brake",)
+
+
+@pytest.mark.parametrize(
+    ("less", "named", "others"),
+    [
+        (0.05, {"constant_load"}, set()),
+        (0.02, {"constant_load", "direction_friction"}, {"constant_load", "direction_friction"}),
+    ],
+)
+def test_a_friction_that_would_drive_is_no_name(less, named, others):
+    """A load of 50 mN·m looks like a friction that differs by as much, which dry friction of 30
+    mN·m forbids: in one sense it would push the shaft.
+    """
+    names = ("coulomb_friction", "direction_friction", "constant_load")
+    library = {name: effects()[name] for name in names}
+
+    def drag(omega, _):
+        return 0.03 * np.sign(omega) + less * np.abs(np.sign(omega))
+
+    # of a steady acceleration an inertia looks like a load
+    known = {"j_kgm2": (BASE["j_kgm2"], 1e-3 * BASE["j_kgm2"])}
+    model = Model(replace(machine(), stated=known), (library["coulomb_friction"],))
+    values = {**BASE, **zero(library["coulomb_friction"], model)}
+    segments = (with_drag(drag), with_drag(drag, 6))
+    begun = Fit(segments, model, values, floors(segments, model, values), values)
+    fit = gauss_newton(begun).fit
+    last = search(fit, library)[-1]
+    (found,) = last.added
+    assert found in named
+    offered = candidates(library, last.fit.model)
+    assert set(alternatives_to(found, last.system, offered)) == others - {found}
 
 
 @pytest.mark.parametrize("told", ["brake", "windage", None])
