@@ -176,16 +176,32 @@ def floors_grown(fit: Fit) -> tuple[Array, ...]:
     Returns
     -------
     tuple of array [R]
-        Ratios [1]; the same noise is added in both, and 1 where there are no currents.
+        Ratios [1]; the same noise is added in both.
 
     """
-    seeds = range(_SEED, _SEED + len(fit.segments))
-    arguments = [(fit.model, fit.values, fit.near, seed) for seed in seeds]
-    return on_each(_floor_grown, fit.segments, arguments)
+    return on_each(noise_growth, fit.segments, _growth_arguments(fit))
 
 
-def _floor_grown(segment: Segment, model: Model, values: Values, near: Values, seed: int) -> Array:
-    """One but where there are currents, whose noise is in the equations times what is fitted."""
+def current_floors_grown(fit: Fit) -> tuple[Array, ...]:
+    """As `floors_grown`, and 1 where there are no currents, whose noise is in the equations times
+    what is fitted.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+
+    """
+    return on_each(_current_floor_grown, fit.segments, _growth_arguments(fit))
+
+
+def _growth_arguments(fit: Fit) -> list[tuple[Model, Values, Values, int]]:
+    return [(fit.model, fit.values, fit.near, _SEED + n) for n in range(len(fit.segments))]
+
+
+def _current_floor_grown(
+    segment: Segment, model: Model, values: Values, near: Values, seed: int
+) -> Array:
     if _CURRENTS.isdisjoint(segment.recorded):
         return np.ones(np.count_nonzero(row_index(segment)[2]))
     return noise_growth(segment, model, values, near, seed)

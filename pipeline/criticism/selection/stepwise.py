@@ -13,7 +13,13 @@ from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.friction_parts import drives
 from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Parameter
-from pipeline.criticism.regression.fit import Fit, floors, floors_grown, tolerances
+from pipeline.criticism.regression.fit import (
+    Fit,
+    current_floors_grown,
+    floors,
+    floors_grown,
+    tolerances,
+)
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
 from pipeline.criticism.regression.goodness import (
     HeldOut,
@@ -168,10 +174,10 @@ def _floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
     is, and the floors were made with that J.
     """
     policy = fit.policy.selection
-    floor = floors(fit.segments, fit.model, fit.values)
-    ratio = np.concatenate(floor) / np.concatenate(fit.sigma)
-    changed = np.abs(np.log(ratio)).max() >= math.log(policy.floor_ratio)
+    grown = np.concatenate(floors_grown(fit))
+    changed = np.abs(np.log(grown)).max() >= math.log(policy.floor_ratio)
     if changed:
+        floor = floors(fit.segments, fit.model, fit.values)
         fit = replace(fit, sigma=floor, near=fit.values)
     refitted = gauss_newton(fit, before=before)
     if not changed and not significant_groups(refitted).any():
@@ -456,7 +462,7 @@ def _floor_factors(tried: LinearSystem) -> Array:
     the residual smaller as well. Reference: Fuller, Measurement Error Models (1987), section 1.3.
     """
     was = np.concatenate(tried.fit.sigma)
-    now = was * np.concatenate(floors_grown(tried.fit))
+    now = was * np.concatenate(current_floors_grown(tried.fit))
     power = tried.row_weight**-2
     by_end = np.bincount(tried.group, power + now**2 - was**2, len(tried.labels))
     factors: Array = np.bincount(tried.group, power, len(tried.labels)) / np.maximum(by_end, 1e-300)

@@ -19,7 +19,7 @@ from pipeline.criticism.data.sensor_noise import (
 )
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.fit import Fit, floors, floors_grown
+from pipeline.criticism.regression.fit import Fit, current_floors_grown, floors
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.regression.noise_propagation import _readings_error, noise_floor
 from pipeline.criticism.residuals.residual import residual
@@ -244,7 +244,7 @@ def test_noise_of_a_current_counts_by_the_constants_that_it_goes_through():
     model = Model(machine(), ())
     halved = {**BASE, **{name: 0.5 * BASE[name] for name in ("r_ohm", "ld_h", "lq_h")}}
     fit = Fit(segments, model, halved, floors(segments, model, BASE), BASE)
-    grown, free = floors_grown(fit)
+    grown, free = current_floors_grown(fit)
     groups = row_index(segments[0])[3]
     volts = [n for n, (channel, _) in enumerate(groups) if channel != "torque_shaft_nm"]
     assert grown[volts] == pytest.approx(0.5, abs=0.05)
@@ -284,4 +284,4 @@ def test_a_rounding_counts_by_the_inertia_that_it_goes_through():
     fit = Fit((segment,), model, lighter, floors((segment,), model, BASE), BASE)
     group, _, valid, groups = row_index(segment)
     torque = group[valid] == groups.index(("torque_shaft_nm", 0))
-    assert floors_grown(fit)[0][torque] == pytest.approx(0.5, rel=0.02)
+    assert current_floors_grown(fit)[0][torque] == pytest.approx(0.5, rel=0.02)
