@@ -14,7 +14,7 @@ from scipy.special import chdtri, ndtr
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.regression import Goodness
-from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.regression.fit import Fit, current_floors_grown
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import pseudo_inverse, unit_diagonal
 from pipeline.criticism.residuals.channels import (
@@ -213,6 +213,37 @@ def predicted_chi2(system: LinearSystem, held_out: HeldOut) -> Array:
 
     """
     return system.reduced_chi2(held_out.or_fit(system) / held_out.widening)
+
+
+def floor_factors(tried: LinearSystem) -> Array:
+    """Factors that turn χ²/n by the floors a fit was made with into χ²/n by those at its end.
+
+    Parameters
+    ----------
+    tried
+        The fit.
+
+    Returns
+    -------
+    array [G]
+        1 for an empty group.
+
+    Notes
+    -----
+    The equations hold the noise of a current times R and L: a fit that makes these smaller makes
+    the residual smaller as well.
+
+    References
+    ----------
+    Fuller, Measurement Error Models, Wiley, 1987, section 1.3. doi:10.1002/9780470316665
+
+    """
+    was = np.concatenate(tried.fit.sigma)
+    now = was * np.concatenate(current_floors_grown(tried.fit))
+    power = tried.row_weight**-2
+    by_end = np.bincount(tried.group, power + now**2 - was**2, len(tried.labels))
+    factors: Array = np.bincount(tried.group, power, len(tried.labels)) / np.maximum(by_end, 1e-300)
+    return np.where(tried.counts > 0, factors, 1.0)
 
 
 def _units(system: LinearSystem) -> NDArray[np.int64]:

@@ -15,7 +15,6 @@ from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.regression.fit import (
     Fit,
-    current_floors_grown,
     floors,
     floors_grown,
     tolerances,
@@ -23,6 +22,7 @@ from pipeline.criticism.regression.fit import (
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
 from pipeline.criticism.regression.goodness import (
     HeldOut,
+    floor_factors,
     in_common,
     leave_out,
     predicted_chi2,
@@ -273,7 +273,7 @@ class _Baseline:
     @classmethod
     def of(cls, wide: LinearSystem, added: Sequence[Effect]) -> _Baseline:
         held_out, significant = leave_out(wide), significant_groups(wide)
-        factors = _floor_factors(wide), _form_error_factors(wide, added)
+        factors = floor_factors(wide), _form_error_factors(wide, added)
         return cls(wide, added, held_out, *factors, significant)
 
     def is_improved_by(self, tried: LinearSystem, score: Score) -> bool:
@@ -285,7 +285,7 @@ class _Baseline:
         promised = policy.held_out_penalties * score.penalty, below * score.penalty
         one, other = in_common((wide, tried), (self.held_out, leave_out(tried)))
         without = predicted_chi2(wide, one) * self.shrunk
-        after = predicted_chi2(tried, other) * _floor_factors(tried)
+        after = predicted_chi2(tried, other) * floor_factors(tried)
         holds = _improves_held_out(wide, without, tried, after, promised, doubts)
         relief = float(wide.prior_costs().sum() - tried.prior_costs().sum())
         return holds and not spoils(tried, without, after, relief)
@@ -453,20 +453,6 @@ def _acts(system: LinearSystem) -> NDArray[np.bool_]:
     columns = [n for n, column in enumerate(system.columns) if column.name.startswith(name)]
     moved = np.any(system.matrix[:, columns], axis=1)
     return np.bincount(system.group, moved, len(system.labels)) > 0
-
-
-def _floor_factors(tried: LinearSystem) -> Array:
-    """Factors [G] that turn χ²/n by the floors a fit was made with into χ²/n by those at its end.
-
-    The equations hold the noise of a current times R and L: a fit that makes these smaller makes
-    the residual smaller as well. Reference: Fuller, Measurement Error Models (1987), section 1.3.
-    """
-    was = np.concatenate(tried.fit.sigma)
-    now = was * np.concatenate(current_floors_grown(tried.fit))
-    power = tried.row_weight**-2
-    by_end = np.bincount(tried.group, power + now**2 - was**2, len(tried.labels))
-    factors: Array = np.bincount(tried.group, power, len(tried.labels)) / np.maximum(by_end, 1e-300)
-    return np.where(tried.counts > 0, factors, 1.0)
 
 
 def begin_from(fit: Fit, score: Score) -> Fit:

@@ -20,11 +20,11 @@ from pipeline.criticism.data.sensor_noise import (
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, current_floors_grown, floors
+from pipeline.criticism.regression.goodness import floor_factors
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.regression.noise_propagation import _readings_error, noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import _by_encoder
-from pipeline.criticism.selection.stepwise import _floor_factors
 from tests.unit.criticism.machines import BASE, coasting, log, machine
 
 SENSORS = DEFAULT.sensor_noise
@@ -250,7 +250,7 @@ def test_noise_of_a_current_counts_by_the_constants_that_it_goes_through():
     assert grown[volts] == pytest.approx(0.5, abs=0.05)
     assert np.array_equal(free, np.ones(free.size))
     system = linear_system(fit)
-    factors = _floor_factors(system)
+    factors = floor_factors(system)
     assert factors.min() >= 1.0 - 1e-9
     assert 1.2 < factors[volts].max() <= 4.0 + 1e-9
 

@@ -124,7 +124,7 @@ def test_floors_at_a_fit_s_end_count_on_both_sides_of_a_comparison(monkeypatch):
     def eightfold(system):
         return np.full(len(system.labels), 8.0)
 
-    monkeypatch.setattr("pipeline.criticism.selection.stepwise._floor_factors", eightfold)
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise.floor_factors", eightfold)
     hidden = (with_drag(curved(0.09)), with_drag(curved(0.09), 6))
     assert search(cautious(hidden, 9.0), LIBRARY)[-1].added == ("windage",)
 
