@@ -316,7 +316,7 @@ def _temperature_note(end: SearchResult) -> tuple[str, ...]:
 
 def _verdict_of(end: SearchResult, not_excited: Sequence[Unexcited]) -> Verdict:
     """The verdict at the end of the ladder; `not_excited` are effects that nothing shows."""
-    if end.freed or (end.remainders and not end.ladder.explains(end.remainders)):
+    if end.freed or not end.ladder.explains(end.remainders):
         return "unknown"
     last = end.ladder.steps[-1]
     if any(of_motor(last.system, name) for name in last.added):

@@ -321,7 +321,7 @@ def _sketched(
 
     The signal that misses by most is sketched, winding or shaft; the other one if that fails.
     """
-    if ladder.explains(remainders):
+    if not remainders or ladder.explains(remainders):
         return None, 0.0
     last = ladder.steps[-1].system
     worst = sorted(remainders, key=lambda left_over: -left_over.chi2_per_n)

@@ -24,7 +24,8 @@ EFFECT = Effect(
     reference="Allan, Ashby & Hodge, The Science of Timekeeping (1997), HP AN 1289: offset of a "
     "crystal's rate",
     parameters=(
-        Parameter("gain", "1", 0.02, 0.002, low=-0.5, high=0.5),
+        # a recorder without a crystal is good to some percent
+        Parameter("gain", "1", 0.02, 0.002, low=-0.1, high=0.1),
         choice(
             "of",
             (_TURNING, _LOG, _OPEN, _SHAFT, _STEP, _OPEN + _SHAFT, _TURNING + _STEP),

@@ -126,8 +126,8 @@ class Selection:
     )  # fmt: skip
     unexplained_share: float = chosen(
         0.5, "1",
-        "share of deviance and held-out power over the floor that effects may leave and still "
-        "explain the captures",
+        "share of deviance and of the held-out error over the floor that effects may leave and "
+        "still explain the captures",
         why="most of it goes",
     )  # fmt: skip
     guess_share: float = chosen(

@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.library.friction_parts import drives
 from pipeline.criticism.operating import Array
-from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.regression.fit import (
     Fit,
     floors,
@@ -52,6 +50,7 @@ from pipeline.criticism.selection.score_test import (
     score_all,
     widened,
 )
+from pipeline.criticism.selection.sizes import material, shaped, size_of
 from pipeline.criticism.selection.unusual_nuisances import with_nuisances
 
 
@@ -473,70 +472,6 @@ def begin_from(fit: Fit, score: Score) -> Fit:
         moved[effect.in_place_of[0]] = 0.0
     start = {**moved, **score.candidate.values, **score.step}
     return replace(fit, model=model).at(start)
-
-
-def material(fit: Fit, effect: Effect) -> bool:
-    """Whether an effect is large enough to matter.
-
-    Parameters
-    ----------
-    fit
-        A fit with the effect.
-    effect
-        The effect.
-
-    Returns
-    -------
-    bool
-        Some amplitude is over its negligible size, and every shape that has one over its own.
-
-    """
-    return shaped(fit, effect) and size_of(fit, effect, effect.parameters_of(fit.machine)) >= 1.0
-
-
-def shaped(fit: Fit, effect: Effect) -> bool:
-    """Whether every shape of an effect is over its negligible size, and a friction drives nothing.
-
-    Parameters
-    ----------
-    fit
-        A fit with the effect.
-    effect
-        The effect.
-
-    """
-    machine = fit.machine
-    return not drives(effect, fit.model, fit.values) and all(
-        fit.size(effect, p) >= p.negligible * machine.scale(p)
-        for p in effect.parameters_of(machine)
-        if not p.amplitude
-    )
-
-
-def size_of(fit: Fit, effect: Effect, parameters: Iterable[Parameter]) -> float:
-    """The largest of some amplitudes of an effect, relative to its negligible size.
-
-    Parameters
-    ----------
-    fit
-        A fit with the effect.
-    effect
-        The effect.
-    parameters
-        Parameters of it.
-
-    Returns
-    -------
-    float
-        0 where none is an amplitude that declares such a size.
-
-    """
-    sizes = [
-        fit.size(effect, p) / (p.negligible * fit.machine.scale(p))
-        for p in parameters
-        if p.amplitude and p.negligible > 0.0
-    ]
-    return max(sizes, default=0.0)
 
 
 def _backward(system: LinearSystem, base: int) -> LinearSystem:

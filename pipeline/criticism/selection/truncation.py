@@ -146,7 +146,7 @@ def _waved(system: LinearSystem) -> set[str]:
 def explained(
     steps: Sequence[LadderStep], held_out: Sequence[HeldOut], remainders: Sequence[Remainder]
 ) -> bool:
-    """Whether the effects found explain what is left over the floor.
+    """Whether the effects found explain what the captures show.
 
     Parameters
     ----------
@@ -160,21 +160,23 @@ def explained(
     Returns
     -------
     bool
-        True where nothing is left.
+        True where nothing was found and nothing is left.
 
     Notes
     -----
     They must remove most of the deviance of the signals that still miss, at least a share of each
-    one's own (`least_share`), and most of the power that held-out errors have over the floor. An
-    offset of the angle that removes all of the torque's error explains nothing of a shaft that
-    coasts too short. Signals with a small part of the deviance do not count alone. Deviance is
-    logarithmic: for an equation at a million floors, half of it remains at a thousand.
+    one's own (`least_share`), and most of what the held-out error has over the floor. A name that
+    leaves more there than a floor may be wrong by (`goodness.over`) explains nothing either where
+    no signal's part is large for the machine. An offset of the angle that removes all of the
+    torque's error explains nothing of a shaft that coasts too short. Signals with a small part of
+    the deviance do not count alone. Deviance is logarithmic: for an equation at a million floors,
+    half of it remains at a thousand.
 
     """
-    policy = steps[0].fit.policy.selection
+    policy, over = steps[0].fit.policy.selection, steps[0].fit.policy.goodness.over
     first, last = (max(held_out[n].total ** 2 - 1.0, 0.0) for n in (0, len(steps) - 1))
-    if last > policy.unexplained_share * first:
-        return not remainders
+    if last > policy.unexplained_share**2 * first:
+        return not remainders and (len(steps) == 1 or last <= over)
     signals = sorted({r.signal for r in remainders})
     before, after = (
         np.array([_excess(step, {name}) for name in signals]) for step in (steps[0], steps[-1])

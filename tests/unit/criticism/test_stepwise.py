@@ -17,14 +17,13 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.selection.requested_model import fit_of
+from pipeline.criticism.selection.sizes import material, size_of
 from pipeline.criticism.selection.stepwise import (
     _floored_anew,
     _form_error_factors,
     _is_determined,
     _same_hook,
-    material,
     search,
-    size_of,
 )
 from tests.unit.criticism.machines import (
     BASE,
@@ -262,6 +261,17 @@ def test_an_effect_is_material_by_its_amplitude_and_by_shapes_that_have_a_least(
     assert not judged("compliance", share=0.3, twist_rad=1e-4, **rigid)
     assert not judged("compliance", share=0.01, twist_rad=0.005, **rigid)
     assert judged("torque_lag", lag_s=1e-3, late=-0.4, stamped=0.0)
+
+
+@pytest.mark.parametrize(("part", "possible"), [(0.9, True), (1.0, False), (-1.0, False)])
+def test_no_more_of_an_effect_is_named_than_there_can_be(part, possible):
+    """A recorder that is 17 % fast was named for a flux of no known form, and was at no bound."""
+    clock = effects()["clock_scale"]
+    model = Model(machine(), (clock,))
+    (gain, _) = clock.parameters
+    assert gain.high == 0.1
+    values = {**BASE, "clock_scale.gain": part * gain.high, "clock_scale.of": 7.0}
+    assert material(Fit((), model, values, (), values), clock) is possible
 
 
 def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkeypatch):

@@ -158,13 +158,22 @@ def test_what_one_signal_gained_does_not_explain_another(speed, said):
     assert explained((first, last), held, left) is said
 
 
-@pytest.mark.parametrize(("total", "said"), [(239.7, False), (160.0, True)])
+@pytest.mark.parametrize(("total", "said"), [(239.7, False), (160.0, False), (110.0, True)])
 def test_what_predicts_no_capture_better_explains_nothing(total, said):
     """From a million floors to a thousand is half of the logarithm, and still a thousand."""
     left = [Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0)]
     first, last = missing_by(torque_shaft_nm=1e6), missing_by(torque_shaft_nm=900.0)
     held = [HeldOut(first.system.residual, one) for one in (244.1, total)]
     assert explained((first, last), held, left) is said
+
+
+@pytest.mark.parametrize(("total", "said"), [(3.1, False), (1.3, True)])
+def test_a_name_that_leaves_most_of_the_error_explains_it_nowhere(total, said):
+    """However small each signal's part is for the machine; a floor is good to twice its power."""
+    first, last = (missing_by(torque_shaft_nm=q) for q in (20.0, 9.0))
+    held = [HeldOut(first.system.residual, one) for one in (5.2 if total > 2.0 else 1.5, total)]
+    assert explained((first, last), held, ()) is said
+    assert explained((first,), held, ())
 
 
 @pytest.mark.parametrize(("doubt", "kept"), [(1.0, True), (0.3, False)])

@@ -1,0 +1,95 @@
+"""How large an effect is that was fitted, and whether there can be such a one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.library.friction_parts import drives
+from pipeline.criticism.parameter import Parameter
+from pipeline.criticism.regression.bounds import limits_of
+from pipeline.criticism.regression.fit import Fit
+
+
+def material(fit: Fit, effect: Effect) -> bool:
+    """Whether an effect is large enough to matter.
+
+    Parameters
+    ----------
+    fit
+        A fit with the effect.
+    effect
+        The effect.
+
+    Returns
+    -------
+    bool
+        Some amplitude is over its negligible size, and every shape that has one over its own.
+
+    """
+    return shaped(fit, effect) and size_of(fit, effect, effect.parameters_of(fit.machine)) >= 1.0
+
+
+def shaped(fit: Fit, effect: Effect) -> bool:
+    """Whether an effect is one that there can be, every shape of it over its negligible size.
+
+    Parameters
+    ----------
+    fit
+        A fit with the effect.
+    effect
+        The effect.
+
+    Returns
+    -------
+    bool
+        False for a friction that drives, and for an effect at the bound of what it can be.
+
+    """
+    machine = fit.machine
+    over = all(
+        fit.size(effect, p) >= p.negligible * machine.scale(p)
+        for p in effect.parameters_of(machine)
+        if not p.amplitude
+    )
+    return over and not drives(effect, fit.model, fit.values) and not _beyond(fit, effect)
+
+
+def _beyond(fit: Fit, effect: Effect) -> bool:
+    """Whether a fit would have more of an effect than there can be: every amplitude that has a
+    negligible size stands at a bound other than zero.
+    """
+    values, limits = fit.values, limits_of(fit.model)
+    names = [
+        f"{effect.name}.{p.name}"
+        for p in effect.parameters_of(fit.machine)
+        if p.amplitude and p.negligible > 0.0
+    ]
+    ends = [values[name] != 0.0 and values[name] in limits[name] for name in names]
+    return bool(ends) and all(ends)
+
+
+def size_of(fit: Fit, effect: Effect, parameters: Iterable[Parameter]) -> float:
+    """The largest of some amplitudes of an effect, relative to its negligible size.
+
+    Parameters
+    ----------
+    fit
+        A fit with the effect.
+    effect
+        The effect.
+    parameters
+        Parameters of it.
+
+    Returns
+    -------
+    float
+        0 where none is an amplitude that declares such a size.
+
+    """
+    sizes = [
+        fit.size(effect, p) / (p.negligible * fit.machine.scale(p))
+        for p in parameters
+        if p.amplitude and p.negligible > 0.0
+    ]
+    return max(sizes, default=0.0)
