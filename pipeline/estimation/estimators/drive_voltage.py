@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.electrical.sample_hold import hold_s
+from pipeline.estimation.electrical.voltage_rows import (
+    D_FLUX,
+    LATE,
+    NEAR_ZERO,
+    VoltageRows,
+    voltage_rows,
+)
+from pipeline.estimation.electrical.voltage_turn import (
+    SPEED2_CURRENT,
+    TURNED,
+    Turn,
+    voltage_turn,
+)
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -36,10 +48,8 @@ from pipeline.estimation.uncertainty.regimes import (
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns
-from pipeline.numerics.shaft_log import shaft_log
-from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
-from pipeline.records.capture import Array, Campaign, Capture
+from pipeline.records.capture import Array, Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
@@ -54,35 +64,7 @@ EXPERIMENT = (
     "better an open_circuit and a resistance test"
 )
 HOLD = "assumed:voltage_hold"
-D_FLUX = "d flux"
-LATE = "acceleration"
-NEAR_ZERO = "drop near zero current"
-"""What a compensation of dead time leaves: it takes the sense of a current from a sample."""
-CANDIDATES = ("zero", LATE, "turned", "cross flux", NEAR_ZERO)
-
-
-@dataclass(frozen=True, slots=True)
-class VoltageRows:
-    """Window means of the q voltage equation; every array is [w].
-
-    `speed_rad_s` and `current_a` come with their products with temperature above 25 degC;
-    `columns` holds the nuisances; `period_s` is that of the samples; `hold_doubt` is what
-    it may matter that an inverter holds its voltage still over a centred period while the rotor
-    turns (relative, of the back-EMF).
-    """
-
-    captures: tuple[Capture, ...]
-    capture: NDArray[np.int64]
-    cluster: NDArray[np.int64]
-    time_s: Array
-    voltage_v: Array
-    current_a: Array
-    speed_rad_s: Array
-    warm_current_k_a: Array
-    warm_speed_k_rad_s: Array
-    columns: Mapping[str, Array]
-    period_s: float
-    hold_doubt: float
+CANDIDATES = ("zero", LATE, TURNED, "cross flux", NEAR_ZERO)
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
@@ -91,14 +73,18 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     The weak form takes w and di_q/dt without differentiating; w is the angle's own rate, since a
     bench's speed estimate lags. The flux of the d current stands in the equation wherever i_d is
     logged and parts from the speed. Lateness of the voltage against the angle shows as Ke tau dw/dt
-    and joins, as a zero error and a turned frame do, where the data demand it. Without
+    and joins, as a zero error and a turned frame do, where the data demand it. Voltages of maps are
+    turned back first (`voltage_turn`): at a held speed their turn is one column with R. Without
     temperatures the values hold for those of the log.
     """
     pole_pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
-    rows = _rows(campaign.of("drive") or campaign.of("torque_map"), pole_pairs)
+    rows = voltage_rows(campaign.of("drive") or campaign.of("torque_map"), pole_pairs)
     if rows is None or rows.voltage_v.size < 20 or float(np.ptp(rows.speed_rad_s)) == 0.0:
         return METHOD.nothing(GIVES, EXPERIMENT)
     magnet, magnet_parts = magnet_coefficient(known)
+    turn = None if campaign.of("drive") else _turn(rows, magnet)
+    if turn is not None:
+        rows = _turned_back(rows, turn)
     chosen = _chosen(rows, magnet, options["level"])
     design = q_voltage(rows, magnet, chosen, {})
     solution = linear_fit(design, rows.voltage_v)
@@ -112,7 +98,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     moved = _moved(rows, solution.coefficients, magnet, chosen, pole_pairs or 1)
     scatter = np.sqrt(np.diag(covariance)[: len(GIVES)])
     estimates = _estimates(
-        rows, solution, (scatter, dof), (magnet, magnet_parts), chosen, (moved, doubts)
+        rows, solution, (scatter, dof), (magnet, magnet_parts), chosen, (moved, doubts), turn
     )
     return Fit(estimates, _evidence(rows, solution))
 
@@ -129,116 +115,6 @@ def _partitions(rows: VoltageRows, information: Array) -> list[Partition]:
         signs("sense of torque", current, "negative", "positive", every),
         Partition("capture", rows.capture, files),
     ]
-
-
-def _rows(captures: Sequence[Capture], pole_pairs: int | None) -> VoltageRows | None:
-    pieces: list[dict[str, Array]] = []
-    used: list[Capture] = []
-    for capture in captures:
-        piece = _of_capture(capture, len(used), pole_pairs)
-        if piece is not None:
-            pieces.append(piece)
-            used.append(capture)
-    if not pieces:
-        return None
-    shared = set.intersection(*(set(piece) for piece in pieces))
-    joined = {k: np.concatenate([p[k] for p in pieces]) for k in pieces[0] if k in shared}
-    own: dict[str, Any] = {
-        field.name: joined.pop(field.name) for field in fields(VoltageRows) if field.name in joined
-    }
-    return VoltageRows(
-        captures=tuple(used),
-        period_s=float(np.median(joined.pop("period"))),
-        hold_doubt=float(np.sqrt(np.mean(joined.pop("hold") ** 2))),
-        columns=joined,
-        **own,
-    )
-
-
-def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[str, Array] | None:
-    optional = ("id_a", "vd_v", "temp_winding_degc", "temp_magnet_degc")
-    log = shaft_log(capture, "vq_v", "iq_a", optional=optional)
-    if log is None or log.t_s.size < 10 * LEAST_SAMPLES:
-        return None
-    data, t, theta, period = log.data, log.t_s, log.theta_rad, log.period_s
-    window, usual = policy().inverter, 3 * LEAST_SAMPLES * period
-    width = min(max(window.shortest_window_s, usual), window.longest_window_s)
-    try:
-        weak = weak_rows(t, max(width, (LEAST_SAMPLES + 1) * period))
-        speed = smooth_speed(t, theta, max(0.005, 10.0 * period))
-    except ValueError:
-        return None
-    v_d, v_q = _instant(capture, data, speed, pole_pairs, period)
-    columns = {
-        "capture": np.full(weak.count, index),
-        "cluster": weak.clusters(policy().evidence.cluster_s, index),
-        "time_s": weak.centres_s,
-        "voltage_v": weak.integral(v_q),
-        **_integrals(weak, data, theta, speed),
-        "zero": np.ones(weak.count),
-        "period": np.full(weak.count, period),
-        "hold": np.full(weak.count, _hold_doubt(capture, speed, pole_pairs, period)),
-    }
-    if v_d is not None:
-        columns["turned"] = weak.integral(speed * v_d)
-    return columns
-
-
-def _integrals(
-    weak: WeakRows, data: Mapping[str, Array], theta: Array, speed: Array
-) -> dict[str, Array]:
-    """Columns of the q-axis voltage equation, each as its integral over a window."""
-    t, i_q = data["t_s"], data["iq_a"]
-    i_d = data.get("id_a", np.zeros(t.size))
-    winding = data.get("temp_winding_degc", np.full(t.size, 25.0)) - 25.0
-    rotor = data.get("temp_magnet_degc", np.full(t.size, 25.0)) - 25.0
-    modulus = np.hypot(i_d, i_q)
-    noise = 0.02 * float(np.max(modulus)) if modulus.size else 0.0
-    integrals = {
-        "current_a": weak.integral(i_q),
-        "speed_rad_s": weak.integral(theta, 1),
-        "warm_current_k_a": weak.integral(i_q * winding),
-        "warm_speed_k_rad_s": weak.integral(speed * rotor),
-        "inductive": weak.integral(i_q, 1),
-        "drop": weak.integral(i_q / np.sqrt(modulus**2 + noise**2 + 1e-300)),
-        NEAR_ZERO: weak.integral(noise * i_q / (modulus**2 + noise**2 + 1e-300)),
-        "cross flux": weak.integral(speed * i_q**2),
-        LATE: weak.integral(theta, 2),
-    }
-    if "id_a" in data:
-        integrals[D_FLUX] = weak.integral(speed * i_d)
-    return integrals
-
-
-def _instant(
-    capture: Capture,
-    data: Mapping[str, Array],
-    speed: Array,
-    pole_pairs: int | None,
-    period_s: float,
-) -> tuple[Array | None, Array]:
-    """Voltages at the sampling instant: period means turned back and undamped (needs p)."""
-    timing = capture.meta.voltage_timing
-    v_d, v_q = data.get("vd_v"), data["vq_v"]
-    if timing == "instant" or pole_pairs is None:
-        return v_d, v_q
-    fastest = pole_pairs * float(np.max(np.abs(speed)))
-    half = 0.5 * pole_pairs * speed * hold_s(capture.meta, period_s, fastest)
-    damping = np.sinc(half / np.pi)
-    if timing == "centred" or v_d is None:
-        return (None if v_d is None else v_d / damping), v_q / damping
-    turned = (v_d + 1j * v_q) * np.exp(-1j * half) / damping
-    return np.real(turned), np.imag(turned)
-
-
-def _hold_doubt(capture: Capture, speed: Array, pole_pairs: int | None, period_s: float) -> float:
-    """(1/cos(w T / 2) - 1)/sqrt(3) at the rms speed: polygon or circle, rectangular (GUM 4.3.7)."""
-    if capture.meta.voltage_timing != "centred":
-        return 0.0
-    omega = (pole_pairs or 1) * np.abs(speed)
-    held = hold_s(capture.meta, period_s, float(np.max(omega)))
-    half = 0.5 * float(np.sqrt(np.mean(omega**2))) * held
-    return float((1.0 / np.cos(min(half, 1.0)) - 1.0) / np.sqrt(3.0))
 
 
 def _gains(rows: VoltageRows, shift: Mapping[str, float]) -> tuple[Array, Array, Array]:
@@ -332,6 +208,7 @@ def _estimates(
     coefficient: tuple[float, Budget],
     chosen: Sequence[str],
     model: tuple[Array, Sequence[Disagreement | None]],
+    turn: Turn | None,
 ) -> tuple[Estimate, ...]:
     (deviation, dof), (moved, doubts) = scatter, model
     magnet, magnet_parts = coefficient
@@ -344,6 +221,7 @@ def _estimates(
     gains = instrument_uncertainties(rows.captures, ("voltage", "current", "temperature"))
     type_b = contributions(values, gains)
     instant = _of_instant(rows, fit, magnet, chosen)
+    turned = [] if turn is None else _of_turn(rows, fit, magnet, chosen, turn)
     per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
     paths = sorted(c.path for c in rows.captures)
     words = [
@@ -362,6 +240,7 @@ def _estimates(
         parts += propagate([(float(per_alpha[i]), magnet_parts)])
         parts.append(Contribution(f"assumed:{METHOD.name}:nuisances", float(moved[i]), "B"))
         parts.append(Contribution("assumed:voltage_instant", float(instant[i]), "B"))
+        parts += [Contribution(source, float(u[i]), kind) for source, u, kind in turned]
         doubt = doubts[i]
         parts += [] if doubt is None else [doubt.part(f"{METHOD.name}:{name}", value)]
         remarks = [] if doubt is None else [doubt.words("the value")]
@@ -404,7 +283,7 @@ def _moved(
     commanded = any(c.meta.voltage_kind != "measured" for c in rows.captures)
     held_s = max(hold_s(c.meta, rows.period_s, 0.0) for c in rows.captures)
     latest = policy().inverter.latest_periods * held_s * commanded
-    most = {LATE: abs(float(values[0])) * latest, "turned": pole_pairs * latest}
+    most = {LATE: abs(float(values[0])) * latest, TURNED: pole_pairs * latest}
     moved = np.zeros(len(GIVES))
     for name, size in zip(chosen, values[len(values) - len(chosen) :], strict=True):
         if abs(float(size)) <= most.get(name, 0.0):
@@ -428,6 +307,38 @@ def _of_instant(rows: VoltageRows, fit: LinearFit, magnet: float, chosen: Sequen
     late_v_s = float(fit.coefficients[0]) * 0.5 * held_s / np.sqrt(3.0)
     along = linear_fit(q_voltage(rows, magnet, chosen, {}), rows.columns[LATE])
     return late_v_s * along.coefficients[: len(GIVES)]
+
+
+def _turn(rows: VoltageRows, magnet: float) -> Turn | None:
+    """The turn of the voltages at held speeds, by the Ke of a first fit."""
+    first = linear_fit(q_voltage(rows, magnet, [], {}), rows.voltage_v)
+    return voltage_turn(rows.columns, rows.speed_rad_s, float(first.coefficients[0]))
+
+
+def _turned_back(rows: VoltageRows, turn: Turn) -> VoltageRows:
+    """The rows in the frame in which the magnet's voltage is on the q axis."""
+    columns = {name: column for name, column in rows.columns.items() if name != TURNED}
+    return replace(rows, voltage_v=rows.voltage_v + turn.q_voltage_v, columns=columns)
+
+
+def _of_turn(
+    rows: VoltageRows, fit: LinearFit, magnet: float, chosen: Sequence[str], turn: Turn
+) -> list[tuple[str, Array, Literal["A", "B"]]]:
+    """Standard uncertainties of Ke and R [2] for what is not known of a turn: its scatter, and
+    whether the voltages are late or iron takes current.
+
+    Turned back, a lateness is gone. Of iron p² ω² G L_q (L_d - L_q) i_q is left, with p L_q G = τ:
+    between none and all of τ (rectangular, GUM 4.3.7).
+    """
+    design = q_voltage(rows, magnet, chosen, {})
+    flux_d = float(fit.coefficients[4]) if design.shape[1] > 4 + len(chosen) else turn.flux_q_wb_a
+    along = linear_fit(design, rows.columns[SPEED2_CURRENT]).coefficients[: len(GIVES)]
+    iron = turn.late_s * (flux_d - turn.flux_q_wb_a) / np.sqrt(3.0)
+    scatter = turn.u_late_s * turn.flux_q_wb_a
+    return [
+        ("assumed:iron_current", iron * along, "B"),
+        (f"scatter:{METHOD.name}:turn", scatter * along, "A"),
+    ]
 
 
 def _evidence(rows: VoltageRows, fit: LinearFit) -> tuple[Evidence, ...]:

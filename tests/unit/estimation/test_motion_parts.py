@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.estimation.electrical import voltage_rows as window_means
 from pipeline.estimation.electrical.terminals import PAIRS
+from pipeline.estimation.electrical.voltage_rows import VoltageRows
 from pipeline.estimation.estimators import drive_voltage, feedforward, lcr, spin_down
-from pipeline.estimation.estimators.drive_voltage import VoltageRows, q_voltage
+from pipeline.estimation.estimators.drive_voltage import q_voltage
 from pipeline.estimation.mechanical import drag
 from pipeline.estimation.mechanical.drag import (
     _drag_part,
@@ -462,10 +464,10 @@ def test_voltages_of_a_drive_at_the_sampling_instant(timing: str) -> None:
     mean = np.array([np.mean(np.exp(1j * o * (t + start))) for o in omega])
     seen = v * (np.ones(2) if timing == "instant" else mean)
     data = {"vd_v": seen.real, "vq_v": seen.imag}
-    v_d, v_q = drive_voltage._instant(made, data, speed, 4, period)
+    v_d, v_q = window_means._instant(made, data, speed, 4, period)
     assert v_d == pytest.approx([2.0, 2.0], rel=1e-6)
     assert v_q == pytest.approx([3.0, 3.0], rel=1e-6)
-    v_d, v_q = drive_voltage._instant(made, {"vq_v": seen.imag}, speed, 4, period)
+    v_d, v_q = window_means._instant(made, {"vq_v": seen.imag}, speed, 4, period)
     half = 0.5 * omega * period
     damped = seen.imag / (1.0 if timing == "instant" else np.sin(half) / half)
     assert v_d is None
@@ -478,15 +480,15 @@ def test_what_a_held_voltage_may_be_of_the_back_emf() -> None:
     speed = np.array([300.0, -400.0, 0.0])
     half = 0.5 * 4 * math.sqrt(250_000.0 / 3.0) * 1e-3
     expected = (1.0 / math.cos(half) - 1.0) / math.sqrt(3.0)
-    assert drive_voltage._hold_doubt(made, speed, 4, 1e-3) == pytest.approx(expected)
-    assert drive_voltage._hold_doubt(log(), speed, 4, 1e-3) == 0.0
+    assert window_means._hold_doubt(made, speed, 4, 1e-3) == pytest.approx(expected)
+    assert window_means._hold_doubt(log(), speed, 4, 1e-3) == 0.0
     # without pole pairs one, the least that a motor has
     least = (1.0 / math.cos(half / 4.0) - 1.0) / math.sqrt(3.0)
-    alone = drive_voltage._hold_doubt(made, speed, None, 1e-3)
+    alone = window_means._hold_doubt(made, speed, None, 1e-3)
     assert alone == pytest.approx(least)
     most = (1.0 / math.cos(1.0) - 1.0) / math.sqrt(3.0)
     slow = replace(made, meta=replace(made.meta, pwm_hz=1.0))
-    assert drive_voltage._hold_doubt(slow, speed, 4, 1.0) == pytest.approx(most)
+    assert window_means._hold_doubt(slow, speed, 4, 1.0) == pytest.approx(most)
 
 
 def fed(*, ks=0.5, kv=0.02, ka=2e-3, delay=0.0, rows=12000, rate=1000.0, noise=1e-4):
