@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.estimation.electrical.link import largest, link_voltage_v
 from pipeline.estimation.policy import changed, policy, under
 from pipeline.estimation.registry import fit_all
 from pipeline.records.agreement import Reading, Way
@@ -170,22 +171,12 @@ def _inverter(capture: Capture, estimate: Estimate) -> float:
     by_voltage = any(part.source.startswith("voltage_commanded@") for part in estimate.budget)
     if not by_voltage or not capture.has("vq_v"):
         return 0.0
-    link_v = max(_largest(capture, "vdc_v"), capture.meta.vdc_v or 0.0)
-    unknown_v = policy().capture_spread.inverter * max(
-        link_v, math.sqrt(3.0) * _largest(capture, "vq_v")
-    )
+    unknown_v = policy().capture_spread.inverter * link_voltage_v(capture)
     names = ("id_a", "iq_a") if estimate.unit == "ohm" else ("omega_mech_rad_s",)
-    reach = max(_largest(capture, name) for name in names)
+    reach = max(largest(capture, name) for name in names)
     if not reach and estimate.unit != "ohm" and capture.has("theta_mech_rad"):
         reach = _fastest_rad_s(capture)
     return unknown_v / (estimate.number * reach) if reach else math.inf
-
-
-def _largest(capture: Capture, name: str) -> float:
-    """The size that a column reaches, strays aside; 0 where it is not there."""
-    values = np.abs(capture.arrays(name)[name]) if capture.has(name) else np.zeros(0)
-    values = values[np.isfinite(values)]
-    return float(np.percentile(values, 95.0)) if values.size else 0.0
 
 
 def _fastest_rad_s(capture: Capture) -> float:

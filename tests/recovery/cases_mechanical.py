@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import polars as pl
 
 from pipeline.estimation.estimators import (
     cogging,
@@ -21,6 +22,8 @@ from pipeline.estimation.estimators import (
     spin_down,
     torque_map,
 )
+from pipeline.estimation.policy import DEFAULT
+from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import Contribution
@@ -202,9 +205,22 @@ def _drive_trial(seed: int) -> Trial:
     return Trial(campaign, true, seen, _known_kt(real))
 
 
+def _through_switches(campaign: Campaign, seed: int) -> tuple[Campaign, float]:
+    """The drive as commanded to an inverter whose switches and leads have a resistance [ohm]."""
+    (drive,) = campaign.captures
+    (table,) = drive.tables
+    drop_v = DEFAULT.inverter.conduction_share * MOTOR.vdc_v
+    u_ohm = drop_v / float(np.max(np.abs(table["iq_a"].to_numpy())))
+    ohm = u_ohm * float(np.random.default_rng(seed).standard_normal())
+    drops = [pl.col(f"v{axis}_v") + ohm * pl.col(f"i{axis}_a") for axis in "dq"]
+    driven = replace(drive, tables=(table.with_columns(drops),))
+    return replace(campaign, captures=(driven,)), ohm
+
+
 def _voltage_trial(seed: int) -> Trial:
     plan: Plan = (("drive_0", "drive", {"voltage_timing": "held"}),)
     campaign, real = recorded(plan, seed)
+    campaign, switches_ohm = _through_switches(campaign, seed)
     true = {
         "ke_phase_peak_v_s_rad": MOTOR.pole_pairs * MOTOR.psi_pm_wb,
         "r_phase_ohm": MOTOR.r_phase_ohm,
@@ -212,7 +228,7 @@ def _voltage_trial(seed: int) -> Trial:
     gain = real.voltage_commanded
     seen = {
         "ke_phase_peak_v_s_rad": true["ke_phase_peak_v_s_rad"] * gain,
-        "r_phase_ohm": true["r_phase_ohm"] * gain / real.current,
+        "r_phase_ohm": true["r_phase_ohm"] * gain / real.current + switches_ohm,
     }
     return Trial(campaign, true, seen)
 

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.estimation.electrical.link import link_voltage_v
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.electrical.sample_hold import hold_s
 from pipeline.estimation.electrical.voltage_rows import (
@@ -254,7 +255,9 @@ def _estimates(
 def _unlogged(
     rows: VoltageRows, fit: LinearFit, name: str, value: float, magnet: float
 ) -> tuple[list[Contribution], list[str]]:
-    """What is assumed for the temperatures and the d current that are not logged, and in words."""
+    """What is assumed for what is not logged: temperatures, d current, an inverter's drop; and in
+    words.
+    """
     parts, words, kelvin = [], [], policy().magnet.unlogged_k
     if not all(c.has(PLACE[name]) for c in rows.captures):
         per_kelvin = abs(magnet) if name == GIVES[0] else COPPER_COEFFICIENT_25_1_K
@@ -262,11 +265,25 @@ def _unlogged(
         words.append(f"{PLACE[name]} not logged, taken as 25 ± {kelvin:g} K")
     if name == GIVES[0]:
         parts.append(Contribution(HOLD, value * rows.hold_doubt, "B"))
+    elif switches := _switches_ohm(rows):
+        parts.append(Contribution("assumed:inverter_resistance", switches, "B"))
+        words.append("of commanded voltages: with switches and leads of the inverter")
     along = rows.speed_rad_s if name == GIVES[0] else rows.current_a
     if flux := _unlogged_flux(rows, fit.residuals, along):
         parts.append(Contribution("assumed:id_a:flux", flux, "B"))
         words.append("id_a not logged, taken as 0 but for what varies")
     return parts, words
+
+
+def _switches_ohm(rows: VoltageRows) -> float:
+    """Standard uncertainty of R [ohm] for the switches and leads between a commanded voltage and
+    the terminals; what of their drop only follows the current's sign is fitted.
+    """
+    commanded = [c for c in rows.captures if c.meta.voltage_kind != "measured"]
+    if not commanded:
+        return 0.0
+    drop_v = policy().inverter.conduction_share * max(link_voltage_v(c) for c in commanded)
+    return drop_v / max(float(np.nanmax(np.abs(c.arrays("iq_a")["iq_a"]))) for c in commanded)
 
 
 def _moved(

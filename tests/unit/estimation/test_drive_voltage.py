@@ -13,6 +13,7 @@ from scipy.special import erfc
 from pipeline.estimation.estimators.drive_voltage import ESTIMATOR
 from pipeline.estimation.policy import DEFAULT
 from pipeline.estimation.thermal.magnet_coefficient import SOURCE
+from pipeline.estimation.uncertainty.agreement import reconciled
 from pipeline.numerics.integrals import trapezoid
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
@@ -300,3 +301,24 @@ def test_lateness_and_current_of_the_iron_are_no_resistance(timing: str, lost_sh
     found = estimates(ESTIMATOR, *turned)["r_phase_ohm"]
     assert found.number == pytest.approx(motor.r_phase_ohm, rel=0.015)
     assert abs(found.number - motor.r_phase_ohm) < 3.0 * found.u
+
+
+def test_switches_and_leads_are_in_u_of_a_resistance_by_a_commanded_voltage() -> None:
+    """0.01 ohm beside 0.12 ohm: the voltage that was measured at the terminals decides."""
+    drive = (("drive_0", "drive", {"voltage_timing": "held"}),)
+    (log,) = recorded(drive, 6)[0].captures
+    (table,) = log.tables
+    behind = [pl.col(f"v{axis}_v") + 0.01 * pl.col(f"i{axis}_a") for axis in "dq"]
+    driven = replace(log, tables=(table.with_columns(behind),))
+    found = estimates(ESTIMATOR, driven)["r_phase_ohm"]
+    assert found.number == pytest.approx(0.13, rel=0.01)
+    assert abs(found.number - 0.12) < 2.0 * found.u
+    assert "with switches and leads" in found.note
+    measured = replace(log, meta=replace(log.meta, voltage_kind="measured"))
+    terminals = estimates(ESTIMATOR, measured)["r_phase_ohm"]
+    assert terminals.number == pytest.approx(0.12, rel=0.01)
+    assert terminals.u < 0.01 * terminals.number
+    assert "switches" not in terminals.note
+    plateaus = replace(terminals, method="resistance")
+    decided = reconciled(Constants((plateaus, found))).best("r_phase_ohm")
+    assert decided == plateaus
