@@ -1,4 +1,4 @@
-"""The DC link of an inverter, as a capture tells of it."""
+"""The DC link of an inverter, as a capture shows it."""
 
 from __future__ import annotations
 

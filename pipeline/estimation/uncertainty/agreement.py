@@ -19,7 +19,8 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import METHODS, Contribution, covariance
 
 # One coupling: torque per ampere is 1.5 p psi at small current, whatever the motor.
-SAME = {"kt_peak_nm_a": ("kt_from_ke_nm_a",)}
+KT, DRAG, TORQUE = "kt_peak_nm_a", "torque_coulomb_nm", "torque@"
+SAME = {KT: ("kt_from_ke_nm_a",)}
 
 
 def reconciled(constants: Constants) -> Constants:
@@ -28,6 +29,7 @@ def reconciled(constants: Constants) -> Constants:
     A measured value is judged by the other methods that hold for like conditions and are precise
     enough to say something of it, or exclude it though they are rough. What they scatter beyond
     chance joins its budget with k - 1 degrees of freedom, and its note names methods and values.
+    What is read off a torque transducer takes its share of what torque and flux disagree on.
 
     Parameters
     ----------
@@ -39,11 +41,15 @@ def reconciled(constants: Constants) -> Constants:
     Particle Data Group, Review of Particle Physics, 2024, 5.2.2 (scale factors).
 
     """
-    judged = tuple(
-        _widened(e, judges(constants, e)) if e.known and e.status == "measured" else e
+    judged = [
+        _beyond_speed(_widened(e, judges(constants, e)), constants) if _measured(e) else e
         for e in constants.estimates
-    )
-    return Constants(judged)
+    ]
+    return Constants(tuple(_by_transducer(e, judged) if _measured(e) else e for e in judged))
+
+
+def _measured(estimate: Estimate) -> bool:
+    return estimate.known and estimate.status == "measured"
 
 
 def judges(constants: Constants, estimate: Estimate) -> list[Estimate]:
@@ -80,6 +86,57 @@ def _alike(estimate: Estimate, other: Estimate) -> bool:
     return len(known) < 2 or max(known) <= policy().agreement.speed_ratio * min(known)
 
 
+def _beyond_speed(estimate: Estimate, constants: Constants) -> Estimate:
+    """A drag read at creep speed, with what it differs by from the drag at speed.
+
+    T_c is the drag of any speed; at creep speed Stribeck's excess is in it, which nothing but the
+    drag at speed shows. So it counts whether or not chance would explain it.
+    """
+    if estimate.name != DRAG:
+        return estimate
+    faster = [e for e in constants.all_of(DRAG) if _measured(e) and _faster(e, estimate)]
+    if not faster:
+        return estimate
+    nearest = min(faster, key=lambda e: e.u)
+    excess = abs(estimate.number - nearest.number)
+    note = f"differs by {excess:.2g} {estimate.unit} from the drag at speed ({nearest.method})"
+    return _with(estimate, Contribution(f"{METHODS}{DRAG}", excess, "A", 1.0), note)
+
+
+def _faster(one: Estimate, estimate: Estimate) -> bool:
+    """Whether an estimate is of speeds that are another quantity's (`policy.agreement`)."""
+    fast, slow = (e.at.get("omega_mech_rad_s") for e in (one, estimate))
+    if not isinstance(fast, int | float) or not isinstance(slow, int | float):
+        return False
+    return abs(fast) > policy().agreement.speed_ratio * abs(slow)
+
+
+def _by_transducer(estimate: Estimate, judged: Sequence[Estimate]) -> Estimate:
+    """An estimate with what torque and flux disagree on, as far as it is read off that transducer.
+
+    The transducer's gain is in Kt and in any torque; what Kt differs by from 1.5 p psi may be that
+    gain, and scales with its share of either budget.
+    """
+    for kt in (e for e in judged if e.name == KT != estimate.name):
+        parts = {part.source: part for part in kt.budget}
+        between = parts.get(f"{METHODS}{KT}")
+        for gain in (p for p in estimate.budget if p.source.startswith(TORQUE)):
+            share = parts.get(gain.source)
+            if between is None or share is None or share.u == 0.0:
+                continue
+            part = replace(between, u=gain.u / share.u * between.u)
+            note = "torque and flux disagree on the torque constant, so the transducer is in doubt"
+            return _with(estimate, part, note)
+    return estimate
+
+
+def _with(estimate: Estimate, part: Contribution, note: str) -> Estimate:
+    """An estimate with one more part of its budget, instead of one of the same source."""
+    others = tuple(p for p in estimate.budget if p.source != part.source)
+    notes = "; ".join(words for words in (note, estimate.note) if words)
+    return replace(estimate, budget=(*others, part), note=notes)
+
+
 def _between(methods: Sequence[Estimate]) -> Between:
     """How far methods are apart, with the degrees of freedom of the sum of their variances (JCGM
     100:2008, G.4): those of a narrow estimate say nothing of a difference that a wide one has made.
@@ -101,5 +158,4 @@ def _widened(estimate: Estimate, judging: Sequence[Estimate]) -> Estimate:
     each = ", ".join(f"{e.method} {e.number:.5g} ± {e.u:.2g}" for e in methods)
     words = f"methods disagree beyond chance ({each} {estimate.unit})"
     part = Contribution(f"{METHODS}{estimate.name}", spread.sd, "A", spread.dof)
-    note = "; ".join(w for w in (words, estimate.note) if w)
-    return replace(estimate, budget=(*estimate.budget, part), note=note)
+    return _with(estimate, part, words)

@@ -81,7 +81,10 @@ def test_drag_at_creep_speed_is_not_held_against_drag_at_full_speed() -> None:
     fast = of("inertia", 1.0, 0.005, name, omega_mech_rad_s=300.0)
     creep = of("cogging", 1.5, 0.005, name, omega_mech_rad_s=0.5)
     nearer = of("torque_map", 1.5, 0.005, name, omega_mech_rad_s=100.0)
-    assert reconciled(Constants((fast, creep))).best(name) == fast
+    both = reconciled(Constants((fast, creep)))
+    assert both.best(name) == fast
+    assert part(both.estimates[1]) == pytest.approx(0.5)
+    assert "from the drag at speed (inertia)" in both.estimates[1].note
     assert reconciled(Constants((fast, nearer))).best(name) != fast
 
 
@@ -105,11 +108,29 @@ def test_torque_constant_off_with_a_transducer_off_is_never_stated_narrow() -> N
         ("torque_map_1", "torque_map", {"speed": -0.3}),
         ("open_circuit", "open_circuit", {}),
     )
-    campaign, _ = recorded(plan, 3, motor, BENCH)
-    found = fit_all(campaign, {})[0].best("kt_peak_nm_a")
+    slow_turns = [(f"cogging_{k}", "cogging", {"direction": k}) for k in (1, -1)]
+    campaign, _ = recorded((*plan, *slow_turns), 3, motor, BENCH)
+    constants = fit_all(campaign, {})[0]
+    found, drag = (constants.best(name) for name in ("kt_peak_nm_a", "torque_coulomb_nm"))
     true = 1.5 * MOTOR.pole_pairs * MOTOR.psi_pm_wb
-    assert found is not None
+    assert found is not None and drag is not None
+    assert drag.method == "cogging"
+    assert abs(drag.number - MOTOR.torque_coulomb_nm) < 2.0 * drag.u
+    assert "the transducer is in doubt" in drag.note
     assert found.number / true - 1.0 > 0.012
     low, high = found.interval()
     assert low < true < high
     assert "methods disagree" in found.note
+
+
+def test_stribecks_excess_at_creep_speed_is_in_u_of_coulomb_friction() -> None:
+    """Creep drag 80 % above the drag at speed: it was published with the transducer's 0.2 %."""
+    motor = with_effects(MOTOR, f"[stribeck={0.8 * MOTOR.torque_coulomb_nm}]")
+    slow_turns = [(f"cogging_{k}", "cogging", {"direction": k}) for k in (1, -1)]
+    driven = (("drive_0", "drive", {}), ("spin_down_0", "spin_down", {}))
+    campaign, _ = recorded((*slow_turns, ("open_circuit", "open_circuit", {}), *driven), 3, motor)
+    constants = fit_all(campaign, {})[0]
+    creep = next(e for e in constants.all_of("torque_coulomb_nm") if e.method == "cogging")
+    assert not creep.known or abs(creep.number - MOTOR.torque_coulomb_nm) < 2.0 * creep.u
+    best = constants.best("torque_coulomb_nm")
+    assert best is None or best.method != "cogging"
