@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.estimation import alone
+from pipeline.estimation.electrical.link import largest
 from pipeline.records.capture import Campaign
 from pipeline.records.uncertainty import coverage_factor, type_a, type_b
 from tests.unit.estimation.signals import capture, known_value
@@ -89,8 +90,8 @@ def test_the_largest_of_a_column_leaves_strays_aside() -> None:
     values = np.concatenate([np.linspace(-1.0, 1.0, 101), [50.0, np.nan]])
     made = capture("drive", iq_a=values)
     expected = float(np.percentile(np.abs(values[:-1]), 95.0))
-    assert alone._largest(made, "iq_a") == pytest.approx(expected)
-    assert alone._largest(made, "id_a") == 0.0
+    assert largest(made, "iq_a") == pytest.approx(expected)
+    assert largest(made, "id_a") == 0.0
     t = np.arange(1000) * 1e-3
     angle = np.where(t < 0.5, 30.0 * t, 15.0 - 90.0 * (t - 0.5))
     angle[::7] = np.nan

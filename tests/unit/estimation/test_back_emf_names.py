@@ -41,7 +41,8 @@ def test_a_log_under_current_alone(test: str) -> None:
         assert one is not None, name
         low, high = one.interval()
         assert low <= true <= high, name
-        assert one.u < 0.02 * true, name
+        switches = name == "r_phase_ohm"  # a commanded voltage holds them and the leads
+        assert one.u < (0.04 if switches else 0.02) * true, name
 
 
 def test_the_flux_needs_pole_pairs() -> None:
