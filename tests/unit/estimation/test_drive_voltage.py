@@ -298,9 +298,10 @@ def test_lateness_and_current_of_the_iron_are_no_resistance(timing: str, lost_sh
     senses = {f"map_{k}": {"speed": 0.9 * k, "voltage_timing": timing} for k in (1, -1)}
     logs = recorded([(stem, "torque_map", how) for stem, how in senses.items()], 3, braked)[0]
     turned = [_with_iron_current(log, motor, siemens) for log in logs.captures]
-    found = estimates(ESTIMATOR, *turned)["r_phase_ohm"]
-    assert found.number == pytest.approx(motor.r_phase_ohm, rel=0.015)
-    assert abs(found.number - motor.r_phase_ohm) < 3.0 * found.u
+    for maps in (turned, turned[:1]):  # one sense alone, as files are held against each other
+        found = estimates(ESTIMATOR, *maps)["r_phase_ohm"]
+        assert found.number == pytest.approx(motor.r_phase_ohm, rel=0.015)
+        assert abs(found.number - motor.r_phase_ohm) < 3.0 * found.u
 
 
 def test_switches_and_leads_are_in_u_of_a_resistance_by_a_commanded_voltage() -> None:
