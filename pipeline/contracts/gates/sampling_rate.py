@@ -74,8 +74,10 @@ def _spin(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _rotor_frame(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Of readings of an instant: means in the rotor's frame alias nothing, however long."""
     stated, top = capture.meta.pole_pairs, _top_speed_rad_s(capture)
-    if stated is None or top == 0.0 or not capture.has("vq_v"):
+    instant = capture.meta.voltage_timing == "instant"
+    if stated is None or top == 0.0 or not capture.has("vq_v") or not instant:
         return Passed()
     samples = TURN_RAD / (stated * top * _interval_s(capture))
     return _judge(capture, samples, 0.0, options["frame_warn"], "in the shortest electrical period")

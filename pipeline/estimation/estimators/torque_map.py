@@ -107,9 +107,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if _enough(turning):
         points = turning
     if not _enough(points):
-        groups = len({p.group for p in points})
-        note = f"{len(points)} settled points at {groups} speeds; {EXPERIMENT}"
-        return METHOD.nothing(GIVES, note)
+        return METHOD.nothing(GIVES, _too_few(captures, table, points))
     alpha, _ = magnet_coefficient(known)
     chosen = _chosen(points, alpha, options["level"])
     model = _regress(points, alpha, chosen)
@@ -117,6 +115,18 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     note = _note(captures, table, points, chosen)
     estimates = _estimates(points, model, chosen, still, known, note)
     return Fit(estimates, _evidence(points, model, alpha, chosen))
+
+
+def _too_few(captures: Sequence[Capture], table: PointTable, points: Sequence[Point]) -> str:
+    """What the torque maps lack: levels that last, torque, or enough of them."""
+    rows = policy().evidence.rows
+    if captures and not table.points:
+        return (
+            f"no level of current holds still for {rows} rows of the log: hold each level for "
+            "longer, or log at a higher rate"
+        )
+    groups = len({p.group for p in points})
+    return f"{len(points)} settled points at {groups} speeds; {EXPERIMENT}"
 
 
 def _enough(points: Sequence[Point]) -> bool:

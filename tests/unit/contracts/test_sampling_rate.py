@@ -28,3 +28,13 @@ def test_a_line_without_a_value_leaves_the_step_to_the_others() -> None:
     blank = np.full(t.size, np.nan)
     made = capture("current_step", ia_a=blank, ib_a=10.0 * current)
     assert said("sampling_rate", made) == "warned"
+
+
+@pytest.mark.parametrize(("timing", "expected"), [("instant", "warned"), ("centred", "")])
+def test_means_in_the_rotors_frame_alias_nothing(timing: str, expected: str) -> None:
+    """0.4 readings an electrical period."""
+    speed, steady = np.full(400, TURN / (5.0 * 0.4 * 1e-4)), np.ones(400)
+    dq = dict.fromkeys(("vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm"), steady)
+    made = capture("torque_map", omega_mech_rad_s=speed, **dq,
+                   meta={"pole_pairs": 5, "voltage_timing": timing})  # fmt: skip
+    assert said("sampling_rate", made) == expected

@@ -24,6 +24,7 @@ from pipeline.estimation.uncertainty.agreement import judges, reconciled
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import type_a, type_b
+from tests.recovery.simulated import recorded
 from tests.unit.estimation.points import point
 from tests.unit.estimation.signals import capture, estimates, known_value
 from tests.unit.estimation.test_motion_parts import coasting, log
@@ -294,3 +295,14 @@ def test_the_regression_of_a_map_gives_its_points_their_rows() -> None:
     chi2 = left @ w @ left / mean / 2.0
     assert found.covariance == pytest.approx(np.linalg.inv(x.T @ w @ x / mean) * chi2)
     assert found.dof == 2
+
+
+def test_levels_of_few_rows_are_said_to_be_too_short() -> None:
+    """A map whose levels last for eight rows is no lack of a map."""
+    (full,) = recorded((("torque_map_0", "torque_map", {"dwell_s": 0.06}),), 3)[0].captures
+    levels = 24
+    thinned = full.tables[0].gather_every(full.tables[0].height // (8 * levels))
+    found = estimates(torque_map.ESTIMATOR, replace(full, tables=(thinned,)))["kt_peak_nm_a"]
+    assert not found.known
+    assert found.note.startswith("no level of current holds still for 20 rows of the log")
+    assert "hold each level for longer" in found.note
