@@ -97,6 +97,8 @@ def choice(name: str, values: tuple[float, ...], words: str = "") -> Parameter:
 
 UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
 """Nuisance that stands for a temperature where a test that warms the machine did not record it."""
+WARMING = {"temp_winding_degc": "warming_winding_k", "temp_magnet_degc": "warming_magnet_k"}
+"""Nuisance of what such a temperature rises by from the begin to the end of one capture."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from pipeline.criticism.data.sensor_noise import rounding_step
 from pipeline.criticism.data.settling import settling_of
 from pipeline.criticism.data.traces import LINES_V, with_values
 from pipeline.criticism.operating import Array
-from pipeline.criticism.parameter import UNLOGGED, Machine
+from pipeline.criticism.parameter import UNLOGGED, WARMING, Machine
 from pipeline.criticism.policy.policy import DEFAULT, Policy
 from pipeline.physics.coupling import COUPLINGS, coupling_from
 from pipeline.physics.frames import vector_of_lines
@@ -97,7 +97,8 @@ def _unlogged(campaign: Campaign) -> dict[str, tuple[str, str]]:
     """Column and capture [path], by nuisance, of the temperatures that captures do not record.
 
     Captures of one day may be of a cold machine and of a warm one. One that alone lacks a column
-    has the nuisance that all captures have in common.
+    has the nuisance that all captures have in common. Under a current that is logged a machine
+    warms as well.
     """
     nuisances: dict[str, tuple[str, str]] = {}
     warm = [c for c in campaign.captures if c.meta.test not in (*_SHAFT_ALONE, *_TABLES)]
@@ -105,6 +106,9 @@ def _unlogged(campaign: Campaign) -> dict[str, tuple[str, str]]:
         paths = sorted(c.path for c in warm if not c.has(column))
         if len(paths) > 1:
             nuisances |= {f"{nuisance}_{n}": (column, path) for n, path in enumerate(paths)}
+        logs = (c for c in campaign.of(*_TRACED) if c.has("iq_a") and not c.has(column))
+        loaded = sorted(c.path for c in logs)
+        nuisances |= {f"{WARMING[column]}_{n}": (column, path) for n, path in enumerate(loaded)}
     return nuisances
 
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from pipeline.criticism.effect import CoenergyHook, Effect, Hooks
 from pipeline.criticism.operating import Array, Complex, Noted, Operating, Values
-from pipeline.criticism.parameter import Machine, Parameter
+from pipeline.criticism.parameter import WARMING, Machine, Parameter
 from pipeline.criticism.policy.captures import Priors
 from pipeline.criticism.policy.policy import Policy
 
@@ -139,7 +139,7 @@ COAST_SHARES = ("coast_dry_share", "coast_viscous_share")
 """Nuisances of a coast beside other tests with drags: friction repeats to some percent."""
 OPEN_FLUX = "open_flux_share"
 """Nuisance of an open-circuit test beside other tests that turn: a magnet may have lost flux."""
-CURVED = tuple(constant.name for constant in BASE if constant.curved)
+CURVED = (*(constant.name for constant in BASE if constant.curved), *WARMING.values())
 """How the names of nuisances begin along which no residual is linear."""
 OF_SIGNALS = frozenset(c.name for c in BASE if c.hook in ("gain", "log"))
 """Constants of sensors and logs: a segment observes them as its sensors and `fixed` say."""
@@ -162,7 +162,7 @@ def base_of(machine: Machine) -> tuple[Constant, ...]:
     further = sorted(set(machine.stated_u) - known)
     gains = (_gain(name, words="gain of a further instrument") for name in further)
     warmth = (
-        _unlogged(name, words=f"{column} of {path} over that of others")
+        _unlogged(name, words=f"{column} of {path} over that of others, or its rise there")
         for name, (column, path) in machine.unlogged.items()
     )
     return (*BASE, *gains, *warmth)

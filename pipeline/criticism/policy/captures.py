@@ -388,6 +388,8 @@ class Priors:
         "inductances differ by a third",
     )  # fmt: skip
     unlogged_k: float = chosen(
-        UNLOGGED_U_K, "K", "winding or magnet over ambient where its temperature was not recorded",
+        UNLOGGED_U_K, "K",
+        "winding or magnet over ambient where its temperature was not recorded, and what it rises "
+        "by in a log under current",
         why="most motors on a bench lie within twice that of their surroundings",
     )  # fmt: skip

@@ -219,7 +219,11 @@ def unrecorded_signals(campaign: Campaign, cut_segments: Sequence[Segment]) -> t
 def _warmer(fit: Fit, name: str) -> dict[str, float]:
     """How much warmer [K] each capture without this temperature is fitted than most of them."""
     known = fit.model.machine.unlogged
-    fitted = {path: fit.values[key] for key, (signal, path) in known.items() if signal == name}
+    fitted = {
+        path: fit.values[key]
+        for key, (signal, path) in known.items()
+        if signal == name and key.startswith(UNLOGGED[name])
+    }
     # what all have in common is in the shared nuisance, or in theirs
     usual = float(np.median(list(fitted.values()))) if fitted else 0.0
     return {path: value - usual for path, value in fitted.items()}

@@ -29,7 +29,7 @@ from pipeline.criticism.operating import (
     Values,
     between,
 )
-from pipeline.criticism.parameter import UNLOGGED, Machine
+from pipeline.criticism.parameter import UNLOGGED, WARMING, Machine
 from pipeline.criticism.policy.captures import Cutting
 
 
@@ -382,7 +382,8 @@ def _warmth(segment: Segment, signals: Signals, name: str, size: int, values: Va
     if name not in signals:
         known = [UNLOGGED[name], *([UNLOGGED_AT_REST] if name == "temp_winding_degc" else [])]
         warmed = sum(values[one] for one in segment.fixed if one.startswith(tuple(known)))
-        return np.full(size, segment.fixed["ambient_k"] + warmed)
+        rise = sum(values[one] for one in segment.fixed if one.startswith(WARMING[name]))
+        return segment.fixed["ambient_k"] + warmed + rise * np.linspace(-0.5, 0.5, size)
     warm = signals[name] - 25.0 - values["offset_temp_k"]
     return np.repeat(warm, size // warm.size)
 

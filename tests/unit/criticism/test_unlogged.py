@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.criticism.comparison import compare
 from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.diagnosis import base_fit, diagnose
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
@@ -25,14 +26,17 @@ U_K = DEFAULT.priors.unlogged_k
 REACH = 1.96
 
 
-def spins(*without: str) -> Campaign:
+def spins(*columns: str) -> Campaign:
     plan = (
         ("cold", "open_circuit", {}),
         ("warm", "open_circuit", {"temp_magnet_degc": 58.0, "levels": (-0.3, -0.6)}),
     )
-    whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), 1, plan))
+    return without(campaign_of(campaign(MOTOR, Bench(instruments=EXACT), 1, plan)), *columns)
+
+
+def without(whole: Campaign, *columns: str) -> Campaign:
     kept = (
-        replace(one, tables=tuple(t.drop(without, strict=False) for t in one.tables))
+        replace(one, tables=tuple(t.drop(columns, strict=False) for t in one.tables))
         for one in whole.captures
     )
     return replace(whole, captures=tuple(kept))
@@ -94,6 +98,22 @@ def test_a_hot_winding_at_rest_without_a_thermometer():
     r = both.parameters["r_ohm"]
     assert abs(r.value - TRUE["r_phase_ohm"]) < REACH * r.u
     assert r.u / r.value < 0.01
+
+
+def test_a_winding_that_warms_within_a_log_without_a_thermometer_is_no_effect():
+    """Six kelvin in a second were named `skin_effect`; with thermometers nothing was missing."""
+    light = {name: getattr(MOTOR, name) / 120.0 for name in ("cth_winding_j_k", "cth_magnet_j_k")}
+    plan = tuple((f"drive_{n}", "drive", {}) for n in range(2))
+    whole = campaign_of(campaign(replace(MOTOR, **light), Bench(instruments=EXACT), 8, plan))
+    temperatures = [c.arrays("temp_winding_degc", "temp_magnet_degc") for c in whole.captures]
+    rises = [t["temp_winding_degc"][-1] - t["temp_winding_degc"][0] for t in temperatures]
+    assert min(rises) > 5.0
+    for captures in (whole, without(whole, "temp_winding_degc", "temp_magnet_degc")):
+        result = diagnose(captures, ModelSpec(), Constants())
+        assert (result.verdict, result.missing) == ("adequate", ())
+    values = base_fit(captures, ModelSpec(), Constants()).system.fit.values
+    for n, rise in enumerate(rises):
+        assert values[f"warming_winding_k_{n}"] == pytest.approx(rise, rel=0.4)
 
 
 def test_a_shaft_that_rests_has_no_speed():
