@@ -128,7 +128,7 @@ def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> BaseFit 
     if machine is None:
         return PAIRLESS
     cut_segments = segments(campaign, machine)
-    if _enough(cut_segments):
+    if _enough(cut_segments, machine):
         return fit_of(cut_segments, model_of(model, machine))
     return (
         TOO_LITTLE
@@ -261,9 +261,13 @@ def _as_reported(system: LinearSystem, remainders: Sequence[Remainder]) -> tuple
     return tuple(replace(r, signal=names[r.capture, r.signal]) for r in reported)
 
 
-def _enough(cut_segments: Sequence[Segment]) -> bool:
-    """Whether some test turns the machine: coasts alone show drags over an inertia."""
-    return any(equation_of(segment).use.turns for segment in cut_segments)
+def _enough(cut_segments: Sequence[Segment], machine: Machine) -> bool:
+    """Whether some test turns the machine: coasts alone show drags over an inertia, and free motion
+    under a current over the flux linkage as well, where nothing states that.
+    """
+    of_segments = [equation_of(segment) for segment in cut_segments]
+    moved = any({"psi_wb", "j_kgm2"} <= {*one.observes.constants} for one in of_segments)
+    return (moved and "psi_wb" in machine.stated) or any(one.use.turns for one in of_segments)
 
 
 def _insufficient(

@@ -70,6 +70,29 @@ def test_a_diagnosis_rests_on_what_is_stated_as_well():
     assert abs(value - TRUE["torque_coulomb_nm"]) < REACH * u
 
 
+@pytest.mark.parametrize("size_nm", [0.0, 0.02])
+def test_a_stated_torque_constant_is_enough_for_a_log_of_current_and_motion(size_nm):
+    """A drive without voltages and transducer was `insufficient`, whatever the motor."""
+    motor = MOTOR.having(cogging=size_nm) if size_nm else MOTOR
+    plan = tuple((f"drive_{n}", "drive", {"load": 0.0}) for n in range(2))
+    logs = campaign_of(campaign(motor, Bench(instruments=EXACT), 5, plan))
+    lacking = ("vd_v", "vq_v", "torque_shaft_nm")
+    bare = tuple(
+        replace(one, tables=tuple(t.drop(lacking, strict=False) for t in one.tables))
+        for one in logs.captures
+    )
+    free = pipeline.Recordings({logs.motor_id: replace(logs, captures=bare)})
+    (blind,) = pipeline.diagnose(free).motors.values()
+    assert (blind.verdict, blind.ladder) == ("insufficient", ())
+    kt = 1.5 * PAIRS * PSI
+    (found,) = pipeline.diagnose(
+        free, constants={"kt_peak_nm_a": kt, "u_kt_peak_nm_a": 0.01 * kt}
+    ).motors.values()
+    assert found.missing == (("cogging",) if size_nm else ())
+    value, u, *_ = found.ladder[-1].parameters["coulomb_friction.torque_nm"]
+    assert abs(value - TRUE["torque_coulomb_nm"]) < REACH * u < 0.2 * value
+
+
 def test_a_constant_that_cannot_be_stated_is_refused():
     with pytest.raises(pipeline.records.errors.UsageError, match="no constant 'kt_peak'"):
         pipeline.compare(recorded("spin_down"), constants={"kt_peak": 0.1})
