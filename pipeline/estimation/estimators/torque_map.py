@@ -107,7 +107,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if _enough(turning):
         points = turning
     if not _enough(points):
-        return METHOD.nothing(GIVES, _too_few(captures, table, points))
+        return METHOD.nothing(GIVES, _too_few(table, points))
     alpha, _ = magnet_coefficient(known)
     chosen = _chosen(points, alpha, options["level"])
     model = _regress(points, alpha, chosen)
@@ -117,13 +117,12 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     return Fit(estimates, _evidence(points, model, alpha, chosen))
 
 
-def _too_few(captures: Sequence[Capture], table: PointTable, points: Sequence[Point]) -> str:
+def _too_few(table: PointTable, points: Sequence[Point]) -> str:
     """What the torque maps lack: levels that last, torque, or enough of them."""
-    rows = policy().evidence.rows
-    if captures and not table.points:
+    if 2 * table.settled_rows < table.rows:
         return (
-            f"no level of current holds still for {rows} rows of the log: hold each level for "
-            "longer, or log at a higher rate"
+            f"{len(table.points)} levels of current hold still for {policy().evidence.rows} rows "
+            "once settled: hold each level for longer, or log at a higher rate"
         )
     groups = len({p.group for p in points})
     return f"{len(points)} settled points at {groups} speeds; {EXPERIMENT}"

@@ -100,7 +100,7 @@ def test_torque_map_without_steps_names_the_experiment() -> None:
     short = replace(first, tables=(first.tables[0].head(30),))
     found = fitted(TORQUE_MAP, Campaign("m", (short,))).estimates
     assert {e.status for e in found} == {"not_identifiable"}
-    assert all("record a torque_map" in e.note for e in found)
+    assert all("hold each level for longer" in e.note for e in found)
 
 
 def test_masked_rows_are_not_used() -> None:

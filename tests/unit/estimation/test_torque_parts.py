@@ -306,7 +306,7 @@ def test_levels_of_few_rows_are_said_to_be_too_short() -> None:
     thinned = full.tables[0].gather_every(full.tables[0].height // (8 * levels))
     found = estimates(torque_map.ESTIMATOR, replace(full, tables=(thinned,)))["kt_peak_nm_a"]
     assert not found.known
-    assert found.note.startswith("no level of current holds still for 20 rows of the log")
+    assert found.note.startswith("0 levels of current hold still for 20 rows once settled")
     assert "hold each level for longer" in found.note
 
 
