@@ -9,7 +9,6 @@ from typing import Self
 
 from pipeline.io.ingest.entry import Entry
 from pipeline.io.ingest.guard import ReadLimits
-from pipeline.io.storage.gate import Gate
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation
@@ -135,34 +134,6 @@ class ModelTest:
 
     def without(self, path: str, reason: str) -> ModelTest:
         """The task with a file refused for a reason."""
-        return replace(self, job=self.job.without(path, reason))
-
-
-@dataclass(frozen=True, slots=True)
-class HeldJob:
-    """A motor's job that begins before it is sure that its files are complete: it writes none
-    before its gate opens.
-    """
-
-    job: MotorJob
-    gate: Gate
-
-    @property
-    def name(self) -> str:
-        """What the task works on."""
-        return self.job.name
-
-    def without(self, path: str, reason: str) -> HeldJob:
-        """The task with a file refused for a reason.
-
-        Parameters
-        ----------
-        path
-            The file, relative to the input folder.
-        reason
-            The reason, in words.
-
-        """
         return replace(self, job=self.job.without(path, reason))
 
 

@@ -15,7 +15,7 @@ from pipeline.execution.caches.keys import batch_parts, key_of, motor_parts
 from pipeline.execution.caches.run_cache import Batch, RunCache
 from pipeline.execution.caches.stamp import configuration_digest
 from pipeline.execution.caches.versions import RUN, tools
-from pipeline.execution.jobs import HeldJob, ModelTest, MotorJob, MotorResult, WarmUp
+from pipeline.execution.jobs import ModelTest, MotorJob, MotorResult, WarmUp
 from pipeline.execution.outputs.publishing import (
     fleet_of,
     other_motors,
@@ -34,6 +34,7 @@ from pipeline.execution.outputs.statuses import (
     with_current_statuses,
 )
 from pipeline.execution.tasks.survey_tasks import survey_with
+from pipeline.execution.workers.gate import HeldJob
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.entry import Entry

@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.execution.workers.gate import Gate
 from pipeline.execution.workers.pools import Pool, local_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.guard import ReadLimits, reading
-from pipeline.io.storage.gate import Gate
 from pipeline.records.errors import CaptureError, MachineError
 
 pytestmark = pytest.mark.workers

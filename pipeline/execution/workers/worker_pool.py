@@ -17,10 +17,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, Self
 
+from pipeline.execution.workers.gate import Gate
 from pipeline.execution.workers.pools import OpenPool, Pool
 from pipeline.execution.workers.task import LOGGER, Report, perform
 from pipeline.io.ingest.guard import CrashReport, crash_report
-from pipeline.io.storage.gate import Gate
 from pipeline.records.errors import MachineError, PipelineError
 
 RERUN = "finished work is cached: run the same command again to continue"

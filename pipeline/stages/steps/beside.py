@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from pipeline.execution.caches.run_cache import RunCache
-from pipeline.execution.jobs import HeldJob, ModelTest, MotorJob
+from pipeline.execution.jobs import ModelTest, MotorJob
+from pipeline.execution.workers.gate import HeldJob
 from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.settings import RunSettings
 

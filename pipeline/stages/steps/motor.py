@@ -20,8 +20,8 @@ from pipeline.execution.jobs import Finished, MotorJob, MotorResult, WarmUp
 from pipeline.execution.tasks import work
 from pipeline.execution.tasks.model_tests import judged_model
 from pipeline.execution.tasks.start import starts_from_fits
+from pipeline.execution.workers.gate import Gate
 from pipeline.execution.workers.segment_worker import open_own, shared_or_in_order
-from pipeline.io.storage.gate import Gate
 from pipeline.io.storage.publish import canonical_json, together
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants

@@ -1,4 +1,4 @@
-"""A gate that the driver holds closed before a worker: the work goes on, or is dropped.
+"""A gate that the driver holds closed before a worker, and a motor's job that waits at one.
 
 It opens by taking a file away, which a full disk does not prevent. A worker that waits ends with
 its driver, as every worker does.
@@ -7,8 +7,10 @@ its driver, as every worker does.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+from pipeline.execution.jobs import MotorJob
 
 LOOK_EVERY_S = 0.01
 
@@ -52,3 +54,31 @@ class Gate:
     @property
     def _wanted(self) -> Path:
         return Path(f"{self.place}.wanted")
+
+
+@dataclass(frozen=True, slots=True)
+class HeldJob:
+    """A motor's job that begins before it is sure that its files are complete: it writes none
+    before its gate opens.
+    """
+
+    job: MotorJob
+    gate: Gate
+
+    @property
+    def name(self) -> str:
+        """What the task works on."""
+        return self.job.name
+
+    def without(self, path: str, reason: str) -> HeldJob:
+        """The task with a file refused for a reason.
+
+        Parameters
+        ----------
+        path
+            The file, relative to the input folder.
+        reason
+            The reason, in words.
+
+        """
+        return replace(self, job=self.job.without(path, reason))
