@@ -360,8 +360,8 @@ class _Sampler:
         pieces = self.pieces
         if column.name == "b_nm_s_rad":
             pieces = replace(pieces, drag_nm=pieces.drag_nm + step * x.omega_rad_s)
-        elif column.name == "lead_ohm":
-            lead = step * self.mean.i_a * float(x.inverter and not x.supply.measured)
+        elif column.name == "lead_share":
+            lead = step * self.values["r_ohm"] * self.mean.i_a * float(x.inverter)
             pieces = replace(pieces, drop_v=pieces.drop_v + lead)
         elif column.name not in _BETWEEN:
             pieces = evaluate(self.model, x, moved, self.hooks)
