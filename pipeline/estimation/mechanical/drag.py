@@ -23,9 +23,6 @@ from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import Array, LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns
 
-OF_CURRENTS = ("d current", "q current cubed", "d squared q current", "d q current cubed")
-"""Torques of the currents beside K i_q that only the drives' rows show."""
-
 
 def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float) -> DragFit:
     """Fits the rows: Coulomb and viscous first, then what the data demand, then a free curve.
@@ -68,7 +65,6 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
     u_form, reasons = _form_allowance(fit.coefficients, free, rows)
     if not free:
         u_form = _shape_allowance(law, candidates, chosen, fit.coefficients, y, sigma)
-        u_form = np.hypot(u_form, _moved(law, candidates, chosen, fit.coefficients, y, sigma))
     return DragFit(
         design.names, fit.coefficients, covariance, fit.residuals, dof, free, u_form, reasons,
         design.columns, sigma, y, rows.fastest_rad_s,
@@ -196,28 +192,6 @@ def _shape_allowance(
         for k in range(3)
     ]
     return np.array(apart) / 2.0
-
-
-def _moved(
-    base: Array,
-    candidates: Mapping[str, Array],
-    chosen: Sequence[str],
-    coefficients: Array,
-    y: Array,
-    sigma: Array,
-) -> Array:
-    """How far T_c and B move with one torque of the currents left out, at most; 0 for J.
-
-    Such a nuisance absorbs what is missing, whatever it is. Where i_d goes with speed, part of it
-    may be drag, and drag part of it.
-    """
-    drag = coefficients[1:3] / coefficients[0]
-    moved = np.zeros(3)
-    for name in (n for n in chosen if n in OF_CURRENTS):
-        columns = [base, *(candidates[n] for n in chosen if n != name)]
-        without = linear_fit(np.column_stack(columns), y, sigma).coefficients
-        moved[1:] = np.maximum(moved[1:], np.abs(without[1:3] / without[0] - drag))
-    return moved
 
 
 def _implausible(rows: ShaftRows, design: Design, y: Array, sigma: Array) -> bool:

@@ -20,13 +20,11 @@ from pipeline.estimation.estimators.inertia import (
 from pipeline.estimation.mechanical.drag_fit import DragFit
 from pipeline.estimation.mechanical.locked_rotor import angle_doubt, ripple_share, standstill_words
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
-from pipeline.estimation.registry import fit_all
 from pipeline.estimation.uncertainty.agreement import judges, reconciled
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import type_a, type_b
-from pipeline.simulator.catalogue import with_effects
-from tests.recovery.simulated import MOTOR, recorded
+from tests.recovery.simulated import recorded
 from tests.unit.estimation.points import point
 from tests.unit.estimation.signals import capture, estimates, known_value
 from tests.unit.estimation.test_motion_parts import coasting, log
@@ -308,19 +306,3 @@ def test_levels_of_few_rows_are_said_to_be_too_short() -> None:
     assert not found.known
     assert found.note.startswith("0 levels of current hold still for 20 rows once settled")
     assert "hold each level for longer" in found.note
-
-
-def test_what_a_torque_of_the_currents_moves_friction_by_is_in_its_u() -> None:
-    """Cross saturation beside a drive's drag: a cubic torque joins, and T_c and b go with it."""
-    motor = with_effects(MOTOR, "[cross_saturation]")
-    drives = [(f"drive_{k}", "drive", {"load": 0.0}) for k in range(2)]
-    campaign = recorded((*drives, ("open_circuit", "open_circuit", {})), 14, motor)[0]
-    names = ("torque_coulomb_nm", "b_visc_nm_s_rad")
-    with_it = fit_all(campaign, {})[0]
-    without = fit_all(campaign, {"inertia": {"level": 1e-300}})[0]
-    for name in names:
-        one, other = with_it.best(name), without.best(name)
-        assert one is not None and other is not None
-        assert "q current cubed" in one.note
-        assert any(part.source == "assumed:drag_form" and part.u > 0.0 for part in one.budget)
-        assert abs(one.number - other.number) < 2.0 * one.u
