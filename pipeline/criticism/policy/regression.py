@@ -112,7 +112,7 @@ class NoiseFloors:
     unseen: float = chosen(
         0.01, "1", "variance of an angle's rounding over that of noise, to which all windows are "
         "taken to have the same",
-        why="it adds half a per cent to a floor, and ten times as much where it creeps",
+        why="it adds half a per cent to a floor, six where one window of twelve has all of it",
     )  # fmt: skip
     reading: float = chosen(
         5e-5, "1", "error of a reading that no sensor is better than",

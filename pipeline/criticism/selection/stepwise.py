@@ -11,12 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.operating import Array
-from pipeline.criticism.regression.fit import (
-    Fit,
-    floors,
-    floors_grown,
-    tolerances,
-)
+from pipeline.criticism.regression.fit import Fit, floors, floors_grown, tolerances
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
 from pipeline.criticism.regression.goodness import (
     HeldOut,

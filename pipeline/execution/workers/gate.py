@@ -71,14 +71,5 @@ class HeldJob:
         return self.job.name
 
     def without(self, path: str, reason: str) -> HeldJob:
-        """The task with a file refused for a reason.
-
-        Parameters
-        ----------
-        path
-            The file, relative to the input folder.
-        reason
-            The reason, in words.
-
-        """
+        """The task with a file refused for a reason."""
         return replace(self, job=self.job.without(path, reason))
