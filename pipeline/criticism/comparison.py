@@ -14,13 +14,13 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out
-from pipeline.criticism.regression.identifiability import (
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
+from pipeline.criticism.regression.mains_hum import hum_notes
+from pipeline.criticism.regression.reported import (
     against_stated,
     reported_combinations,
     reported_parameters,
 )
-from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.missing_data import (

@@ -23,13 +23,14 @@ from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, of_motor, over_floor
-from pipeline.criticism.regression.identifiability import against_stated, reported_combinations
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import hum_notes
+from pipeline.criticism.regression.reported import against_stated, reported_combinations
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import Ladder, SearchResult, search_ladder
 from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
+from pipeline.criticism.selection.candidates import Candidate, candidates
 from pipeline.criticism.selection.missing_data import (
     loaded_drives,
     mixed_coasts,
@@ -42,7 +43,7 @@ from pipeline.criticism.selection.missing_data import (
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.other_readings import reading_notes
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of
-from pipeline.criticism.selection.score_test import Candidate, Score, candidates
+from pipeline.criticism.selection.score_test import Score
 from pipeline.criticism.selection.stepwise import LadderStep, loss_without
 from pipeline.criticism.validation.signature import signature
 from pipeline.physics.notation import number_text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.criticism.regression.goodness import HeldOut, signal_errors
-from pipeline.criticism.regression.identifiability import reported_parameters
+from pipeline.criticism.regression.reported import reported_parameters
 from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.criticism.validation.error_maps import (
     angle_maps,

@@ -38,8 +38,8 @@ ARITHMETIC = {
         "_SHORT",
         "_SIN_120",
     },  # rounding; legs
-    # a centre of ±1/12; a complex step; all but zero
-    "machine/model.py": {"BASE", "_STEP", "_NOTHING"},
+    "machine/coenergy.py": {"_STEP"},  # a complex step
+    "machine/model.py": {"BASE", "_NOTHING"},  # a centre of ±1/12; all but zero
     "machine/two_masses.py": {"LINEAR_COUPLING"},  # sizes that an effect states for itself
     "regression/bounds.py": {"_AT"},  # rounding
     "selection/changed_between.py": {"_FREE"},  # the whole of a share
@@ -49,10 +49,11 @@ ARITHMETIC = {
     "regression/fit.py": {"_SEED"},
     "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart
     "regression/identifiability.py": {"_EDGE"},  # rounding
-    "regression/linearise.py": {"_CHUNK", "_NOTHING", "_FINE"},  # the cache; rounding; differences
+    "regression/linearise.py": {"_CHUNK"},  # the cache
     "regression/mains_hum.py": {"LINES_HZ", "_BESIDE", "_LOBE", "_FINER"},  # mains; Hann's window
     "regression/normal_equations.py": {"_TIE", "_SAFE"},  # rounding
     "regression/parallel.py": {"_THREADS"},  # how work is run
+    "regression/sampler.py": {"_NOTHING", "_FINE"},  # rounding; differences
     "validation/free_run.py": {"_SEED"},
     # cells of a picture, when its waves are laid over each other; a turn
     "validation/signature.py": {"_CELLS", "_FEWEST", "_MANY_WAVES", "_FINE", "_FEWEST_PHASES"},

@@ -9,7 +9,7 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.selection.score_test import candidates
+from pipeline.criticism.selection.candidates import candidates
 from tests.unit.criticism.machines import BASE, log, machine
 
 MODEL = Model(machine(), ())

@@ -25,7 +25,7 @@ from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.linearise import linearise
 from pipeline.criticism.regression.noise_floors import Floor
 from pipeline.criticism.regression.noise_propagation import noise_floor
-from pipeline.criticism.selection.score_test import Candidate, placed
+from pipeline.criticism.selection.candidates import Candidate, placed
 from pipeline.records.diagnosis import Separation
 
 _GAIN_WORDS = {

@@ -21,7 +21,7 @@ from pipeline.criticism.operating import Array
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import NormalEquations, Prior, pseudo_inverse
-from pipeline.criticism.selection.score_test import clears
+from pipeline.criticism.selection.improvement import clears
 from pipeline.physics.notation import number_text
 
 

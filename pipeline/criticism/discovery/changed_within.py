@@ -25,7 +25,7 @@ from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import pseudo_inverse
-from pipeline.criticism.selection.score_test import clears
+from pipeline.criticism.selection.improvement import clears
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,8 @@ import numpy as np
 
 from pipeline.criticism.discovery.dictionary import POWER
 from pipeline.criticism.discovery.effect_source import effect_source
-from pipeline.criticism.discovery.matching_pursuit import Expression, Pursuit, curve_about
+from pipeline.criticism.discovery.expression import Expression
+from pipeline.criticism.discovery.matching_pursuit import Pursuit, curve_about
 from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.discovery import Discovery

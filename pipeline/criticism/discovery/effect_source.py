@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from pipeline.criticism.discovery.dictionary import CENTRED, POWER, Term
-from pipeline.criticism.discovery.matching_pursuit import Expression
+from pipeline.criticism.discovery.expression import Expression
 from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.policy.discovery import Discovery
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.discovery.bases import Variable
 from pipeline.criticism.discovery.dictionary import CENTRED, POWER, SHAPES, WAVES, Term
+from pipeline.criticism.discovery.expression import Expression
 from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.discovery import Discovery
@@ -31,108 +32,6 @@ _RIDGE = 1e-9
 and no amplitude moves by more than that."""
 Group = tuple[Term, ...]
 """Terms that come in together, as the sine and cosine of an order do."""
-
-
-@dataclass(frozen=True, slots=True)
-class Expression:
-    """Terms with amplitudes [unit of the port] and the covariance of amplitudes and scales.
-
-    `covariance` is in the order of `directions`: (term, "amplitude" or a field of the term).
-    `gain`: fall of −2 log likelihood. `residual` [R]: the residual with everything refitted.
-
-    Attributes
-    ----------
-    terms, amplitudes
-        Terms, and their amplitudes [unit of the input].
-    directions
-        (term, `amplitude` or a field of the term) of each row of the covariance.
-    covariance
-        Of amplitudes and scales, in that order.
-    gain
-        Fall of −2 log likelihood.
-    residual
-        Residual with everything refitted [R].
-
-    """
-
-    terms: tuple[Term, ...]
-    amplitudes: Array
-    directions: tuple[tuple[int, str], ...]
-    covariance: Array
-    gain: float
-    residual: Array
-
-    def value(self, v: Array, carrier: int = 0) -> Array:
-        """The expression on one carrier.
-
-        Parameters
-        ----------
-        v
-            Values of its variable [n].
-        carrier
-            Number of the carrier.
-
-        Returns
-        -------
-        array [n]
-            In the unit of the input.
-
-        """
-        total = np.zeros(np.shape(v))
-        for term, amplitude in zip(self.terms, self.amplitudes, strict=True):
-            if term.carrier == carrier:
-                total = total + amplitude * term.value(v)
-        return total
-
-    def spread(self, v: Array, carrier: int = 0) -> Array:
-        """Standard uncertainty of the expression on one carrier.
-
-        Parameters
-        ----------
-        v
-            Values of its variable [n].
-        carrier
-            Number of the carrier.
-
-        Returns
-        -------
-        array [n]
-            In the unit of the input.
-
-        """
-        rows = [
-            _direction(self.terms[n], self.amplitudes[n], name, v)
-            if self.terms[n].carrier == carrier
-            else np.zeros(np.shape(v))
-            for n, name in self.directions
-        ]
-        if not rows:
-            return np.zeros(np.shape(v))
-        slope = np.stack(rows)
-        variance = np.einsum("iv,ij,jv->v", slope, self.covariance, slope)
-        return np.sqrt(np.maximum(variance, 0.0))
-
-    def u(self, term: int, name: str) -> float:
-        """Standard uncertainty of an amplitude or scale of a term.
-
-        Parameters
-        ----------
-        term
-            Number of the term.
-        name
-            `amplitude` or a field of the term.
-
-        """
-        place = self.directions.index((term, name))
-        return math.sqrt(max(float(self.covariance[place, place]), 0.0))
-
-
-def _direction(term: Term, amplitude: float, name: str, v: Array) -> Array:
-    if name == "amplitude":
-        return term.value(v)
-    step = 1e-4 * (term.scale if name == "scale" else 1.0)
-    moved = replace(term, **{name: getattr(term, name) + step})
-    return amplitude * (moved.value(v) - term.value(v)) / step
 
 
 class Pursuit:

@@ -30,7 +30,8 @@ from pipeline.criticism.signals.shaft import (
     torque_reading,
     true_load,
 )
-from pipeline.criticism.signals.true_state import at_true_angle, drive_current, motion_of, operating
+from pipeline.criticism.signals.true_current import drive_current
+from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
 from pipeline.criticism.signals.voltage import (
     ahead,
     central,

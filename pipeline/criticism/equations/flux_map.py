@@ -11,7 +11,8 @@ from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Tables
-from pipeline.criticism.signals.true_state import at_rest, operating, table_current
+from pipeline.criticism.signals.true_current import table_current
+from pipeline.criticism.signals.true_state import at_rest, operating
 from pipeline.criticism.signals.voltage import recorded_voltage
 from pipeline.records.capture import Capture
 

@@ -14,7 +14,8 @@ from pipeline.criticism.machine.model import Model, Pieces, evaluate
 from pipeline.criticism.operating import Array, Operating, Recorded, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.shaft import net_torque
-from pipeline.criticism.signals.true_state import Motion, operating, table_current, true_current
+from pipeline.criticism.signals.true_current import table_current, true_current
+from pipeline.criticism.signals.true_state import Motion, operating
 from pipeline.records.capture import Capture
 
 _CRAWL = 1e-9

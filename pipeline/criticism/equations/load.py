@@ -14,7 +14,8 @@ from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.shaft import net_torque, sensed_torque, torque_reading, true_load
-from pipeline.criticism.signals.true_state import at_true_angle, drive_current, motion_of, operating
+from pipeline.criticism.signals.true_current import drive_current
+from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
 from pipeline.numerics.projection import projection
 from pipeline.records.capture import Capture
 

@@ -21,13 +21,8 @@ from pipeline.criticism.signals.shaft import (
     torque_reading,
     unexplained_acceleration,
 )
-from pipeline.criticism.signals.true_state import (
-    at_true_angle,
-    drive_current,
-    finer_of,
-    motion_of,
-    operating,
-)
+from pipeline.criticism.signals.true_current import drive_current
+from pipeline.criticism.signals.true_state import at_true_angle, finer_of, motion_of, operating
 from pipeline.numerics.projection import projection
 from pipeline.records.capture import Capture
 

@@ -13,7 +13,8 @@ from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Us
 from pipeline.criticism.machine.model import STATE, UNSAMPLED, Model, Pieces, values_of
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
-from pipeline.criticism.signals.true_state import at_true_angle, drive_current, motion_of, operating
+from pipeline.criticism.signals.true_current import drive_current
+from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
 from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage, unresolved
 from pipeline.numerics.projection import projection, window_starts
 from pipeline.records.capture import Capture

@@ -12,7 +12,8 @@ from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
-from pipeline.criticism.signals.true_state import Motion, operating, table_current
+from pipeline.criticism.signals.true_current import table_current
+from pipeline.criticism.signals.true_state import Motion, operating
 from pipeline.criticism.signals.voltage import recorded_voltage
 from pipeline.records.capture import Capture
 

@@ -14,7 +14,8 @@ from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Recorded, Signals, Values
 from pipeline.criticism.parameter import Machine
-from pipeline.criticism.signals.true_state import at_rest, operating, true_current
+from pipeline.criticism.signals.true_current import true_current
+from pipeline.criticism.signals.true_state import at_rest, operating
 from pipeline.criticism.signals.voltage import central, recorded_voltage
 from pipeline.numerics.projection import Projection, projection, window_starts
 from pipeline.records.capture import Capture

@@ -16,7 +16,8 @@ from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.signals.shaft import as_sensed, net_torque
-from pipeline.criticism.signals.true_state import Motion, operating, table_current
+from pipeline.criticism.signals.true_current import table_current
+from pipeline.criticism.signals.true_state import Motion, operating
 from pipeline.records.capture import Capture
 
 TORQUE = "torque_shaft_nm"

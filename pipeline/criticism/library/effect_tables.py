@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.criticism.effect import Effect, TorqueHook
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.model import air_gap_torque, base_flux, effect_flux
+from pipeline.criticism.machine.coenergy import air_gap_torque, base_flux, effect_flux
 from pipeline.criticism.operating import Array, Operating, ShaftState, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.records.effect_table import EffectTable, EffectTables

@@ -12,7 +12,8 @@ import numpy as np
 
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.effect_tables import at_rest, over_all_ranges
-from pipeline.criticism.machine.model import Model, base_flux, evaluate, values_of
+from pipeline.criticism.machine.coenergy import base_flux
+from pipeline.criticism.machine.model import Model, evaluate, values_of
 from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.records.diagnosis import ReportedParameter

@@ -12,22 +12,19 @@ Woodson & Melcher, Electromechanical Dynamics (1968), ch. 3 (torque from co-ener
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.effect import CoenergyHook, Effect, Hooks
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.machine.coenergy import air_gap_torque, base_flux, effect_flux, flux_of
+from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import Array, Complex, Noted, Operating, Values
 from pipeline.criticism.parameter import WARMING, Machine, Parameter
 from pipeline.criticism.policy.captures import Priors
 from pipeline.criticism.policy.policy import Policy
-
-_STEP = 1e-30
-"""Complex step [A, rad]: its square is below the rounding of anything."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -329,213 +326,6 @@ class Pieces:
     slope_wb: Array
     drop_v: Complex
     drag_nm: Array
-
-
-def base_flux(x: Operating, base: Mapping[str, float]) -> Complex:
-    """Flux linkage of magnet and constant inductances.
-
-    Parameters
-    ----------
-    x
-        True state [n].
-    base
-        Constants of the base model.
-
-    Returns
-    -------
-    array [n], complex
-        L_d i_d + ψ_m + j L_q i_q [Wb].
-
-    """
-    return base["ld_h"] * x.id_a + base["psi_wb"] + 1j * base["lq_h"] * x.iq_a
-
-
-def flux_of(current: Complex, base: Values) -> Complex:
-    """Flux linkage that a current makes in the constant inductances.
-
-    Parameters
-    ----------
-    current
-        Complex [n, A].
-    base
-        Constants of the base model.
-
-    Returns
-    -------
-    array [n], complex
-        L_d i_d + j L_q i_q [Wb].
-
-    """
-    return base["ld_h"] * current.real + 1j * base["lq_h"] * current.imag
-
-
-def effect_flux(effect: Hooks, x: Operating, q: Values) -> tuple[Complex, Array]:
-    """Flux linkage of one effect from its co-energy W, by complex steps.
-
-    Parameters
-    ----------
-    effect
-        With or without a co-energy.
-    x
-        State of the machine [n].
-    q
-        Parameters of the effect by their short names.
-
-    Returns
-    -------
-    flux [n], complex
-        ∂W/∂i_d + j ∂W/∂i_q [Wb].
-    slope [n]
-        ∂W/∂ε [Wb·A], for the torque.
-
-    Notes
-    -----
-    f'(x) = Im f(x + ih)/h is exact to rounding for an analytic f.
-
-    References
-    ----------
-    Squire and Trapp, SIAM Review 40(1), 1998, 110, doi:10.1137/S003614459631241X.
-
-    """
-    hook = effect.coenergy
-    shape = x.omega_rad_s.shape
-    if hook is None:
-        return np.zeros(shape, dtype=complex), np.zeros(shape)
-    ones = np.ones(shape)
-
-    def slope(moved: Operating) -> Array:
-        return np.imag(hook(moved, q)) / _STEP * ones
-
-    by_d = slope(replace(x, id_a=_stepped(x, x.id_a)))
-    by_q = slope(replace(x, iq_a=_stepped(x, x.iq_a)))
-    flux: Complex = by_d + 1j * by_q
-    used = frozenset(name for name, value in q.items() if value)
-    if not x.once(x.eps_rad, (hook, used), lambda: _turns(hook, x.one_sample(), q)):
-        return flux, np.zeros(shape)
-    return flux, slope(replace(x, eps_rad=_stepped(x, x.eps_rad)))
-
-
-def _stepped(x: Operating, column: Array) -> Complex:
-    """A column [n] of a state after its complex step; the same array for all effects."""
-
-    def stepped() -> Complex:
-        return column + np.complex128(1j * _STEP)
-
-    return x.once(column, "beside", stepped)
-
-
-def _turns(hook: CoenergyHook, x: Operating, q: Values) -> bool:
-    """Whether a co-energy has the electrical angle in it: it is complex if that is."""
-    return np.iscomplexobj(hook(replace(x, eps_rad=x.eps_rad + 1j * _STEP), q))
-
-
-def air_gap_torque(x: Operating, psi_wb: Complex, slope_wb: Array) -> Array:
-    """Torque of the air gap.
-
-    Parameters
-    ----------
-    x
-        State of the machine, its currents [n, A].
-    psi_wb
-        Flux linkage [n, Wb].
-    slope_wb
-        ∂W/∂ε of the co-energy [n, Wb·A].
-
-    Returns
-    -------
-    array [n, N·m]
-
-    Notes
-    -----
-    T = 1.5 p [ψ_d i_q − ψ_q i_d + ∂W/∂ε]
-
-    """
-    return 1.5 * x.machine.pole_pairs * (psi_wb.real * x.iq_a - psi_wb.imag * x.id_a + slope_wb)
-
-
-def mean_current(x: Operating, values: Values) -> Operating:
-    """Where the drops of a sample period act: at its mean current, not at the sampled one.
-
-    Parameters
-    ----------
-    x
-        State at the samples [n].
-    values
-        With the nuisances `ripple_slope` and `ripple_mean` [1].
-
-    Returns
-    -------
-    Operating
-        Currents and electrical angle of the period's mean; `x` itself without an inverter.
-
-    Notes
-    -----
-    A voltage is held in the stationary frame while the rotor turns, so that the flux follows chords
-    instead of arcs. So the current ripples, and its mean is that of another instant and is below
-    its samples. The nuisances of the fit say by how much.
-
-    """
-    if not x.inverter or not (values["ripple_slope"] or values["ripple_mean"]):
-        return x
-    current = x.i_a
-    slope = np.zeros(current.shape, dtype=complex)
-    slope[1:-1] = 0.5 * (current[2:] - current[:-2])
-    _, below = ripple(x, values["ripple_mean"], values)
-    mean = current - values["ripple_slope"] * slope - below
-    return replace(x, id_a=mean.real, iq_a=mean.imag, eps_rad=_earlier(x, values["ripple_slope"]))
-
-
-def _earlier(x: Operating, periods: float) -> Array:
-    """Electrical angle [n, rad] so many sample periods ago."""
-    omega = x.omega_rad_s
-
-    def angle() -> tuple[Array, Array]:
-        return omega, x.eps_rad - periods * (x.machine.pole_pairs * omega * x.ts_s)
-
-    _, earlier = x.once(x.eps_rad, ("earlier", periods, id(omega)), angle)
-    return earlier
-
-
-def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]:
-    """What a period's means of flux and current are below the samples.
-
-    Parameters
-    ----------
-    x
-        State at the samples [n].
-    part
-        Share [1]: 1/12 for samples where the voltage changes, −1/24 for samples half a period from
-        there.
-    values
-        Constants of the base.
-
-    Returns
-    -------
-    flux [n, Wb], current [n, A]
-        Complex, d + jq.
-
-    Notes
-    -----
-    A voltage v that is held for T while the rotor turns by φ = ω_e T makes the flux ripple by
-    v T φ; the means are `part` of that below, −j v T φ with v = R i + j ω_e ψ.
-
-    """
-    r_ohm, l_d, l_q = values["r_ohm"], values["ld_h"], values["lq_h"]
-    hold_s, iq_a, omega = x.supply.hold_s, x.iq_a, x.omega_rad_s
-
-    def made() -> tuple[Any, Array, tuple[Complex, Complex]]:
-        turn = x.machine.pole_pairs * omega * hold_s
-        flux = part * turn * (turn * base_flux(x, values) - 1j * hold_s * r_ohm * x.i_a)
-        # what no capture determines is zero
-        return (
-            iq_a,
-            omega,
-            (flux, flux.real / (l_d or math.inf) + 1j * flux.imag / (l_q or math.inf)),
-        )
-
-    of_state = hold_s, id(iq_a), id(omega)
-    name = ("ripple", part, r_ohm, l_d, l_q, values["psi_wb"], *of_state)
-    return x.once(x.id_a, name, made)[2]
 
 
 HOOKS = frozenset({"flux", "drop", "torque"})

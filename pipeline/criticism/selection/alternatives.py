@@ -10,8 +10,8 @@ import numpy as np
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.candidates import Candidate, placed
 from pipeline.criticism.selection.discrimination import discriminate, sharing_discriminator
-from pipeline.criticism.selection.score_test import Candidate, placed
 from pipeline.criticism.selection.sizes import shaped
 from pipeline.criticism.selection.stepwise import loss_without
 

@@ -24,16 +24,9 @@ from pipeline.criticism.regression.linearise import trial_residuals
 from pipeline.criticism.regression.normal_equations import Descent
 from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.observability import observes
-from pipeline.criticism.selection.score_test import (
-    Candidate,
-    Score,
-    Standing,
-    clears,
-    fall_below_floor,
-    paid_for,
-    searched,
-    share_of,
-)
+from pipeline.criticism.selection.candidates import Candidate, searched
+from pipeline.criticism.selection.improvement import Standing, clears, fall_below_floor, share_of
+from pipeline.criticism.selection.score_test import Score, paid_for, ranked
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +96,7 @@ def with_starts(
         if known is None or score.fall > known.fall:
             penalty = score.penalty + searched(offered, effect)
             best[effect.name] = replace(score, penalty=penalty)
-    return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
+    return ranked(best.values())
 
 
 def _best_ends(base: LinearSystem, offered: Sequence[Candidate]) -> list[_End]:

@@ -28,16 +28,9 @@ from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.selection.score_test import (
-    Candidate,
-    Score,
-    Standing,
-    clears,
-    fall_below_floor,
-    paid_for,
-    searched,
-    share_of,
-)
+from pipeline.criticism.selection.candidates import Candidate, first_of_each, searched
+from pipeline.criticism.selection.improvement import Standing, clears, fall_below_floor, share_of
+from pipeline.criticism.selection.score_test import Score, paid_for, ranked
 
 
 def with_linear_start(
@@ -66,15 +59,15 @@ def with_linear_start(
         The largest fall first.
 
     """
-    ranked = list(scores)
-    for candidate in {c.effect.name: c for c in reversed(offered)}.values():
+    so_far = list(scores)
+    for candidate in first_of_each(offered).values():
         form = candidate.effect.linear
         if form is None or not _exceeds_floor(wide, significant, form.channel):
             continue
         begun = _fit_from_form(wide.fit, candidate.effect, form)
         if begun is not None:
-            ranked = with_better(ranked, scored(wide, candidate, begun), offered)
-    return tuple(ranked)
+            so_far = with_better(so_far, scored(wide, candidate, begun), offered)
+    return tuple(so_far)
 
 
 def with_better(
@@ -103,7 +96,7 @@ def with_better(
     others = [score for score in scores if score.candidate.effect.name != name]
     known = [score for score in scores if score.candidate.effect.name == name]
     best = max([started, *known], key=lambda score: score.fall)
-    return sorted([*others, best], key=lambda s: (-s.fall, s.candidate.effect.name))
+    return list(ranked([*others, best]))
 
 
 def _exceeds_floor(wide: LinearSystem, significant: NDArray[np.bool_], channel: str) -> bool:

@@ -20,9 +20,10 @@ from pipeline.criticism.machine.model import zero
 from pipeline.criticism.operating import Values
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.candidates import Candidate, first_of_each
 from pipeline.criticism.selection.discrimination import full_logs, settled
 from pipeline.criticism.selection.linear_start import scored, with_better
-from pipeline.criticism.selection.score_test import Candidate, Score
+from pipeline.criticism.selection.score_test import Score
 
 
 def with_log_start(
@@ -53,8 +54,8 @@ def with_log_start(
         The largest fall first.
 
     """
-    ranked = list(scores)
-    by_name = {c.effect.name: c for c in reversed(offered)}
+    so_far = list(scores)
+    by_name = first_of_each(offered)
     hooks = {c.effect.shown: c for c in by_name.values() if c.effect.shown is not None}
     for hook in hooks if significant.any() else ():
         shown = hook(full_logs(wide.fit, wide.fit.model))
@@ -65,11 +66,11 @@ def with_log_start(
         shown_values = {name: value for name, (value, _) in shown.discrimination.values.items()}
         begun = _fit_at(wide.fit, effect, {**shown_values, **shown.start}, shown.base)
         started = scored(wide, candidate, begun)
-        alike = [s for s in ranked if s.candidate.effect.shown is hook]
+        alike = [s for s in so_far if s.candidate.effect.shown is hook]
         best = max((s.fall for s in alike), default=0.0)
         if started.fall > started.policy.close_share * best:
-            ranked = with_better([s for s in ranked if s not in alike], started, offered)
-    return tuple(ranked)
+            so_far = with_better([s for s in so_far if s not in alike], started, offered)
+    return tuple(so_far)
 
 
 def _fit_at(fit: Fit, effect: Effect, values: Values, base: Values) -> Fit:

@@ -17,7 +17,7 @@ from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.residuals.segments import known_tests, mixed_setups
 from pipeline.criticism.selection.alternatives import detectable
-from pipeline.criticism.selection.score_test import Candidate
+from pipeline.criticism.selection.candidates import Candidate
 from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.numerics.coast_setups import REMEDY, setup_words
 from pipeline.physics.glossary import of_ohmmeter

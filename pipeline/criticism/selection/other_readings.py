@@ -20,7 +20,7 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.selection.score_test import clears
+from pipeline.criticism.selection.improvement import clears
 
 TORQUE = "torque_shaft_nm"
 _HALF_HOLD = 0.5

@@ -10,9 +10,10 @@ from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_fit
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import Hum, hum_of, with_hum
+from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
-from pipeline.criticism.selection.score_test import candidates, score_all, widened
+from pipeline.criticism.selection.score_test import score_all
 from pipeline.criticism.selection.stepwise import begin_from
 
 

@@ -8,42 +8,19 @@ doi:10.1093/biomet/asn034, penalty of a search over candidates.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.machine.model import Model, zero
-from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.selection import Selection
-from pipeline.criticism.regression.columns import Column, effect_columns
-from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.linear_system import LinearSystem, linear_system, model_columns
-from pipeline.criticism.regression.normal_equations import Descent, NormalEquations, deviance_of
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """An effect that is not in the model, its shape parameters at one of their trial values.
-
-    Attributes
-    ----------
-    effect
-        The effect.
-    columns
-        One a parameter that is fitted.
-    values
-        Its parameters by full name, amplitudes zero.
-
-    """
-
-    effect: Effect
-    columns: tuple[Column, ...]
-    values: Mapping[str, float] = field(default_factory=dict)
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.normal_equations import Descent, NormalEquations
+from pipeline.criticism.selection.candidates import Candidate, placed, searched
+from pipeline.criticism.selection.improvement import Standing, clears, fall_below_floor, share_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,104 +106,6 @@ class Score:
         return "takes too small a share of what is over the noise floor"
 
 
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """How well a fit stands.
-
-    Attributes
-    ----------
-    deviance
-        −2 log likelihood with the cost of the priors.
-    reduced_chi2
-        χ²/n of every group [G].
-    prior_cost
-        Cost of the priors alone.
-
-    """
-
-    deviance: float
-    reduced_chi2: Array
-    prior_cost: float
-
-    @classmethod
-    def of(cls, system: LinearSystem, places: NDArray[np.int64], end: Descent) -> Standing:
-        """How well a system stands after a descent.
-
-        Parameters
-        ----------
-        system
-            The system.
-        places
-            Columns that moved.
-        end
-            Where the descent ended.
-
-        """
-        cost = float(system.prior_costs(places, end.step).sum())
-        return cls(end.deviance, end.reduced_chi2, cost)
-
-
-def candidates(library: Mapping[str, Effect], model: Model) -> tuple[Candidate, ...]:
-    """Every effect that is not in the model, once for each combination of trial shapes.
-
-    Parameters
-    ----------
-    library
-        Every effect by name.
-    model
-        The model; effects whose wave of the angle no capture goes through are left out.
-
-    """
-    inside = {effect.name for effect in model.effects}
-    candidates = []
-    for effect in library.values():
-        if effect.name in inside or not effect.gone_through(model.machine):
-            continue
-        shapes = [p for p in effect.parameters_of(model.machine) if not p.amplitude]
-        grids = [[(p.name, v * model.machine.scale(p)) for v in p.scan] for p in shapes]
-        for at in product(*grids):
-            columns = tuple(effect_columns(effect, model, at))
-            start = zero(effect, model)
-            start.update({f"{effect.name}.{name}": value for name, value in at})
-            candidates.append(Candidate(effect, columns, start))
-    return tuple(candidates)
-
-
-def widened(
-    fit: Fit, offered: Sequence[Candidate], before: LinearSystem | None = None
-) -> LinearSystem:
-    """The system around a fit with the candidates' columns behind its own, in order.
-
-    The candidates' may stay as they were in `before`. Its own are made anew: what the station's
-    priors alone hold apart, such as a gain and the effect of that name, columns that are made in
-    two places would seem to discriminate.
-
-    Parameters
-    ----------
-    fit
-        The fit.
-    offered
-        The candidates.
-    before
-        An earlier system whose columns of candidates may be used again.
-
-    Returns
-    -------
-    LinearSystem
-        The model's own columns are computed anew: what only priors of the station separate, such as
-        a gain and the effect of that name, would seem to be separated by columns computed at two
-        places.
-
-    """
-    columns = [c for candidate in offered for c in candidate.columns]
-    if before is not None:
-        present = {column.key for column in model_columns(fit.model)}
-        before = before.only(
-            np.array([n for n, c in enumerate(before.columns) if c.key not in present], dtype=int)
-        )
-    return linear_system(fit, columns, before)
-
-
 def score_all(
     system: LinearSystem,
     offered: Sequence[Candidate],
@@ -263,31 +142,19 @@ def score_all(
         if score is not None and (known is None or score.fall > known[0].fall):
             best[candidate.effect.name] = replace(score, penalty=cost), places
     scores = [replace(one, confounder=scoring.confounder(one, best)) for one, _ in best.values()]
-    return tuple(sorted(scores, key=lambda s: (-s.fall, s.candidate.effect.name)))
+    return ranked(scores)
 
 
-def placed(
-    wide: LinearSystem, offered: Sequence[Candidate]
-) -> Iterator[tuple[Candidate, NDArray[np.int64]]]:
-    """Every candidate of a widened system with the places of its columns.
+def ranked(scores: Iterable[Score]) -> tuple[Score, ...]:
+    """Scores, the largest fall first, of equal ones by the effect's name.
 
     Parameters
     ----------
-    wide
-        The system.
-    offered
-        The candidates, as `widened` had them.
-
-    Yields
-    ------
-    tuple of Candidate and array
-        Indices into `wide.columns`.
+    scores
+        One an effect.
 
     """
-    first = wide.model_columns.size
-    for candidate in offered:
-        yield candidate, np.arange(first, first + len(candidate.columns))
-        first += len(candidate.columns)
+    return tuple(sorted(scores, key=lambda s: (-s.fall, s.candidate.effect.name)))
 
 
 def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
@@ -309,38 +176,6 @@ def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
         for p in effect.parameters_of(machine)
         if not p.choice
     )
-
-
-def searched(offered: Sequence[Candidate], effect: Effect) -> float:
-    """What the search over candidates costs the score of one.
-
-    Parameters
-    ----------
-    offered
-        All candidates; one effect at several trial shapes counts once.
-    effect
-        The effect of the candidate.
-
-    Returns
-    -------
-    float
-        2 log (p c) [deviance] of p effects, at least two, and c choices that the effect has: the
-        best of seven recorders whose clock may be off has had seven chances.
-
-    References
-    ----------
-    Chen and Chen, Biometrika 95(3), 2008, 759 (extended Bayesian information criterion: 2 log of
-    the number of models of a size, here of one further effect), doi:10.1093/biomet/asn034.
-
-    """
-    choices = {f"{effect.name}.{p.name}" for p in effect.parameters if p.choice}
-    chances = {
-        tuple(sorted((name, c.values[name]) for name in choices & c.values.keys()))
-        for c in offered
-        if c.effect.name == effect.name
-    }
-    effects = max(len({c.effect.name for c in offered}), 2)
-    return 2.0 * math.log(effects * max(len(chances), 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -460,135 +295,5 @@ class _Scoring:
         return None if worth else clearest.candidate.effect.name
 
 
-def clears(
-    system: LinearSystem, significant: NDArray[np.bool_], before: Array, after: Array
-) -> bool:
-    """Whether most of the power over the floor goes, of the groups that count as a remainder.
-
-    Parameters
-    ----------
-    system
-        The fit.
-    significant
-        Groups that count [G].
-    before
-        χ²/n without the candidate [G].
-    after
-        χ²/n with it [G].
-
-    Returns
-    -------
-    bool
-        False where no group counts.
-
-    """
-    excess, remaining = (system.counts * np.maximum(q - 1.0, 0.0) for q in (before, after))
-    allowed = system.policy.selection.clears_share * float(excess[significant].sum())
-    return bool(significant.any()) and float(remaining[significant].sum()) < allowed
-
-
 def _outside(value: float, parameter: Parameter) -> bool:
     return (value < 0 <= parameter.low) or (value > 0 >= parameter.high)
-
-
-def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Standing) -> float:
-    """Largest share of the removable deviance that an effect removes.
-
-    Parameters
-    ----------
-    system
-        The fit.
-    effect
-        The effect.
-    before
-        The fit without it.
-    after
-        The fit with it.
-
-    Returns
-    -------
-    float
-        From 0 to 1: of one recorded signal, of the captures of the tests that excite the effect, or
-        of what the priors of the station cost; of a signal's error no more than the share of its
-        power, at one order.
-
-    Notes
-    -----
-    Small excesses do not count (`excess`, `excess_a_sample`): drift and unmodelled effects are
-    deviance that many candidates partly absorb.
-
-    """
-    policy = system.policy.selection
-    excess = system.counts * np.log(np.maximum(before.reduced_chi2, 1.0))
-    remaining = system.counts * np.log(np.maximum(after.reduced_chi2, 1.0))
-    channel = np.array([name for _, name, _ in system.labels])
-    groups = [channel == name for name in dict.fromkeys(channel.tolist())]
-    groups.append(np.array([system.segments[n].test in effect.tests for n, _, _ in system.labels]))
-    shares = [0.0]
-    for group in groups:
-        had = float(excess[group].sum())
-        if had > min(policy.excess, policy.excess_a_sample * float(system.counts[group].sum())):
-            shares.append(1.0 - float(remaining[group].sum()) / had)
-    error = min(max(shares), power_share(system, before.reduced_chi2, after.reduced_chi2))
-    cost = before.prior_cost
-    return max(error, 1.0 - after.prior_cost / cost if cost > policy.excess else 0.0)
-
-
-def fall_below_floor(system: LinearSystem, before: Array, after: Array) -> float:
-    """Fall of the deviance in signals that at some order have no excess that counts.
-
-    There an allowance for a bench's and a model's errors counts as one error of a group, whatever
-    its shape, and not as noise that windows average.
-
-    Parameters
-    ----------
-    system
-        The fit.
-    before
-        χ²/n without the candidate [G].
-    after
-        χ²/n with it [G].
-
-    """
-    pool, worth = _pools(system, before)
-    below = ~worth[pool]
-    counts = system.independent_counts[below]
-    return deviance_of(counts, before[below]) - deviance_of(counts, after[below])
-
-
-def power_share(system: LinearSystem, before: Array, after: Array) -> float:
-    """Largest share of the power over the noise floor that is removed, of one signal at one order.
-
-    Parameters
-    ----------
-    system
-        The fit.
-    before
-        χ²/n without the candidate [G].
-    after
-        χ²/n with it [G].
-
-    Returns
-    -------
-    float
-        From 0 to 1; 0 where no signal has an excess that counts.
-
-    """
-    pool, worth = _pools(system, before)
-    had, has = (
-        np.bincount(pool, system.counts * np.maximum(reduced_chi2 - 1.0, 0.0))
-        for reduced_chi2 in (before, after)
-    )
-    return float((1.0 - has[worth] / had[worth]).max(initial=0.0))
-
-
-def _pools(
-    system: LinearSystem, reduced_chi2: Array
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Which signal at which order each group [G] is of, and of which of them the excess counts."""
-    numbers: dict[tuple[str, int], int] = {}
-    pool = np.array([numbers.setdefault((name, k), len(numbers)) for _, name, k in system.labels])
-    count = np.bincount(pool, system.counts)
-    nats = np.bincount(pool, system.counts * np.log(np.maximum(reduced_chi2, 1.0)))
-    policy = system.policy.selection
-    return pool, nats > np.minimum(policy.excess, policy.excess_a_sample * count)

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.selection.score_test import Candidate, Score, paid_for, searched
+from pipeline.criticism.selection.candidates import Candidate, first_of_each, searched
+from pipeline.criticism.selection.score_test import Score, paid_for, ranked
 
 
 def with_nuisances(
@@ -35,14 +36,13 @@ def with_nuisances(
 
     """
     best = {score.candidate.effect.name: score for score in scores}
-    first = {candidate.effect.name: candidate for candidate in reversed(offered)}
-    for name, candidate in first.items():
+    for name, candidate in first_of_each(offered).items():
         if candidate.effect.in_place_of is None:
             continue
         score, known = _taken_over(wide, offered, candidate), best.get(name)
         if known is None or score.fall > known.fall - wide.policy.selection.tie:
             best[name] = score
-    return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
+    return ranked(best.values())
 
 
 def _taken_over(wide: LinearSystem, offered: Sequence[Candidate], candidate: Candidate) -> Score:

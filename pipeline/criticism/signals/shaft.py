@@ -7,16 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.machine.model import (
-    LATE_TORQUE,
-    Model,
-    Pieces,
-    air_gap_torque,
-    ripple,
-    values_of,
-)
+from pipeline.criticism.machine.coenergy import air_gap_torque
+from pipeline.criticism.machine.model import LATE_TORQUE, Model, Pieces, values_of
+from pipeline.criticism.machine.sample_period import ripple
 from pipeline.criticism.operating import Array, Complex, Operating, Recorded, Signals, Values
-from pipeline.criticism.signals.true_state import ahead_in
+from pipeline.criticism.signals.true_current import ahead_in
 from pipeline.criticism.signals.voltage import central
 
 TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")

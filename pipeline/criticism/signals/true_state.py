@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,26 +10,19 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, slow_orders
 from pipeline.criticism.data.traces import smoothed
-from pipeline.criticism.machine.model import (
-    LATE_SPEED,
-    UNLOGGED_AT_REST,
-    Model,
-    clock_gain,
-    values_of,
-)
+from pipeline.criticism.machine.model import LATE_SPEED, UNLOGGED_AT_REST, Model, clock_gain
 from pipeline.criticism.operating import (
     Array,
     Complex,
     Operating,
-    Recorded,
     ShaftState,
     Signals,
     Supply,
     Values,
-    between,
 )
 from pipeline.criticism.parameter import UNLOGGED, WARMING, Machine
 from pipeline.criticism.policy.captures import Cutting
+from pipeline.criticism.signals.angle_sensor import angle_error, frame_turn, zero_angle
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,81 +290,6 @@ def _in_time(segment: Segment, x: Operating, late_s: float) -> Operating:
     )
 
 
-def drive_current(
-    segment: Segment, signals: Signals, model: Model, values: Values, size: int
-) -> Complex:
-    """True current of a drive's log.
-
-    Parameters
-    ----------
-    segment
-        The log.
-    signals
-        Recorded columns [n].
-    model
-        Effects of the current sensors.
-    values
-        Parameters by full name.
-    size
-        Points wanted; beyond the samples, on straight lines between them.
-
-    Returns
-    -------
-    array [size], complex
-        d + jq [A].
-
-    """
-    recorded = _recorded(segment, signals, model)
-    zero = values["zero_alpha_a"] + 1j * values["zero_beta_a"]
-    if zero and _both_axes(segment):
-        eps, theta, pairs = recorded.eps_rad, signals["theta_mech_rad"], model.machine.pole_pairs
-        back = segment.once(theta, "back", pairs, lambda: np.exp(-1j * eps))
-        recorded = replace(recorded, i_a=recorded.i_a - zero * back)
-    current = true_current(recorded, segment.instrument.ammeter, model, values)
-    if current.size < size:
-        at = np.arange(size) * (current.size / size)
-        current = np.interp(at, np.arange(current.size), current)
-    return current
-
-
-def table_current(
-    segment: Segment,
-    current: Complex,
-    eps_rad: Array,
-    omega_e_rad_s: Array,
-    model: Model,
-    values: Values,
-) -> Complex:
-    """True current of the rows of a table.
-
-    Parameters
-    ----------
-    segment
-        The table.
-    current
-        Recorded, complex [n, A].
-    eps_rad
-        Electrical angle [n].
-    omega_e_rad_s
-        Electrical speed [n].
-    model
-        Effects of the current sensors.
-    values
-        Parameters by full name.
-
-    Returns
-    -------
-    array [n], complex
-        In A.
-
-    """
-    nothing = np.zeros(current.size)
-    recorded = Recorded(
-        current, nothing, eps_rad, omega_e_rad_s, segment.ts_s, False, segment.instrument.name
-    )
-    return true_current(recorded, segment.instrument.ammeter, model, values)
-
-
 def _speed(theta: Array, period: float, finer: int, policy: Cutting) -> Array:
     width = max(2 * round(policy.speed_s / period / 2) + 1, 5) * finer
     return smoothed(np.gradient(theta, period / finer), width)
@@ -410,202 +327,3 @@ def _run(signals: Signals, size: int) -> NDArray[np.int64]:
 def _torque_behind(signals: Signals, size: int) -> Array | None:
     behind = signals.get("behind_nm")
     return None if behind is None else np.repeat(behind, size // behind.size)
-
-
-def _recorded(segment: Segment, signals: Signals, model: Model) -> Recorded:
-    theta, pairs = signals["theta_mech_rad"], model.machine.pole_pairs
-
-    def turning() -> tuple[Array, Array]:
-        eps = pairs * theta
-        return eps, np.gradient(eps, segment.ts_s)
-
-    eps, omega = segment.once(theta, "turning", (segment.ts_s, pairs), turning)
-    return Recorded(
-        i_a=signals.get("id_a", np.zeros(theta.size)) + 1j * signals["iq_a"],
-        torque_nm=signals.get("torque_shaft_nm", np.zeros(theta.size)),
-        eps_rad=eps,
-        omega_e_rad_s=omega,
-        ts_s=segment.ts_s,
-        inverter=True,
-        instrument=segment.instrument.name,
-        ahead=ahead_in(segment, signals, model.machine.pole_pairs),
-    )
-
-
-def ahead_in(
-    segment: Segment, signals: Signals, pole_pairs: int
-) -> Callable[[float], tuple[Complex, Array, Array]] | None:
-    """Changes of currents, torque and angle within a delay, from the whole log of a segment.
-
-    Parameters
-    ----------
-    segment
-        On its true clock; its `unthinned` part holds the whole log.
-    signals
-        Recorded columns [n].
-    pole_pairs
-        Turns the angle into an electrical one.
-
-    Returns
-    -------
-    callable or None
-        delay [s] -> changes of complex current [n, A], torque [n, N·m] and electrical angle [n,
-        rad]; None where nothing was thinned.
-
-    """
-    log, rows = segment.unthinned.late, segment.recorded.get("t_s")
-    if not log or rows is None:
-        return None
-    at: Array | None = segment.once(rows, "places", None, lambda: _places(rows))
-    if at is None:
-        return None
-    places = at.astype(np.int64)
-
-    def whole() -> tuple[Array, Array]:
-        columns = np.stack(list(log.values()))
-        return columns, columns.take(places, axis=-1, mode="clip")
-
-    columns, now = segment.once(rows, "whole", None, whole)
-
-    def ahead(delay_s: float) -> tuple[Complex, Array, Array]:
-        later = between(columns, at + delay_s / segment.ts_s)
-        change = dict(zip(log, later - now, strict=True))
-        zero = np.zeros(at.size)
-        current = change.get("id_a", zero) + 1j * change.get("iq_a", zero)
-        return current, change.get("torque_shaft_nm", zero), pole_pairs * change["theta_mech_rad"]
-
-    return ahead if at.size == next(iter(signals.values())).size else None
-
-
-def _places(rows: Array) -> Array | None:
-    """Places [n] of times [n, s] on the even clock that they were taken from."""
-    steps = np.diff(rows)
-    if not (steps > 0.0).any():
-        return None
-    return np.rint(rows / float(np.median(steps[steps > 0.0])))
-
-
-def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values) -> Complex:
-    """True complex current of a recorded one: gain and effects of its sensors taken out.
-
-    Parameters
-    ----------
-    recorded
-        Recorded signals [n].
-    ammeter
-        Nuisance that is the gain of the instrument.
-    model
-        Effects of the current sensors, taken out in their order.
-    values
-        Parameters by full name.
-
-    Returns
-    -------
-    array [n], complex
-        In A.
-
-    """
-    gain = 1.0 / (1.0 + values[ammeter])
-    ahead = recorded.ahead
-    recorded = replace(recorded, i_a=gain * recorded.i_a)
-    if ahead is not None:
-
-        def scaled(delay_s: float) -> tuple[Complex, Array, Array]:
-            current, torque, turned = ahead(delay_s)
-            return gain * current, torque, turned
-
-        recorded = replace(recorded, ahead=scaled)
-    for effect in model.effects:
-        if effect.current is not None:
-            q = values_of(effect, model.machine, values)
-            recorded = replace(recorded, i_a=effect.current(recorded, q))
-    return recorded.i_a
-
-
-def zero_angle(segment: Segment, x: Operating, values: Values) -> Array | None:
-    """Recorded less true electrical angle of a drive's encoder that has its zero elsewhere and is
-    read later than the currents.
-
-    Parameters
-    ----------
-    segment
-        Any segment.
-    x
-        State with its speed [n].
-    values
-        Parameters by full name.
-
-    Returns
-    -------
-    array [n] or None
-        In rad; None unless it is a drive's log of both currents, and where all of it is zero.
-
-    """
-    zero_rad, late_s = values["zero_angle_rad"], values["late_angle_s"]
-    if not (zero_rad or late_s) or not _both_axes(segment):
-        return None
-    return zero_rad - late_s * (x.machine.pole_pairs * x.omega_rad_s)
-
-
-def frame_turn(segment: Segment, x: Operating, model: Model, values: Values) -> Complex | None:
-    """What turns a vector from the frame of the recorded angle into that of the true one.
-
-    Parameters
-    ----------
-    segment
-        Any segment.
-    x
-        State at which the errors of the angle are evaluated [n].
-    model
-        Effects of the angle.
-    values
-        Parameters by full name.
-
-    Returns
-    -------
-    array [n], complex, or None
-        Unit vectors; None where the angle has no error.
-
-    """
-
-    def turn() -> Complex | None:
-        zero = zero_angle(segment, x, values)
-        return None if zero is None else np.exp(1j * zero)
-
-    if not any(effect.angle is not None for effect in model.effects):
-        name = "frame", values["zero_angle_rad"], values["late_angle_s"]
-        return x.once(x.omega_rad_s, name, turn)
-    zero, error = zero_angle(segment, x, values), angle_error(x, model, values)
-    return np.exp(1j * (error if zero is None else zero + error))
-
-
-def _both_axes(segment: Segment) -> bool:
-    """Whether this is a drive's log of both currents, in a frame that its own encoder turns."""
-    return segment.instrument.name == "drive" and {"id_a", "theta_mech_rad"} <= set(
-        segment.recorded
-    )
-
-
-def angle_error(x: Operating, model: Model, values: Values) -> Array:
-    """Recorded less true electrical angle by the sensor effects of a model.
-
-    Parameters
-    ----------
-    x
-        State at which it is evaluated [n].
-    model
-        Effects of the angle; their errors add up.
-    values
-        Parameters by full name.
-
-    Returns
-    -------
-    array [n]
-        In rad.
-
-    """
-    total = np.zeros(x.omega_rad_s.shape)
-    for effect in model.effects:
-        if effect.angle is not None:
-            total = total + effect.angle(x, values_of(effect, model.machine, values))
-    return total

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import Model, Pieces, values_of
 from pipeline.criticism.operating import Array, Complex, Operating, Values
-from pipeline.criticism.signals.true_state import frame_turn
+from pipeline.criticism.signals.angle_sensor import frame_turn
 
 _EIGHTH_ORDER = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)
 """Weights of a slope: of the differences of samples one, two, three and four to either side."""

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.equations import equation_of
-from pipeline.criticism.machine.model import Model, air_gap_torque, evaluate
+from pipeline.criticism.machine.coenergy import air_gap_torque
+from pipeline.criticism.machine.model import Model, evaluate
 from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
 from pipeline.criticism.regression.noise_floors import reading_error
 from pipeline.criticism.residuals.residual import measured, operate, predicted

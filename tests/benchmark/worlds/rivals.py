@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.diagnosis import base_fit
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.selection.score_test import candidates, placed, widened
+from pipeline.criticism.selection.candidates import candidates, placed, widened
 from pipeline.execution.tasks.start import start_constants
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec

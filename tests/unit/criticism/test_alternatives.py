@@ -14,7 +14,7 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.selection.alternatives import alternatives_to
-from pipeline.criticism.selection.score_test import candidates, widened
+from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.stepwise import search
 from tests.unit.criticism.machines import (
     BASE,

@@ -11,8 +11,9 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.residuals.residual import residual
+from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.requested_model import fit_of
-from pipeline.criticism.selection.score_test import candidates, score_all, widened
+from pipeline.criticism.selection.score_test import score_all
 from tests.unit.criticism.machines import BASE, log, machine
 
 LEAD = 1.5

@@ -13,7 +13,7 @@ from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.operating import Recorded, between
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.signals.true_state import ahead_in
+from pipeline.criticism.signals.true_current import ahead_in
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.criticism.discovery.description import _run, turn_angles
 from pipeline.criticism.discovery.dictionary import Term
-from pipeline.criticism.discovery.matching_pursuit import Expression
+from pipeline.criticism.discovery.expression import Expression
 from pipeline.criticism.discovery.residual_inputs import Port, ports
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.records.diagnosis import CurvePoint

@@ -12,7 +12,8 @@ import pytest
 from pipeline.criticism.data.segment import slow_orders
 from pipeline.criticism.effects import cogging
 from pipeline.criticism.library.registry import chosen, effects
-from pipeline.criticism.machine.model import Model, base_flux, effect_flux, evaluate, values_of
+from pipeline.criticism.machine.coenergy import base_flux, effect_flux
+from pipeline.criticism.machine.model import Model, evaluate, values_of
 from pipeline.criticism.operating import Recorded, ShaftState
 from pipeline.physics.glossary import COLUMNS, TESTS
 from pipeline.records.errors import UsageError

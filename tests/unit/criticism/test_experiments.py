@@ -19,7 +19,7 @@ from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import residual
-from pipeline.criticism.selection.score_test import candidates, widened
+from pipeline.criticism.selection.candidates import candidates, widened
 from tests.unit.criticism.machines import BASE, log, machine
 
 ALL = effects()

@@ -16,9 +16,10 @@ from pipeline.criticism.machine.two_masses import far_drag, linear_far_drag, pas
 from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.discrimination import discriminate
 from pipeline.criticism.selection.linear_start import with_linear_start
-from pipeline.criticism.selection.score_test import Score, candidates, widened
+from pipeline.criticism.selection.score_test import Score
 from pipeline.execution.tasks.start import start_constants
 from pipeline.records.comparison import ModelSpec
 from pipeline.simulator.bench import campaign

@@ -14,7 +14,8 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.residuals.residual import residual
-from pipeline.criticism.selection.score_test import candidates, score_all, widened
+from pipeline.criticism.selection.candidates import candidates, widened
+from pipeline.criticism.selection.score_test import score_all
 from pipeline.criticism.selection.stepwise import begin_from, search
 from pipeline.criticism.selection.unusual_nuisances import with_nuisances
 from pipeline.records.comparison import ModelSpec

@@ -13,7 +13,7 @@ from scipy.signal import lfilter, lfiltic
 from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.library.named_models import model_of
-from pipeline.criticism.machine.model import mean_current, ripple
+from pipeline.criticism.machine.sample_period import mean_current, ripple
 from pipeline.criticism.regression.noise_floors import reading_error
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import segments

@@ -18,10 +18,11 @@ from pipeline.criticism.regression.linear_system import (
     linear_system,
     model_columns,
 )
-from pipeline.criticism.regression.linearise import _Sampler, absorb, whitened_anew
+from pipeline.criticism.regression.linearise import absorb, whitened_anew
 from pipeline.criticism.regression.noise_floors import offsets
+from pipeline.criticism.regression.sampler import Sampler
 from pipeline.criticism.residuals.residual import operate, residual
-from pipeline.criticism.selection.score_test import candidates
+from pipeline.criticism.selection.candidates import candidates
 from tests.unit.criticism.machines import BASE, coasting, log, machine
 
 PLAIN = Model(machine(), ())
@@ -124,7 +125,7 @@ def test_the_column_of_a_sensor_is_what_the_residual_moves_by(name):
     segment, values = log(), {**BASE, "gain_torque": 0.01}
     with_it = PLAIN.with_effects(LIBRARY[name])
     still = {**values, **zero(LIBRARY[name], PLAIN)}
-    sampler = _Sampler(segment, PLAIN, values)
+    sampler = Sampler(segment, PLAIN, values)
     heard = 0
     for column in effect_columns(LIBRARY[name], PLAIN):
         moved = {**still, column.name: column.step}
@@ -146,13 +147,13 @@ def test_a_drag_s_column_has_the_gain_of_the_transducer_in_it():
     still = {**values, **zero(LIBRARY["windage"], PLAIN)}
     moved = {**still, column.name: column.step}
     expected = residual(segment, with_it, moved) - residual(segment, with_it, still)
-    found = _Sampler(segment, PLAIN, values).change(column)
+    found = Sampler(segment, PLAIN, values).change(column)
     assert found * column.step == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("one", [log(noise=1.0), coasting()], ids=["log", "coast"])
 def test_a_column_at_shapes_that_it_does_not_read_is_the_one_before(one):
-    sampler, anew = (_Sampler(one, PLAIN, {**BASE}) for _ in range(2))
+    sampler, anew = (Sampler(one, PLAIN, {**BASE}) for _ in range(2))
     changes, twins = {}, []
     for column in (c for offered in candidates(LIBRARY, PLAIN) for c in offered.columns):
         twin = sampler.twin(column)
@@ -170,9 +171,9 @@ def test_a_fit_that_comes_back_to_where_it_was_computes_nothing_again(monkeypatc
     start = Fit(segments, PLAIN, {**BASE}, floors(segments, PLAIN, BASE), BASE)
     offered = effect_columns(LIBRARY["angle_eccentricity"], PLAIN)
     linear_system(start, offered)
-    asked, change = [], _Sampler.change
+    asked, change = [], Sampler.change
     monkeypatch.setattr(
-        _Sampler, "change", lambda self, one: asked.append(one.name) or change(self, one)
+        Sampler, "change", lambda self, one: asked.append(one.name) or change(self, one)
     )
     louder = replace(start, sigma=tuple(3.0 * sigma for sigma in start.sigma))
     again = linear_system(louder, offered)

@@ -10,7 +10,8 @@ import pytest
 from pipeline.criticism.data.segment import Sensors, projected, row_index, slow_orders
 from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.model import Model, mean_current, zero
+from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.columns import effect_columns

@@ -13,16 +13,9 @@ from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
-from pipeline.criticism.selection.score_test import (
-    Candidate,
-    Score,
-    candidates,
-    fall_below_floor,
-    power_share,
-    score_all,
-    searched,
-    widened,
-)
+from pipeline.criticism.selection.candidates import Candidate, candidates, searched, widened
+from pipeline.criticism.selection.improvement import fall_below_floor, power_share
+from pipeline.criticism.selection.score_test import Score, score_all
 from pipeline.criticism.selection.stepwise import _floored_anew
 from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, machine, with_drag
 

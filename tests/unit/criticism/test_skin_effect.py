@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.effects.skin_effect import EFFECT
-from pipeline.criticism.machine.model import effect_flux
+from pipeline.criticism.machine.coenergy import effect_flux
 from tests.unit.criticism.machines import operating
 
 BRANCH_OHM, LATE_S = 0.02, 0.7e-3

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.selection.stepwise import spoils
+from pipeline.criticism.selection.acceptance import spoils
 
 
 def after_refit(acts):

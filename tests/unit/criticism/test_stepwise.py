@@ -16,15 +16,10 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import linear_system
+from pipeline.criticism.selection.acceptance import _form_error_factors, _same_hook, is_determined
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.sizes import material, size_of
-from pipeline.criticism.selection.stepwise import (
-    _floored_anew,
-    _form_error_factors,
-    _is_determined,
-    _same_hook,
-    search,
-)
+from pipeline.criticism.selection.stepwise import _floored_anew, search
 from tests.unit.criticism.machines import (
     BASE,
     LIBRARY,
@@ -123,7 +118,7 @@ def test_floors_at_a_fit_s_end_count_on_both_sides_of_a_comparison(monkeypatch):
     def eightfold(system):
         return np.full(len(system.labels), 8.0)
 
-    monkeypatch.setattr("pipeline.criticism.selection.stepwise.floor_factors", eightfold)
+    monkeypatch.setattr("pipeline.criticism.selection.acceptance.floor_factors", eightfold)
     hidden = (with_drag(curved(0.09)), with_drag(curved(0.09), 6))
     assert search(cautious(hidden, 9.0), LIBRARY)[-1].added == ("windage",)
 
@@ -280,7 +275,7 @@ def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkey
 
     hidden = tuple(with_drag(curved(0.1), seed) for seed in (5, 6))
     assert search(fitted(hidden), LIBRARY)[-1].added == ("windage",)
-    monkeypatch.setattr("pipeline.criticism.selection.stepwise._is_determined", unsure)
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise.is_determined", unsure)
     assert search(fitted(hidden), LIBRARY)[-1].added == ()
 
 
@@ -295,7 +290,7 @@ def test_an_explanation_of_unsure_size_does_not_speak_where_it_does_not_act(monk
         return system.fit.model.effects[-1].name != "windage"
 
     hidden = tuple(with_drag(curved(0.1), seed) for seed in (5, 6))
-    for name, answer in (("_is_determined", sure), ("_acts", acts)):
+    for name, answer in (("is_determined", sure), ("acts_in", acts)):
         monkeypatch.setattr(f"pipeline.criticism.selection.stepwise.{name}", answer)
     added = search(fitted(hidden), LIBRARY)[-1].added
     assert added
@@ -316,5 +311,7 @@ def test_a_gap_that_windows_leave_open_is_determined_where_full_logs_show_it(
         ("significantly_nonzero", {"backlash.share"}),
         ("discriminate", Discrimination("backlash", logged)),
     ):
-        monkeypatch.setattr(f"pipeline.criticism.selection.stepwise.{name}", lambda *_, a=answer: a)
-    assert _is_determined(coupled, coupled) is determined
+        monkeypatch.setattr(
+            f"pipeline.criticism.selection.acceptance.{name}", lambda *_, a=answer: a
+        )
+    assert is_determined(coupled, coupled) is determined

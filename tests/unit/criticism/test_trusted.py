@@ -18,15 +18,11 @@ from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.identifiability import significantly_nonzero, together_nonzero
 from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
 from pipeline.criticism.search import Ladder, ladder_from
+from pipeline.criticism.selection.acceptance import _improves_held_out, is_determined
+from pipeline.criticism.selection.candidates import Candidate
 from pipeline.criticism.selection.requested_model import BaseFit
-from pipeline.criticism.selection.score_test import Candidate, Score
-from pipeline.criticism.selection.stepwise import (
-    LadderStep,
-    _improves_held_out,
-    _is_determined,
-    _refitted,
-    search,
-)
+from pipeline.criticism.selection.score_test import Score
+from pipeline.criticism.selection.stepwise import LadderStep, _refitted, search
 from pipeline.criticism.selection.truncation import contradiction, explained, truncated
 from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, fitted, log, machine, with_drag
@@ -219,8 +215,8 @@ def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, s
     )
     step = np.array([apart.get(key, 0.0) for key in values])
     held = HeldOut(plain.residual, 1.0, {0: step, 1: -step})
-    monkeypatch.setattr("pipeline.criticism.selection.stepwise.leave_out", lambda _: held)
-    assert _is_determined(system, plain) is sure
+    monkeypatch.setattr("pipeline.criticism.selection.acceptance.leave_out", lambda _: held)
+    assert is_determined(system, plain) is sure
 
 
 def test_what_all_current_sensors_share_names_no_difference_of_them(monkeypatch):
@@ -239,9 +235,9 @@ def test_what_all_current_sensors_share_names_no_difference_of_them(monkeypatch)
         model_column_count=1,
     )
     held = HeldOut(plain.residual, 1.0, {})
-    monkeypatch.setattr("pipeline.criticism.selection.stepwise.leave_out", lambda _: held)
-    monkeypatch.setattr("pipeline.criticism.selection.stepwise._takes_most", lambda *_: True)
-    assert not _is_determined(system, plain)
+    monkeypatch.setattr("pipeline.criticism.selection.acceptance.leave_out", lambda _: held)
+    monkeypatch.setattr("pipeline.criticism.selection.acceptance._takes_most", lambda *_: True)
+    assert not is_determined(system, plain)
 
 
 @pytest.mark.parametrize(("damping_nm", "sure"), [(0.1, True), (-0.1, False)])

@@ -1,0 +1,251 @@
+"""What a refit with one more effect must show before the effect is accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.operating import Array
+from pipeline.criticism.regression.goodness import (
+    HeldOut,
+    floor_factors,
+    in_common,
+    leave_out,
+    predicted_chi2,
+    significant_groups,
+)
+from pipeline.criticism.regression.identifiability import significantly_nonzero, together_nonzero
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.noise_floors import form_tolerance
+from pipeline.criticism.selection.discrimination import discriminate
+from pipeline.criticism.selection.improvement import clears, fall_below_floor, power_share
+from pipeline.criticism.selection.score_test import Score
+from pipeline.criticism.selection.sizes import material, shaped, size_of
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """The fit without a candidate, as the candidate is judged against it: with the effects `added`
+    so far, what it predicts of captures held out, its `shrunk` floors and `doubt` of form [G].
+    """
+
+    wide: LinearSystem
+    added: Sequence[Effect]
+    held_out: HeldOut
+    shrunk: Array
+    doubt: Array
+    significant: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, wide: LinearSystem, added: Sequence[Effect]) -> Baseline:
+        """A fit as a baseline.
+
+        Parameters
+        ----------
+        wide
+            The fit.
+        added
+            Effects that the search added to it.
+
+        """
+        held_out, significant = leave_out(wide), significant_groups(wide)
+        factors = floor_factors(wide), _form_error_factors(wide, added)
+        return cls(wide, added, held_out, *factors, significant)
+
+    def is_improved_by(self, tried: LinearSystem, score: Score) -> bool:
+        """Whether a candidate predicts captures held out better, and mends more than it spoils.
+
+        Parameters
+        ----------
+        tried
+            The fit with the candidate.
+        score
+            Its score.
+
+        """
+        wide, policy = self.wide, self.wide.policy.selection
+        same_hook = _same_hook(score.candidate.effect, self.added)
+        doubts = _form_error_factors(wide, same_hook), self.doubt
+        below = policy.same_hook_penalties if same_hook else policy.held_out_penalties
+        promised = policy.held_out_penalties * score.penalty, below * score.penalty
+        one, other = in_common((wide, tried), (self.held_out, leave_out(tried)))
+        without = predicted_chi2(wide, one) * self.shrunk
+        after = predicted_chi2(tried, other) * floor_factors(tried)
+        holds = _improves_held_out(wide, without, tried, after, promised, doubts)
+        relief = float(wide.prior_costs().sum() - tried.prior_costs().sum())
+        return holds and not spoils(tried, without, after, relief)
+
+
+def matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_]) -> bool:
+    """Whether the newest effect of a refit is large enough to matter in use, or takes most.
+
+    Parameters
+    ----------
+    system
+        The refit.
+    before
+        The fit without the effect.
+    significant
+        Groups [G] that `before` leaves over their floor.
+
+    """
+    fit, effect = system.fit, system.fit.model.effects[-1]
+    return material(fit, effect) or _takes_most(system, before, significant)
+
+
+def _takes_most(system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_]) -> bool:
+    """Whether the newest effect takes most of what was `significant` [G] as a remainder before."""
+    fit, effect = system.fit, system.fit.model.effects[-1]
+    chi2 = [fitted.reduced_chi2(fitted.residual) for fitted in (before, system)]
+    takes_most = effect.discriminator is None and clears(system, significant, *chi2)
+    return takes_most and shaped(fit, effect)
+
+
+def is_determined(system: LinearSystem, before: LinearSystem) -> bool:
+    """Whether some amplitude of the newest effect that matters differs significantly from zero.
+
+    Parameters
+    ----------
+    system
+        The fit with the effect.
+    before
+        The fit without it.
+
+    Returns
+    -------
+    bool
+        Whether one is two standard uncertainties away from zero, whichever capture is left out, or
+        all of them together are. Of a coupling, its twist or gap must be so as well, by the fit or
+        by full logs, and full logs must not exclude it.
+
+    Notes
+    -----
+    Counterexamples: a drag below the lowest speed of any capture can mend how friction changes
+    sense at a reversal, while its own size is not known at all; and waves of the flux too small to
+    matter are sure beside a large one that may be zero.
+
+    """
+    effect = system.fit.model.effects[-1]
+    held_out = leave_out(system)
+    sure = significantly_nonzero(system, held_out, system.policy.selection.least_u)
+    parameters = effect.parameters_of(system.fit.machine)
+    least, discrimination = system.policy.selection.least_u, discriminate(system.fit, effect)
+    excluded = discrimination is not None and discrimination.name is None
+    logged = {p.name: (system.fit.size(effect, p), p.u) for p in parameters if p.u > 0.0}
+    logged |= discrimination.values if discrimination is not None else {}
+    by_logs = {name for name, (size, u) in logged.items() if size > least * u}
+    nonzero = [p for p in parameters if f"{effect.name}.{p.name}" in sure or p.name in by_logs]
+    twists = [p for p in parameters if p.negligible > 0 and not p.amplitude]
+    coupled = effect.discriminator is None or not twists or any(p in nonzero for p in twists)
+    amplitudes = [p for p in parameters if p.amplitude and p.negligible > 0.0]
+    names = [f"{effect.name}.{p.name}" for p in amplitudes]
+    present = [p for p in amplitudes if p in nonzero]
+    if not present and together_nonzero(system, held_out, names, least):
+        present = amplitudes
+    large = size_of(system.fit, effect, present) >= 1.0 or (
+        bool(present) and _takes_most(system, before, significant_groups(before))
+    )
+    return coupled and not excluded and large
+
+
+def _same_hook(effect: Effect, added: Sequence[Effect]) -> list[Effect]:
+    """The found effects that act where an effect does: fluxes and drops in voltages, or drags."""
+    acts = ("flux", "drop") if effect.hook in ("flux", "drop") else (effect.hook,)
+    return [other for other in added if other.hook in acts and effect.hook != "sensor"]
+
+
+def _form_error_factors(wide: LinearSystem, added: Sequence[Effect]) -> Array:
+    """Factors [G] on χ²/n if the forms of these effects are wrong by a twentieth.
+
+    Windage that only takes up what the formula of Stribeck friction leaves is not there.
+    """
+    if not added:
+        return np.ones(len(wide.labels))
+    model, values = wide.fit.model, wide.fit.values
+    share = wide.policy.selection.form_error
+    wrong = np.concatenate([form_tolerance(s, model, values, added, share) for s in wide.segments])
+    noise = np.bincount(wide.group, wide.row_weight**-2, len(wide.labels)) / np.maximum(
+        wide.counts, 1.0
+    )
+    return noise / np.maximum(noise + wrong**2, 1e-300)
+
+
+def _improves_held_out(
+    wide: LinearSystem,
+    before: Array,
+    tried: LinearSystem,
+    after: Array,
+    least: tuple[float, float],
+    doubts: tuple[Array, Array],
+) -> bool:
+    """Whether a candidate helps where captures are predicted from all the others.
+
+    Their deviance must fall by the first of `least`. A share of some signal's power must go too,
+    or the deviance of signals below their floor must fall by the second of `least`. `before` and
+    `after` are χ²/n [G] without and with the candidate. They are multiplied by the first of the
+    `doubts` [G]; below the floor, the smaller fall with and without the second counts.
+    """
+    policy = wide.policy.selection
+    same_hook, below = doubts
+    cost, after_cost = (float(system.prior_costs().sum()) for system in (wide, tried))
+    fall = (
+        wide.deviance_of(same_hook * before)
+        + cost
+        - tried.deviance_of(same_hook * after)
+        - after_cost
+    )
+    priors = cost > policy.excess and after_cost < (1.0 - policy.least_share) * cost
+    helps = priors or power_share(wide, same_hook * before, same_hook * after) >= policy.least_share
+    below_floor = min(fall_below_floor(wide, k * before, k * after) for k in (1.0, below))
+    return fall > least[0] and (helps or below_floor > least[1])
+
+
+def spoils(tried: LinearSystem, before: Array, after: Array, relief: float = 0.0) -> bool:
+    """Whether the newest effect adds more power than it removes, of what other captures predict.
+
+    Parameters
+    ----------
+    tried
+        The fit with the effect.
+    before
+        χ²/n predicted without it [G].
+    after
+        χ²/n predicted with it [G].
+    relief
+        Fall of the priors' χ²: a lag of 24 usual ones was as good as the effect that names it.
+
+    Returns
+    -------
+    bool
+        A deviance is logarithmic: it falls where a small error is halved and a large one doubled.
+        Only groups count in which the effect acts, and of these what changes by more than
+        `least_share`, since any refit moves an error of another cause a little.
+
+    """
+    acts = acts_in(tried)
+    change = np.maximum(after, 1.0) - np.maximum(before, 1.0)
+    counts = acts & (np.abs(change) > tried.policy.selection.least_share * np.maximum(before, 1.0))
+    return float((tried.counts * change)[counts].sum()) > relief
+
+
+def acts_in(system: LinearSystem) -> NDArray[np.bool_]:
+    """The groups in which the newest effect acts.
+
+    Parameters
+    ----------
+    system
+        The fit with it.
+
+    Returns
+    -------
+    array [G] of bool
+
+    """
+    name = f"{system.fit.model.effects[-1].name}."
+    columns = [n for n, column in enumerate(system.columns) if column.name.startswith(name)]
+    moved = np.any(system.matrix[:, columns], axis=1)
+    return np.bincount(system.group, moved, len(system.labels)) > 0
