@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -59,17 +59,6 @@ class Samples:
     repeats: tuple[Member, ...] = ()
     golden: tuple[Member, ...] = ()
     diagnoses: Mapping[str, DiagnosisSummary] = field(default_factory=dict)
-
-    def with_diagnoses(self, diagnoses: Mapping[str, DiagnosisSummary]) -> Samples:
-        """The samples with what the model of each motor lacks.
-
-        Parameters
-        ----------
-        diagnoses
-            By motor_id.
-
-        """
-        return replace(self, diagnoses=diagnoses)
 
 
 def compare_lots(

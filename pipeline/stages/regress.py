@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pipeline.estimation.registry import estimator_terms
@@ -87,7 +88,7 @@ def _compare(
         groups = chosen.samples.baseline, chosen.samples.candidate
         return compare_versions(chosen.pairs, groups, limits, terms, chosen.notes)
     diagnoses = read_diagnoses(_diagnosis_folders(settings))
-    samples = chosen.samples.with_diagnoses(diagnoses)
+    samples = replace(chosen.samples, diagnoses=diagnoses)
     return compare_lots(samples, limits, terms, chosen.notes)
 
 

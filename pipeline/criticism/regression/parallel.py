@@ -1,4 +1,4 @@
-"""How what is done to every segment of a campaign is done: on two threads, or as a caller says."""
+"""Maps a function over the segments of a campaign: on two threads, or as a caller says."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 from pipeline.criticism.data.segment import Segment
 
 Work = Callable[..., Any]
-Doing = Callable[[Work, Sequence[Segment], Sequence[tuple[Any, ...]]], tuple[Any, ...]]
-"""Does `work(segment, *arguments)` to every segment with its arguments; results in order."""
+Mapper = Callable[[Work, Sequence[Segment], Sequence[tuple[Any, ...]]], tuple[Any, ...]]
+"""Calls `work(segment, *arguments)` for every segment; results in their order."""
 
 _THREADS = 2
 """Threads: two are worth 1.4 cores on arrays of this size (docs/criticism.md)."""
@@ -62,30 +62,30 @@ def in_order(
     return tuple(work(one, *with_) for one, with_ in zip(segments, arguments, strict=True))
 
 
-_DOING: ContextVar[Doing] = ContextVar("doing", default=by_threads)
+_MAPPER: ContextVar[Mapper] = ContextVar("mapper", default=by_threads)
 
 
 @contextmanager
-def done_by(doing: Doing) -> Iterator[None]:
-    """Inside the block, work on segments is done by another function.
+def mapped_by(mapper: Mapper) -> Iterator[None]:
+    """Inside the block, `on_each` is another function.
 
     Parameters
     ----------
-    doing
+    mapper
         Takes `work`, segments and arguments, as `by_threads` does.
 
     """
-    before = _DOING.set(doing)
+    before = _MAPPER.set(mapper)
     try:
         yield
     finally:
-        _DOING.reset(before)
+        _MAPPER.reset(before)
 
 
 def on_each(
     work: Work, segments: Sequence[Segment], arguments: Sequence[tuple[Any, ...]]
 ) -> tuple[Any, ...]:
-    """Maps a function over segments, as `done_by` says, on threads by default.
+    """Maps a function over segments, as `mapped_by` says, on threads by default.
 
     Parameters
     ----------
@@ -102,4 +102,4 @@ def on_each(
         Results in the order of the segments.
 
     """
-    return _DOING.get()(work, segments, arguments)
+    return _MAPPER.get()(work, segments, arguments)

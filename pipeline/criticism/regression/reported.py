@@ -127,12 +127,14 @@ def against_stated(system: LinearSystem, held_out: HeldOut) -> tuple[str, ...]:
             continue
         value = u_alone**2 * (system.fit.values[column.name] / u**2 - stated_value / u_stated**2)
         if abs(value - stated_value) > policy.contradicted * math.hypot(u_alone, u_stated):
-            known, found = usual.get(column.name), f"{value:.4g} ± {u_alone:.2g}"
-            said = f"is stated as {stated_value:.4g} ± {u_stated:.2g}, and without that"
-            if known is not None:
-                said = f"({known.words}) is usually within {u_stated:.2g} {known.unit}, and"
-                found = f"{found} {known.unit}"
-            notes.append(f"{column.name} {said} these captures say {found}")
+            instrument, result = usual.get(column.name), f"{value:.4g} ± {u_alone:.2g}"
+            prior = f"is stated as {stated_value:.4g} ± {u_stated:.2g}, and without that"
+            if instrument is not None:
+                prior = (
+                    f"({instrument.words}) is usually within {u_stated:.2g} {instrument.unit}, and"
+                )
+                result = f"{result} {instrument.unit}"
+            notes.append(f"{column.name} {prior} these captures say {result}")
     return tuple(notes)
 
 

@@ -42,13 +42,11 @@ def residual(
 
     """
     signals = segment.recorded if recorded is None else recorded
-    equation = equation_of(segment)
-    segment = on_true_clock(segment, equation.recorder, model, values)
-    x = equation.state(segment, signals, model, values)
+    x = operate(segment, signals, model, values)
     x = x if beside is None else x.beside(beside)
     pieces = evaluate(model, x, values, hooks_in(segment))
-    measured = equation.measured(segment, signals, model, values)
-    return measured - equation.predicted(segment, x, pieces, model, values)
+    recorded_rows = measured(segment, signals, model, values)
+    return recorded_rows - predicted(segment, x, pieces, model, values)
 
 
 def operate(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

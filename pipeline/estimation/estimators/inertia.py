@@ -96,50 +96,6 @@ class Torque:
     reluctance_known: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Doubts:
-    """What contradicts the law: the acceleration's `share` that the torque does not explain,
-    and where regimes differ in J, T_c/J, B/J.
-    """
-
-    share: float
-    regimes: tuple[Disagreement | None, Disagreement | None, Disagreement | None]
-
-    def parts(self, index: int, value: float, logged: bool) -> list[Contribution]:
-        """Contributions to J, T_c or B; T_c and B are scaled by J, and so by its doubts."""
-        if logged:
-            parts = [Contribution(f"{BETWEEN}{METHOD.name}:unexplained", self.share * value, "B")]
-        else:
-            half = 0.5 * self.share * value / self.middle(logged)
-            parts = [Contribution("assumed:free_shaft", half, "B")]
-        for k in {0, index}:
-            regime = self.regimes[k]
-            if regime is not None:
-                parts.append(regime.part(f"{METHOD.name}:{GIVES[k]}", value))
-        return parts
-
-    def middle(self, logged: bool) -> float:
-        """Middle of where the inertia may lie, over the one by which acceleration follows torque.
-
-        With a load that nothing logged, J is that one where the current does not answer the load,
-        and less by the unexplained share, as current follows acceleration, where a speed loop has
-        the current hold against all of it. Between both it may be any. Reference: Frisch,
-        Statistical Confluence Analysis, 1934 (the two regressions are bounds).
-        """
-        return 1.0 if logged else 1.0 - 0.5 * self.share
-
-    def words(self, logged: bool) -> list[str]:
-        """What the regimes and the share say, where they say something."""
-        names = ("the inertia", "Coulomb friction over inertia", "viscous friction over inertia")
-        words = [d.words(n) for d, n in zip(self.regimes, names, strict=True) if d is not None]
-        if self.share > policy().drag.unexplained_share:
-            words.append(
-                f"{100.0 * self.share:.2g} % of the square of the drives' acceleration follows "
-                f"neither current nor load{'' if logged else ', which nothing logged'}"
-            )
-        return words
-
-
 def acceleration(rows: ShaftRows, driving_nm: Array) -> Array:
     """The derivatives of the shaft's acceleration by what is fitted: it is linear in all three.
 
@@ -260,6 +216,50 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
         words = _setups_reason(setups)
         estimates = tuple(replace(e, note=f"{words}; {e.note}") for e in estimates)
     return Fit(_of_a_known_sign(estimates), _evidence(rows, y, drag))
+
+
+@dataclass(frozen=True, slots=True)
+class Doubts:
+    """What contradicts the law: the acceleration's `share` that the torque does not explain,
+    and where regimes differ in J, T_c/J, B/J.
+    """
+
+    share: float
+    regimes: tuple[Disagreement | None, Disagreement | None, Disagreement | None]
+
+    def parts(self, index: int, value: float, logged: bool) -> list[Contribution]:
+        """Contributions to J, T_c or B; T_c and B are scaled by J, and so by its doubts."""
+        if logged:
+            parts = [Contribution(f"{BETWEEN}{METHOD.name}:unexplained", self.share * value, "B")]
+        else:
+            half = 0.5 * self.share * value / self.middle(logged)
+            parts = [Contribution("assumed:free_shaft", half, "B")]
+        for k in {0, index}:
+            regime = self.regimes[k]
+            if regime is not None:
+                parts.append(regime.part(f"{METHOD.name}:{GIVES[k]}", value))
+        return parts
+
+    def middle(self, logged: bool) -> float:
+        """Middle of where the inertia may lie, over the one by which acceleration follows torque.
+
+        With a load that nothing logged, J is that one where the current does not answer the load,
+        and less by the unexplained share, as current follows acceleration, where a speed loop has
+        the current hold against all of it. Between both it may be any. Reference: Frisch,
+        Statistical Confluence Analysis, 1934 (the two regressions are bounds).
+        """
+        return 1.0 if logged else 1.0 - 0.5 * self.share
+
+    def words(self, logged: bool) -> list[str]:
+        """What the regimes and the share say, where they say something."""
+        names = ("the inertia", "Coulomb friction over inertia", "viscous friction over inertia")
+        words = [d.words(n) for d, n in zip(self.regimes, names, strict=True) if d is not None]
+        if self.share > policy().drag.unexplained_share:
+            words.append(
+                f"{100.0 * self.share:.2g} % of the square of the drives' acceleration follows "
+                f"neither current nor load{'' if logged else ', which nothing logged'}"
+            )
+        return words
 
 
 def _of_a_known_sign(estimates: tuple[Estimate, ...]) -> tuple[Estimate, ...]:

@@ -81,21 +81,6 @@ class Columns:
         return self.drop_start + len(self.drops)
 
 
-def columns_of(points: Sequence[Point]) -> Columns:
-    """The coefficients that these plateaus can separate."""
-    pairs = tuple(p for p in PAIRS if any(point.pair == p for point in points))
-    offsets, drops = [], set()
-    for index in sorted({p.capture for p in points}):
-        of_capture = [p for p in points if p.capture == index]
-        signs = {math.copysign(1.0, p.i_a) for p in of_capture}
-        levels = sorted(abs(p.i_a) for p in of_capture)
-        if len(signs) == 2:
-            offsets.append(index)
-        if len(levels) > len(signs) and levels[-1] > 1.2 * levels[0]:
-            drops.add(voltage_source(of_capture[0].meta))
-    return Columns(pairs, tuple(offsets), tuple(sorted(drops)))
-
-
 def terminal_voltage(point: Point, columns: Columns, alpha_1_k: float) -> Array:
     """The derivatives of one pair's voltage by what is fitted: it is linear in all but alpha.
 
@@ -153,6 +138,21 @@ class DirectCurrentFit:
     residuals: Array
     full_rank: bool
     dof: float
+
+
+def columns_of(points: Sequence[Point]) -> Columns:
+    """The coefficients that these plateaus can separate."""
+    pairs = tuple(p for p in PAIRS if any(point.pair == p for point in points))
+    offsets, drops = [], set()
+    for index in sorted({p.capture for p in points}):
+        of_capture = [p for p in points if p.capture == index]
+        signs = {math.copysign(1.0, p.i_a) for p in of_capture}
+        levels = sorted(abs(p.i_a) for p in of_capture)
+        if len(signs) == 2:
+            offsets.append(index)
+        if len(levels) > len(signs) and levels[-1] > 1.2 * levels[0]:
+            drops.add(voltage_source(of_capture[0].meta))
+    return Columns(pairs, tuple(offsets), tuple(sorted(drops)))
 
 
 def fit_direct_current(

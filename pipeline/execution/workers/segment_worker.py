@@ -17,7 +17,7 @@ from multiprocessing.util import Finalize
 from typing import Any, TypeVar
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.regression.parallel import Work, by_threads, done_by, in_order
+from pipeline.criticism.regression.parallel import Work, by_threads, in_order, mapped_by
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 
 Made = TypeVar("Made")
@@ -43,7 +43,7 @@ class SegmentWorker:
     @contextmanager
     def campaign(self) -> Iterator[None]:
         """Shares the work on one campaign's segments inside the block, then drops the segments."""
-        with done_by(self.share):
+        with mapped_by(self.share):
             yield
         for segments in self._placed:
             segments.clear()
@@ -170,7 +170,7 @@ def shared_or_in_order() -> AbstractContextManager[None]:
     """Shares the work on a campaign's segments inside the block with the worker that `open_own` has
     opened; without one, they are worked on one after the other.
     """
-    return _OWN[0].campaign() if _OWN else done_by(in_order)
+    return _OWN[0].campaign() if _OWN else mapped_by(in_order)
 
 
 def _forget() -> None:

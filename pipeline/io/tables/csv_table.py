@@ -44,12 +44,6 @@ class CsvTable:
     time_increment: float | None = None
 
 
-def _refuse(
-    code: str, message: str, remedy: str, rows: tuple[int, int] | None = None
-) -> CaptureError:
-    return CaptureError(code, message, remedy, rows)
-
-
 def check_text(data: bytes) -> None:
     """Refuses bytes that are no plain text table.
 
@@ -65,15 +59,15 @@ def check_text(data: bytes) -> None:
 
     """
     if data.startswith(PACKED):
-        raise _refuse("encoding", "the file is packed", "unpack it first")
+        raise CaptureError("encoding", "the file is packed", "unpack it first")
     if data.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in data:
-        raise _refuse(
+        raise CaptureError(
             "encoding",
             "the file is UTF-16 or binary (it holds NUL bytes)",
             "save it as UTF-8 text",
         )
     if b"\r" in data and data.count(b"\r") != data.count(b"\r\n"):
-        raise _refuse(
+        raise CaptureError(
             "encoding", "lines end in a bare carriage return", "save it with LF or CRLF line ends"
         )
 
@@ -110,10 +104,10 @@ def split_comments(data: bytes) -> tuple[dict[str, str], int]:
         try:
             line = decoded(data[at:stop]).rstrip("\r\n")
         except ParseError as fault:
-            raise _refuse("encoding", f"a metadata line {fault}", "save it as UTF-8") from None
+            raise CaptureError("encoding", f"a metadata line {fault}", "save it as UTF-8") from None
         match = _COMMENT.match(line)
         if match and match[1] and metadata.setdefault(match[1], match[2]) != match[2]:
-            raise _refuse(
+            raise CaptureError(
                 "bad_metadata", f"the key {match[1]!r} has two values", "keep one of the two lines"
             )
         at = stop
@@ -188,7 +182,7 @@ def read_csv(
 def _check_last_line(body: bytes, rows: bytes) -> None:
     if not body.endswith(b"\n"):
         last = rows.count(b"\n")
-        raise _refuse(
+        raise CaptureError(
             "truncated",
             "the last line does not end in a line break, so its last number may be cut",
             "copy the file again; if it is whole, end it with a line break",
@@ -201,16 +195,18 @@ def _check_digest(data: bytes, begin: int, stated: str, rows: int) -> None:
     digest, _, counted = stated.partition("/")
     count = whole(counted)
     if not re.fullmatch(r"[0-9a-fA-F]{64}", digest) or count is None:
-        raise _refuse("bad_metadata", "sha256_rows is not of the form HEX/ROWS", "write it again")
+        raise CaptureError(
+            "bad_metadata", "sha256_rows is not of the form HEX/ROWS", "write it again"
+        )
     if count != rows:
-        raise _refuse(
+        raise CaptureError(
             "truncated",
             f"the file states {count} rows and holds {rows}",
             "copy the file again",
             (min(rows, count), max(rows, count) - 1),
         )
     if hashlib.sha256(memoryview(data)[begin:]).hexdigest() != digest.lower():
-        raise _refuse(
+        raise CaptureError(
             "corrupt",
             "the rows fail their checksum sha256_rows",
             "copy the file again; never edit a recording",
@@ -222,7 +218,7 @@ def _text(data: bytes, dialect: CsvDialect) -> str:
     try:
         return decoded(data, dialect.encoding)
     except ParseError as fault:
-        raise _refuse("encoding", f"the header {fault}", "state its `encoding`") from None
+        raise CaptureError("encoding", f"the header {fault}", "state its `encoding`") from None
 
 
 def _split_head(body: bytes, dialect: CsvDialect) -> tuple[list[bytes], bytes]:
@@ -237,7 +233,7 @@ def _split_head(body: bytes, dialect: CsvDialect) -> tuple[list[bytes], bytes]:
         stop = body.find(b"\n", at, at + MAX_HEAD_BYTES)
         if stop < 0 and len(body) > at + MAX_HEAD_BYTES:
             words = f"the line at byte {at} is longer than {MAX_HEAD_BYTES} bytes"
-            raise _refuse("limit", words, "record fewer columns, one line a row")
+            raise CaptureError("limit", words, "record fewer columns, one line a row")
         stop = len(body) if stop < 0 else stop
         head.append(body[at:stop])
         at = stop + 1
@@ -246,7 +242,9 @@ def _split_head(body: bytes, dialect: CsvDialect) -> tuple[list[bytes], bytes]:
         if pattern is None or pattern.match(_text(head[-1], dialect)):
             break
     else:
-        raise _refuse("no_header", "there is no header line", "name the columns in the first line")
+        raise CaptureError(
+            "no_header", "there is no header line", "name the columns in the first line"
+        )
     for _ in range(dialect.skip_after_header):
         stop = body.find(b"\n", at)
         stop = len(body) if stop < 0 else stop
@@ -267,7 +265,9 @@ def _header(
     if dialect.names is not None:
         return list(dialect.names[: len(names)]), tuple(zip(dialect.names, names, strict=False))
     if len(names) > _MAX_COLUMNS:
-        raise _refuse("limit", f"the header names {len(names)} columns", "record fewer columns")
+        raise CaptureError(
+            "limit", f"the header names {len(names)} columns", "record fewer columns"
+        )
     units: tuple[tuple[str, str], ...] = ()
     if dialect.units_row:
         row = _cells(head[at + 1], dialect)
@@ -282,7 +282,7 @@ def _check_separator(names: Sequence[str], rows: bytes, dialect: CsvDialect) -> 
         return
     comma = used[0] != "," and _DECIMAL_COMMA.search(rows, 0, MAX_HEAD_BYTES)
     layout = f"separator: {used[0]!r}" + (", decimal: ','" if comma else "")
-    raise _refuse(
+    raise CaptureError(
         "separator",
         f"the fields are separated by {used[0]!r}, where {dialect.separator!r} is expected",
         "save it with commas between fields and points as decimal signs, or write a source map "
@@ -329,7 +329,7 @@ def _check_shape(rows: bytes, names: list[str], dialect: CsvDialect) -> list[str
     wrong = np.flatnonzero(per_row != expected)
     if wrong.size:
         row = int(wrong[0])
-        raise _refuse(
+        raise CaptureError(
             "ragged_row",
             f"a row has {int(per_row[row]) + 1} fields where the header names {expected + 1}",
             "copy the file again, or check the separator",
@@ -338,7 +338,7 @@ def _check_shape(rows: bytes, names: list[str], dialect: CsvDialect) -> list[str
     names = names[: expected + 1]
     twice = {name for name in names if name and names.count(name) > 1}
     if twice:
-        raise _refuse(
+        raise CaptureError(
             "duplicate_column", f"the column {min(twice)!r} is there twice", "rename one of them"
         )
     return names
@@ -353,7 +353,7 @@ def _fields_a_row(rows: bytes, separator: str) -> NDArray[np.int64]:
         if stop == 0:
             row = sum(part.size for part in counts)
             words = f"a line is longer than {_BLOCK_BYTES} bytes"
-            raise _refuse("limit", words, "record one line a row", (row, row))
+            raise CaptureError("limit", words, "record one line a row", (row, row))
         raw = np.frombuffer(rows, np.uint8, stop - begin, begin)
         ends, marks = np.flatnonzero(raw == ord("\n")), np.flatnonzero(raw == ord(separator))
         counts.append(np.diff(np.searchsorted(marks, ends), prepend=0).astype(np.int64))
@@ -396,7 +396,7 @@ def _parse(
         columns[name] = values.to_numpy() if values.null_count() == 0 else _with_nan(values)
         infinite = np.flatnonzero(np.isinf(columns[name]))
         if infinite.size:
-            raise _refuse(
+            raise CaptureError(
                 "infinite",
                 f"the column {name!r} holds an infinite number",
                 "leave the field empty where nothing was measured",
@@ -439,13 +439,13 @@ def _locate(
         wrong = np.flatnonzero((number.is_null() & text.is_not_null()).to_numpy())
         if wrong.size:
             row = int(wrong[0])
-            return _refuse(
+            return CaptureError(
                 "bad_number",
                 f"the column {name!r} holds {str(text[row])[:40]!r}, which is no number",
                 "leave the field empty where nothing was measured; check the units row",
                 (row, int(wrong[-1])),
             )
-    return _refuse("bad_number", "a field is no number", "check the rows")
+    return CaptureError("bad_number", "a field is no number", "check the rows")
 
 
 def _number_in(text: str, pattern: str | None, what: str) -> float | None:
@@ -454,7 +454,7 @@ def _number_in(text: str, pattern: str | None, what: str) -> float | None:
     match = re.search(pattern, text, re.MULTILINE)
     value = number(match[1] or "") if match and match.re.groups else None
     if value is None:
-        raise _refuse(
+        raise CaptureError(
             "no_header",
             f"the time {what} is not where the source map says",
             "check `time` in the source map against the file's first lines",
