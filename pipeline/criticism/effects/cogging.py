@@ -22,7 +22,7 @@ def orders(machine: Machine) -> tuple[int, ...]:
     """Orders a turn that magnets and slots can make, of those that stand out of a slow turn.
 
     Multiples of p, 2p or the number of slots; LCM(slots, 2p) is always among them, but where it is
-    out of all reason (`Machine.cogging_order`), and twice that where no slow turn shows it.
+    out of all reason (`Machine.cogging_order`), and what no slow turn shows beside it.
     """
     bases = [machine.pole_pairs] + ([machine.slots] if machine.slots else [])
     multiples = {k for k in machine.torque_orders if any(k % base == 0 for base in bases)}
@@ -34,13 +34,21 @@ def orders(machine: Machine) -> tuple[int, ...]:
 
 
 def _unverified_orders(machine: Machine) -> set[int]:
-    """The second harmonic of cogging where no torque spectrum says whether it is there."""
-    order = machine.cogging_order
-    return set() if order is None or machine.torque_orders else {2 * order}
+    """Orders of which no torque spectrum says whether they are there.
+
+    The second harmonic of LCM(slots, 2p). Where the slots are not known, that itself: it is a
+    multiple of 2p, of which the windows observe three, and others where logs under load show them.
+    """
+    if machine.torque_orders:
+        return set()
+    if machine.cogging_order is not None:
+        return {2 * machine.cogging_order}
+    poles = 2 * machine.pole_pairs
+    return {poles, 3 * poles, 6 * poles} | {int(k) for k in machine.load_orders if k % poles == 0}
 
 
 def _expand(machine: Machine) -> tuple[Parameter, ...]:
-    unverified = _unverified_orders(machine)
+    terms = {order: n for n, order in enumerate(sorted(_unverified_orders(machine)), 1)}
     return tuple(
         Parameter(
             f"{wave}_{order}_nm",
@@ -50,7 +58,7 @@ def _expand(machine: Machine) -> tuple[Parameter, ...]:
             "torque_nm",
             -1.0,
             1.0,
-            optional=int(order in unverified),
+            optional=terms.get(order, 0),
             order=order,
         )
         for order in orders(machine)
