@@ -36,8 +36,11 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     -----
     A gap is longer than `gap_intervals` median intervals. Straight lines over `window` samples on
     either side give the change of the signal across it, Δ, and its slope s. The clock has skipped
-    where |Δ − s · gap| is above `sigmas` of the samples' scatter and |Δ − s · interval| is below a
-    quarter of it. Skips that stay below the uncertainty of the time base over the record change
+    where |Δ − s · gap| is above `sigmas` of the samples' scatter, |Δ − s · interval| is below a
+    quarter of it, and the samples on either side join without a bend of their own. Without the
+    last, a shaft that slows down or turns back while samples are lost would pass for a clock:
+    it is back near where it was.
+    Skips that stay below the uncertainty of the time base over the record change
     nothing that the record determines, and are warnings: one late row of a heat run.
 
     """
@@ -89,7 +92,31 @@ def _went_on(
     if_closed = right[0] - before_gap[0] - slope * usual_s
     sigma = float(np.hypot(before_gap[2], right[2])) + 0.5 * abs(right[1] - before_gap[1]) * usual_s
     clear = abs(as_stamped) > options["sigmas"] * sigma
-    return bool(clear and abs(if_closed) < 0.25 * abs(as_stamped))
+    closed = abs(if_closed) < 0.25 * abs(as_stamped)
+    return bool(clear and closed and _joins(signal[before], signal[after]))
+
+
+def _joins(before: Array, after: Array) -> bool:
+    """Whether samples of one run go on into those of another as they do within each.
+
+    Parameters
+    ----------
+    before, after : ndarray [n]
+        Samples of one signal on either side of a gap, in its unit.
+
+    Notes
+    -----
+    The two second differences that span the gap are held against twice the largest of the others:
+    of fifty samples of noise, none is that far out by chance.
+
+    """
+    before, after = before[np.isfinite(before)], after[np.isfinite(after)]
+    joined = np.concatenate((before, after))
+    bends = np.abs(np.diff(joined, 2))
+    spanning = slice(before.size - 2, before.size)
+    rounding = 4.0 * float(np.spacing(np.abs(joined).max()))
+    usual = float(np.delete(bends, spanning).max())
+    return bool(bends[spanning].max() <= 2.0 * usual + rounding)
 
 
 def _line(t_s: Array, values: Array, at_s: float) -> tuple[float, float, float] | None:

@@ -82,6 +82,17 @@ def test_only_rows_near_a_gap_are_looked_at() -> None:
         assert clock_jump._went_on(table, "theta_mech_rad", 99, 1.0, options) is there
 
 
+@pytest.mark.parametrize(("at", "lost"), [(240, 15), (250, 20)])
+def test_a_shaft_that_turned_back_while_samples_were_lost_is_no_skip(at: int, lost: int) -> None:
+    """It slows down and turns on over 80 ms; a clock that skips there is one still."""
+    rows = np.arange(600)
+    angle = 20e-3 * rows + 0.8 * np.cos(2.0 * math.pi * (rows - 250) / 80.0)
+    kept = np.delete(rows, np.arange(at, at + lost))
+    assert said("clock_jump", capture("drive", t_s=kept * 1e-3, theta_mech_rad=angle[kept])) == ""
+    t_s = np.where(rows < at, rows, rows + 100) * 1e-3
+    assert said("clock_jump", capture("drive", t_s=t_s, theta_mech_rad=angle)) == "refused"
+
+
 def test_a_table_without_a_clock_and_a_clock_that_stands() -> None:
     rows = np.arange(600.0)
     made = capture("drive", t_s=rows * 1e-3, theta_mech_rad=rows * 0.01)
