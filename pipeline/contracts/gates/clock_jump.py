@@ -36,10 +36,10 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     -----
     A gap is longer than `gap_intervals` median intervals. Straight lines over `window` samples on
     either side give the change of the signal across it, Δ, and its slope s. The clock has skipped
-    where |Δ − s · gap| is above `sigmas` of the samples' scatter, |Δ − s · interval| is below a
-    quarter of it, and the samples on either side join without a bend of their own. Without the
-    last, a shaft that slows down or turns back while samples are lost would pass for a clock:
-    it is back near where it was.
+    where |Δ − s · gap| is above `sigmas` of the samples' scatter and |Δ − s · interval| is below a
+    quarter of it. Where the two slopes differ by enough to explain Δ, the samples on either side
+    must also join without a bend of their own: a shaft that turns back while samples are lost is
+    back near where it was.
     Skips that stay below the uncertainty of the time base over the record change
     nothing that the record determines, and are warnings: one late row of a heat run.
 
@@ -76,7 +76,8 @@ def _went_on(
     """Whether the signal moved by one usual interval's worth, and clearly not by the gap's.
 
     Straight lines on either side give the signal and its slope at the gap's ends. The change
-    between them is held against the mean slope times the gap, and times one usual interval.
+    between them is held against the mean slope times the gap, and times one usual interval. Half
+    the difference of the slopes is the doubt about the slope in between.
     """
     window = int(options["window"])
     t_s, signal = table["t_s"].to_numpy(), table[name].to_numpy()
@@ -90,10 +91,12 @@ def _went_on(
     slope = 0.5 * (before_gap[1] + right[1])
     as_stamped = right[0] - before_gap[0] - slope * skipped
     if_closed = right[0] - before_gap[0] - slope * usual_s
-    sigma = float(np.hypot(before_gap[2], right[2])) + 0.5 * abs(right[1] - before_gap[1]) * usual_s
-    clear = abs(as_stamped) > options["sigmas"] * sigma
+    scatter = float(np.hypot(before_gap[2], right[2]))
+    doubt = 0.5 * abs(right[1] - before_gap[1])
+    clear = abs(as_stamped) > options["sigmas"] * (scatter + doubt * usual_s)
     closed = abs(if_closed) < 0.25 * abs(as_stamped)
-    return bool(clear and closed and _joins(signal[before], signal[after]))
+    straight = abs(as_stamped) > options["sigmas"] * (scatter + doubt * skipped)
+    return bool(clear and closed and (straight or _joins(signal[before], signal[after])))
 
 
 def _joins(before: Array, after: Array) -> bool:
