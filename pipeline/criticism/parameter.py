@@ -160,6 +160,14 @@ class Machine:
         order = math.lcm(self.slots, 2 * self.pole_pairs) if self.slots else 0
         return order if 0 < order <= self.policy.cutting.highest_order else None
 
+    @property
+    def electrical_orders(self) -> tuple[float, ...]:
+        """Orders [1/turn] at which electrical effects show, sorted: 1, 2, p, 2p, 6p, 12p and those
+        that logs under load show.
+        """
+        p = self.pole_pairs
+        return tuple(sorted({1, 2, p, 2 * p, 6 * p, 12 * p, *self.load_orders}))
+
     def scale(self, parameter: Parameter) -> float:
         """Size of one relative unit of a parameter.
 

@@ -395,24 +395,6 @@ def rows_where(segment: Segment, holds: Callable[[str, float], bool]) -> NDArray
     return np.array([holds(channel, order) for channel, order in groups])[group[valid]]
 
 
-def electrical_orders(machine: Machine) -> tuple[float, ...]:
-    """Orders a turn at which electrical effects show.
-
-    Parameters
-    ----------
-    machine
-        Pole pairs p, and orders that were seen under load.
-
-    Returns
-    -------
-    tuple of float
-        1, 2, p, 2p, 6p, 12p and those seen, sorted.
-
-    """
-    p = machine.pole_pairs
-    return tuple(sorted({1, 2, p, 2 * p, 6 * p, 12 * p, *machine.load_orders}))
-
-
 def slow_orders(machine: Machine) -> tuple[float, ...]:
     """Orders a turn that are examined in a slow turn.
 
@@ -427,7 +409,7 @@ def slow_orders(machine: Machine) -> tuple[float, ...]:
         Electrical orders, those seen, slots, and the cogging order with its double, sorted.
 
     """
-    orders = set(electrical_orders(machine)) | set(machine.torque_orders)
+    orders = set(machine.electrical_orders) | set(machine.torque_orders)
     if machine.slots:
         orders.add(machine.slots)
     if machine.cogging_order is not None:

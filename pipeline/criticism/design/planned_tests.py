@@ -12,7 +12,6 @@ from pipeline.criticism.data.segment import (
     Instrument,
     Segment,
     Sensors,
-    electrical_orders,
     slow_orders,
 )
 from pipeline.criticism.operating import Array
@@ -109,7 +108,7 @@ def _torque_map(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
             "torque_shaft_nm": np.zeros(i_d.size),
         }
         window = policy.map_samples // 2
-        weak = projection(theta, window_starts(keep, window), window, electrical_orders(machine))
+        weak = projection(theta, window_starts(keep, window), window, machine.electrical_orders)
         maps.append(
             Segment(
                 capture=f"planned torque_map {speed:g}",

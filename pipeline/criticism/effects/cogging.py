@@ -36,15 +36,15 @@ def orders(machine: Machine) -> tuple[int, ...]:
 def _unverified_orders(machine: Machine) -> set[int]:
     """Orders of which no torque spectrum says whether they are there.
 
-    The second harmonic of LCM(slots, 2p). Where the slots are not known, that itself: it is a
-    multiple of 2p, of which the windows observe three, and others where logs under load show them.
+    The second harmonic of LCM(slots, 2p). Where the slots are not known, that itself: one of the
+    multiples of 2p that windows observe.
     """
     if machine.torque_orders:
         return set()
     if machine.cogging_order is not None:
         return {2 * machine.cogging_order}
     poles = 2 * machine.pole_pairs
-    return {poles, 3 * poles, 6 * poles} | {int(k) for k in machine.load_orders if k % poles == 0}
+    return {int(k) for k in machine.electrical_orders if k % poles == 0}
 
 
 def _expand(machine: Machine) -> tuple[Parameter, ...]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment, Unthinned, electrical_orders, segment_of
+from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
 from pipeline.criticism.data.sensors import TEMPERATURES, prepared
 from pipeline.criticism.data.shaft_angle import (
     ANGLES,
@@ -78,7 +78,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     turned = float(np.ptp(columns["theta_mech_rad"]))
     size = columns["vd_v"].size
     window = window_of(period, size, policy)
-    orders = electrical_orders(machine) if angle and turned > policy.turning_rad else ()
+    orders = machine.electrical_orders if angle and turned > policy.turning_rad else ()
     sensors = with_smooth_angle(
         capture, columns, prepared(columns, period, machine.policy, speed_noise), machine, window
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.criticism.data.drive_log import in_time
-from pipeline.criticism.data.segment import Segment, electrical_orders, segment_of
+from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.sensors import TEMPERATURES, prepared
 from pipeline.criticism.data.shaft_angle import shaft_angle, with_angle, with_smooth_angle
 from pipeline.criticism.data.traces import even_clock, thinned, window_of
@@ -56,7 +56,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     columns["t_s"] = period * np.arange(size, dtype=np.float64)
     cut_out, starts = thinned(columns, keep, window, policy.windows)
     by_angle = "omega_mech_rad_s" not in angle
-    orders = electrical_orders(machine) if by_angle else ()
+    orders = machine.electrical_orders if by_angle else ()
     weak = projection(cut_out["theta_mech_rad"], starts, window, orders)
     middle = np.rint(cut_out["t_s"][weak.starts + window // 2] / period)
     return segment_of(

@@ -13,7 +13,6 @@ from pipeline.criticism.data.segment import (
     PAIR_RAD,
     Segment,
     Sensors,
-    electrical_orders,
     segment_of,
 )
 from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
@@ -71,7 +70,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     sensors = _beside_waves(prepared(columns, period, machine.policy), columns, machine, window)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     columns, starts = thinned(columns, keep, window, policy.windows)
-    orders, margin = electrical_orders(machine), policy.wave_samples
+    orders, margin = machine.electrical_orders, policy.wave_samples
     weak = projection(columns["theta_mech_rad"], starts, window, orders, margin=margin)
     weak = weak.only(_steady(weak, columns["theta_mech_rad"], policy))
     return segment_of(

@@ -148,9 +148,8 @@ def _of_handbooks(system: LinearSystem) -> Array:
 
 
 def _beyond(u: Array, prior_precision: Array, policy: GaussNewton) -> Array:
-    """Standard uncertainties [P] without the priors of inverse variance `prior_precision` [P],
-    infinite
-    where nothing else does: what handbooks say is not measured.
+    """Standard uncertainties [P] without the priors of inverse variance `prior_precision` [P];
+    infinite where there is nothing else, since what handbooks say is not measured.
     """
     information = np.maximum(u, 1e-300) ** -2.0 - prior_precision
     informed = information > policy.least_information * prior_precision

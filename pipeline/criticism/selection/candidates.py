@@ -80,10 +80,6 @@ def widened(
 ) -> LinearSystem:
     """The system around a fit with the candidates' columns behind its own, in order.
 
-    The candidates' may stay as they were in `before`. Its own are made anew: what the station's
-    priors alone hold apart, such as a gain and the effect of that name, columns that are made in
-    two places would seem to discriminate.
-
     Parameters
     ----------
     fit

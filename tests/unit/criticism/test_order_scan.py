@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.segment import electrical_orders, row_index
+from pipeline.criticism.data.segment import row_index
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.linear_system import linear_system
@@ -102,7 +102,7 @@ def test_noise_has_no_orders(first):
 
 def test_orders_that_were_seen_have_rows_of_their_own():
     seen = replace(machine(), load_orders=(16,))
-    assert set(electrical_orders(seen)) - set(electrical_orders(machine())) == {16}
+    assert set(seen.electrical_orders) - set(machine().electrical_orders) == {16}
     assert ("torque_shaft_nm", 42) in row_index(log())[3]
 
 
