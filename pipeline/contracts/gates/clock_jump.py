@@ -117,9 +117,7 @@ def _joins(before: Array, after: Array) -> bool:
     joined = np.concatenate((before, after))
     bends = np.abs(np.diff(joined, 2))
     spanning = slice(before.size - 2, before.size)
-    rounding = 4.0 * float(np.spacing(np.abs(joined).max()))
-    usual = float(np.delete(bends, spanning).max())
-    return bool(bends[spanning].max() <= 2.0 * usual + rounding)
+    return bool(bends[spanning].max() <= 2.0 * np.delete(bends, spanning).max())
 
 
 def _line(t_s: Array, values: Array, at_s: float) -> tuple[float, float, float] | None:
