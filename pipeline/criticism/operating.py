@@ -34,6 +34,8 @@ class Supply:
         Whether the log holds the q axis only, so that of a voltage's delay only its envelope shows.
     hold_s
         Time for which a voltage vector is constant while the rotor turns [s]; 0 where not known.
+    measured
+        Whether the voltage is stated to be measured, so that nothing of the inverter is in it.
 
     """
 
@@ -42,6 +44,7 @@ class Supply:
     volts_v: Complex | None = None
     q_alone: bool = False
     hold_s: float = 0.0
+    measured: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -192,7 +192,7 @@ def _fastest_rad_s(capture: Capture) -> float:
 def _way(capture: Capture) -> Way:
     """What two captures must have in common to measure alike."""
     meta = capture.meta
-    place: Way = (meta.test, meta.pair or "", meta.voltage_kind)
+    place: Way = (meta.test, meta.pair or "", meta.voltage_kind or "")
     if meta.test != "current_step":
         return place
     angle = "" if meta.theta_elec_deg is None else f"{meta.theta_elec_deg % 180.0:.0f}"

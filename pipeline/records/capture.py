@@ -57,7 +57,8 @@ class CaptureMeta:
     theta_elec_deg
         Electrical angle at which the rotor is locked [deg].
     voltage_kind
-        Whether voltages are `measured` or the inverter's `commanded` ones.
+        Whether voltages are `measured` or the inverter's `commanded` ones; None where not stated,
+        which is not taken as measured.
     voltage_timing
         Whether a voltage sample is of its `instant`, `held` for the period that follows, or
         `centred` on it.
@@ -91,7 +92,7 @@ class CaptureMeta:
     ambient_degc: float | None = None
     pair: str | None = None
     theta_elec_deg: float | None = None
-    voltage_kind: VoltageKind = "measured"
+    voltage_kind: VoltageKind | None = None
     voltage_timing: VoltageTiming = "instant"
     pwm_hz: float | None = None
     vdc_v: float | None = None

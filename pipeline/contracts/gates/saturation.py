@@ -33,7 +33,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """
     masks: list[Mask] = []
     findings: list[Finding] = []
-    measured = capture.meta.voltage_kind == "measured"
+    measured = capture.meta.voltage_kind != "commanded"
     names = CURRENTS + OTHERS + (MEASURED_VOLTAGES if measured else ())
     for index, table in enumerate(capture.tables):
         for name in (n for n in names if n in table.columns):

@@ -264,7 +264,8 @@ def segment_of(
     Returns
     -------
     Segment
-        With gains, temperatures and frequencies of the metadata.
+        With gains, temperatures and frequencies of the metadata, and 1 as `measured` where the
+        voltages are stated to be so.
 
     """
     stated = capture.meta.ambient_degc
@@ -272,6 +273,8 @@ def segment_of(
     numbers = {"ambient_k": ambient, **(fixed or {})}
     if pwm_hz := capture.meta.pwm_hz:
         numbers |= {"pwm_s": 1.0 / pwm_hz, "vdc_v": capture.meta.vdc_v or 0.0}
+    if capture.meta.voltage_kind == "measured":
+        numbers["measured"] = 1.0
     meter = "gain_commanded" if capture.meta.voltage_kind == "commanded" else "gain_voltage"
     return Segment(
         capture=capture.path,

@@ -18,7 +18,7 @@ _EDGES, _MOMENTS = 1.0, 2.0
 
 
 def _drop(x: Operating, q: Values) -> Complex:
-    if not x.inverter:
+    if not x.inverter or x.supply.measured:
         return np.zeros(x.omega_rad_s.shape, dtype=complex)
     given_v = _given(x, q) if q["given_v"] else 0.0
     whole_v = q["loss_v"] + q["given_v"]

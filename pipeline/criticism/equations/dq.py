@@ -291,7 +291,7 @@ EQUATION = Equation(
     predicted=predicted,
     observes=Observes(
         (
-            *("r_ohm", "lead_share", "ld_h", "lq_h", *STATE),
+            *("r_ohm", "lead_ohm", "ld_h", "lq_h", *STATE),
             *(
                 "ripple_slope",
                 "ripple_mean",

@@ -19,6 +19,7 @@ from pipeline.criticism.machine.model import (
     Model,
     Pieces,
     evaluate,
+    lead_ohm,
 )
 from pipeline.criticism.operating import Array, Operating, Signals, Values, between
 from pipeline.criticism.parameter import Machine
@@ -135,7 +136,7 @@ def predicted(segment: Segment, x: Operating, _: Pieces, model: Model, values: V
         current = (values["j_kgm2"] * smooth + pieces.drag_nm) / kt
         driven = replace(x, iq_a=current, cache={})
         pieces = evaluate(model, driven, values)
-    rough = (1.0 + values["lead_share"]) * values["r_ohm"] * values["j_kgm2"] / kt
+    rough = (values["r_ohm"] + lead_ohm(x, values)) * values["j_kgm2"] / kt
     volts = pieces.drop_v + 1j * x.machine.pole_pairs * x.omega_rad_s * pieces.psi_wb.real
     volts = volts + 1j * (rough * (bend - smooth) + _across_l(segment, bend, model, values))
     return recorded_voltage(volts, segment, driven, model, values, in_frame=True).imag[None]
@@ -184,7 +185,7 @@ def _ka(segment: Segment, model: Model, values: Values) -> float:
     return r_ohm * values["j_kgm2"] / (1.5 * ke)
 
 
-_DETERMINES = ("r_ohm", "lead_share", "psi_wb", "j_kgm2", "b_nm_s_rad")
+_DETERMINES = ("r_ohm", "lead_ohm", "psi_wb", "j_kgm2", "b_nm_s_rad")
 _KT = "(1.5*pole_pairs*psi_wb)"
 _OF = ("r_ohm", "psi_wb")
 COMBINATIONS = (

@@ -146,7 +146,7 @@ EQUATION = Equation(
     measured=measured,
     predicted=predicted,
     observes=Observes(
-        ("r_ohm", "lead_share", "ld_h", "lq_h", "psi_wb", *STATE),
+        ("r_ohm", "lead_ohm", "ld_h", "lq_h", "psi_wb", *STATE),
         hooks=frozenset({"flux", "drop"}),
         sensors=frozenset({"angle", "current", "voltage", "clock"}),
         form="affine",

@@ -92,7 +92,7 @@ BASE: tuple[Constant, ...] = (
     Constant("ripple_torque", "1", "T_s di/dt of the current in the torque", hook="hold"),
     Constant("ripple_held", "1", "(ω_e T_s)², ripple in a held shaft's torque", hook="hold"),
     Constant("bench_angle_rad", "rad", "electrical zero of the bench's encoder", hook="bench"),
-    Constant("lead_share", "1", "resistance of inverter and leads over the phase's"),
+    Constant("lead_ohm", "ohm", "resistance of inverter and leads"),
     Constant("zero_alpha_a", "A", "α offset of the shunts", 0.0, "state", "current_a", "zero_a"),
     Constant("zero_beta_a", "A", "β offset of the shunts", 0.0, "state", "current_a", "zero_a"),
     Constant("zero_angle_rad", "rad", "electrical zero of the drive's encoder", hook="state"),
@@ -377,12 +377,25 @@ def evaluate(model: Model, x: Operating, values: Values, hooks: frozenset[str] =
 def _drops(model: Model, x: Operating, values: Values) -> Complex:
     """Voltage [n, V] of the resistance and of every effect that has a drop."""
     mean = mean_current(x, values)
-    lead = values["lead_share"] if x.inverter else 0.0
-    drop: Complex = (1.0 + lead) * values["r_ohm"] * mean.i_a
+    drop: Complex = (values["r_ohm"] + lead_ohm(x, values)) * mean.i_a
     for effect in model.effects:
         if effect.drop is not None:
             drop = drop + effect.drop(mean, values_of(effect, model.machine, values))
     return drop
+
+
+def lead_ohm(x: Operating, values: Values) -> float:
+    """Resistance of inverter and leads in the voltage of a state.
+
+    Parameters
+    ----------
+    x
+        A state; a voltage that is measured, at a bench or a drive, holds nothing of them.
+    values
+        Constants of the base.
+
+    """
+    return values["lead_ohm"] if x.inverter and not x.supply.measured else 0.0
 
 
 def _drags(model: Model, x: Operating, values: Values) -> Array:

@@ -320,9 +320,9 @@ class Priors:
     ripple_held: float = derived(
         0.08, "(ω_e T_s)²", "ripple in a held shaft's torque", source="as `priors.ripple_edge`"
     )
-    lead_share: float = chosen(
-        5e-3, "1", "resistance of inverter and leads over the phase's",
-        why="a few milliohm of switches and leads beside a winding of one ohm",
+    lead_ohm: float = chosen(
+        5e-3, "ohm", "resistance of inverter and leads, which a commanded voltage holds",
+        why="a few milliohm of switches and leads, whatever the winding",
     )  # fmt: skip
     zero_a: float = derived(
         1e-3, "machine scales", "offset of the shunts",

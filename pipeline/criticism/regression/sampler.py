@@ -147,8 +147,8 @@ class Sampler:
         pieces = self.pieces
         if column.name == "b_nm_s_rad":
             pieces = replace(pieces, drag_nm=pieces.drag_nm + step * x.omega_rad_s)
-        elif column.name == "lead_share":
-            lead = step * self.values["r_ohm"] * self.mean.i_a * float(x.inverter)
+        elif column.name == "lead_ohm":
+            lead = step * self.mean.i_a * float(x.inverter and not x.supply.measured)
             pieces = replace(pieces, drop_v=pieces.drop_v + lead)
         elif column.name not in _BETWEEN:
             pieces = evaluate(self.model, x, moved, self.hooks)

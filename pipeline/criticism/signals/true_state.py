@@ -187,6 +187,7 @@ def operating(
             segment.fixed.get("pwm_s", 0.0),
             segment.fixed.get("vdc_v", 0.0),
             hold_s=hold_s(segment, motion.omega_rad_s, model.machine),
+            measured=bool(segment.fixed.get("measured")),
         ),
         shaft=ShaftState(
             held=segment.test == "torque_map",

@@ -45,7 +45,7 @@ def voltage_source(meta: CaptureMeta) -> str:
         A commanded voltage is another instrument than a measured one.
 
     """
-    kind = "voltage" if meta.voltage_kind == "measured" else "voltage_commanded"
+    kind = "voltage_commanded" if meta.voltage_kind == "commanded" else "voltage"
     return f"{kind}@{station(meta)}"
 
 

@@ -175,7 +175,7 @@ def test_a_step_may_not_be_cut_at_all() -> None:
     assert "cut flat at -2.5 in 40 of 2000 rows" in finding.message
     assert finding.rows == (500, 539)
     # a commanded voltage stands at the inverter's limit, a measured one at the probe's
-    for kind, expected in (("measured", "warned"), ("commanded", "")):
+    for kind, expected in (("measured", "warned"), (None, "warned"), ("commanded", "")):
         made = capture("drive", vab_v=values, meta={"voltage_kind": kind})
         assert said("saturation", made) == expected
 

@@ -245,6 +245,7 @@ def test_a_voltage_is_no_later_than_a_drive_computes(meta: dict[str, Any], count
     [
         ({"voltage_kind": "commanded", "pwm_hz": 8e3}, 1.25e-4),
         ({"voltage_kind": "commanded", "pwm_hz": 2e3}, 5e-4),
+        ({"pwm_hz": 8e3}, 1.25e-4),
         ({"voltage_kind": "measured", "pwm_hz": 8e3}, 0.0),
     ],
 )
