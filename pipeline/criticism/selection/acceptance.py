@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.operating import Array
+from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.regression.goodness import (
     HeldOut,
     floor_factors,
@@ -130,10 +131,34 @@ def is_determined(system: LinearSystem, before: LinearSystem) -> bool:
 
     """
     effect = system.fit.model.effects[-1]
-    held_out = leave_out(system)
-    sure = significantly_nonzero(system, held_out, system.policy.selection.least_u)
+    present = sure_amplitudes(system, leave_out(system), effect)
+    return size_of(system.fit, effect, present) >= 1.0 or (
+        bool(present) and _takes_most(system, before, significant_groups(before))
+    )
+
+
+def sure_amplitudes(system: LinearSystem, held_out: HeldOut, effect: Effect) -> list[Parameter]:
+    """The amplitudes of an effect that differ significantly from zero beside all that is fitted.
+
+    Parameters
+    ----------
+    system
+        The fit with the effect.
+    held_out
+        What leaving out captures moves.
+    effect
+        The effect.
+
+    Returns
+    -------
+    list of Parameter
+        As `is_determined` asks it of them; none of a coupling without a twist that is sure, nor of
+        one that full logs exclude.
+
+    """
     parameters = effect.parameters_of(system.fit.machine)
     least, discrimination = system.policy.selection.least_u, discriminate(system.fit, effect)
+    sure = significantly_nonzero(system, held_out, least)
     excluded = discrimination is not None and discrimination.name is None
     logged = {p.name: (system.fit.size(effect, p), p.u) for p in parameters if p.u > 0.0}
     logged |= discrimination.values if discrimination is not None else {}
@@ -146,10 +171,7 @@ def is_determined(system: LinearSystem, before: LinearSystem) -> bool:
     present = [p for p in amplitudes if p in nonzero]
     if not present and together_nonzero(system, held_out, names, least):
         present = amplitudes
-    large = size_of(system.fit, effect, present) >= 1.0 or (
-        bool(present) and _takes_most(system, before, significant_groups(before))
-    )
-    return coupled and not excluded and large
+    return present if coupled and not excluded else []
 
 
 def _same_hook(effect: Effect, added: Sequence[Effect]) -> list[Effect]:

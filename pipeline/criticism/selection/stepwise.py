@@ -12,10 +12,16 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown, tolerances
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
-from pipeline.criticism.regression.goodness import significant_groups
+from pipeline.criticism.regression.goodness import leave_out, significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.normal_equations import NormalEquations
-from pipeline.criticism.selection.acceptance import Baseline, acts_in, is_determined, matters
+from pipeline.criticism.selection.acceptance import (
+    Baseline,
+    acts_in,
+    is_determined,
+    matters,
+    sure_amplitudes,
+)
 from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.changed_between import with_free_shares
 from pipeline.criticism.selection.choices import reconsidered
@@ -74,12 +80,35 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
     -----
     Shares of friction or magnet left free, or another reading of a column, that explain as much as
     the best effect, within a `tie`, are taken instead; what full logs show of that effect counts
-    for it.
+    for it. An effect of the last step whose size may be zero, now that all others are in, goes with
+    every step that has it; the search goes on without it.
 
     """
-    steps: list[LadderStep] = []
-    policy = fit.policy.selection
     base = len(fit.model.effects)
+    steps = _climbed(fit, base, library)
+    unsure: frozenset[str] = frozenset()
+    while (name := _unsure(steps[-1].system, base)) is not None:
+        unsure |= {name}
+        kept = [step for step in steps if name not in step.added]
+        last = steps[-1].system
+        fit = _refloored(gauss_newton(last.fit.without(name), before=last), base)
+        if tuple(e.name for e in fit.model.effects[base:]) == kept[-1].added:
+            fit = kept.pop().fit
+        steps = _climbed(fit, base, library, kept, unsure)
+    return tuple(steps)
+
+
+def _climbed(
+    fit: Fit,
+    base: int,
+    library: Mapping[str, Effect],
+    before: Sequence[LadderStep] = (),
+    unsure: Set[str] = frozenset(),
+) -> list[LadderStep]:
+    """The steps `before`, one of a fit, and those that follow from it without effects that are
+    `unsure`; `base` effects of the model were not added.
+    """
+    steps, policy = list(before), fit.policy.selection
     for _ in range(policy.most_steps):
         offered = candidates(library, fit.model)
         wide = widened(fit, offered, steps[-1].system if steps else None)
@@ -96,7 +125,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         inside = {e.discriminator for e in fit.model.effects} - {None}
         couplings = bool(significant.any())
         passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
-        chosen = _chosen(wide, passing, fit.model.effects[base:])
+        chosen = _chosen(wide, passing, fit.model.effects[base:], unsure)
         unnamed = filter(None, (with_free_shares(wide), other_reading(wide)))
         alternative = min(unnamed, key=lambda system: system.deviance, default=None)
         if alternative is not None and (
@@ -108,14 +137,19 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         if chosen is None:
             break
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
-        system = reconsidered(_backward(chosen, base))
-        fit, effects = system.fit, system.fit.model.effects[base:]
-        fit = replace(fit, tolerance=tolerances(fit, effects))
-        if effects:
-            fit = _floored_anew(fit, system)
-        if tuple(e.name for e in effects) in {r.added for r in steps}:
+        if chosen.fit.model.effects[-1].name in unsure:
             break
-    return tuple(steps)
+        fit = _refloored(reconsidered(_backward(chosen, base)), base)
+        if tuple(e.name for e in fit.model.effects[base:]) in {r.added for r in steps}:
+            break
+    return steps
+
+
+def _refloored(system: LinearSystem, base: int) -> Fit:
+    """The fit of a system by tolerances and noise floors of the effects beyond its first `base`."""
+    fit, effects = system.fit, system.fit.model.effects[base:]
+    fit = replace(fit, tolerance=tolerances(fit, effects))
+    return _floored_anew(fit, system) if effects else fit
 
 
 def _with_full_logs(system: LinearSystem) -> float:
@@ -165,17 +199,20 @@ def _floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
 
 
 def _chosen(
-    wide: LinearSystem, passing: Sequence[Score], added: Sequence[Effect]
+    wide: LinearSystem,
+    passing: Sequence[Score],
+    added: Sequence[Effect],
+    unsure: Set[str],
 ) -> LinearSystem | None:
     """The fit with the best candidate of the first few; of the next few, if none of these keeps its
-    predicted fall and differs significantly from zero.
+    predicted fall and differs significantly from zero; an effect that is `unsure` does not.
 
     That fit is finished with columns of its own, and without terms that are not worth their
     penalty. Where one that explains more by over a `tie` is not sure of its size, no other that
     acts there is named in its place.
     """
     policy = wide.policy.selection
-    unsure: list[tuple[float, NDArray[np.bool_]]] = []
+    doubtful: list[tuple[float, NDArray[np.bool_]]] = []
     for first in range(0, min(len(passing), policy.refit_rounds * policy.refits), policy.refits):
         batch = list(passing[first : first + policy.refits])
         while (best := _refit_best(wide, batch, added)) is not None:
@@ -183,11 +220,12 @@ def _chosen(
             finished = trimmed(gauss_newton(with_all_terms(best.fit), before=best), named)
             cost = finished.deviance + math.log(wide.size) * finished.model_columns.size
             acts = acts_in(finished)
-            if any(cost > least + policy.tie and np.any(acts & where) for least, where in unsure):
+            if any(cost > least + policy.tie and np.any(acts & where) for least, where in doubtful):
                 return None
-            if is_determined(at_end := linear_system(finished.fit), wide):
+            at_end = linear_system(finished.fit)
+            if named[-1] not in unsure and is_determined(at_end, wide):
                 return at_end
-            unsure.append((cost, acts))
+            doubtful.append((cost, acts))
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
     return None
 
@@ -279,6 +317,20 @@ def begin_from(fit: Fit, score: Score) -> Fit:
         moved[effect.in_place_of[0]] = 0.0
     start = {**moved, **score.candidate.values, **score.step}
     return replace(fit, model=model).at(start)
+
+
+def _unsure(wide: LinearSystem, base: int) -> str | None:
+    """The name of an effect that was added to the first `base` and whose size may be zero, fitted
+    with all others; of several the one that explains least. One may be unsure as long as another
+    stands for it as well, so they go one at a time.
+    """
+    added = wide.fit.model.effects[base:]
+    if not added:
+        return None
+    system = wide.only(np.arange(wide.model_column_count))
+    held_out = leave_out(system)
+    unsure = [e.name for e in added if not sure_amplitudes(system, held_out, e)]
+    return min(unsure, key=lambda name: loss_without(system, (name,)), default=None)
 
 
 def _backward(system: LinearSystem, base: int) -> LinearSystem:
