@@ -85,7 +85,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
 
     """
     base = len(fit.model.effects)
-    steps = _climbed(fit, base, library)
+    steps = _steps_from(fit, base, library)
     unsure: frozenset[str] = frozenset()
     while (name := _unsure(steps[-1].system, base)) is not None:
         unsure |= {name}
@@ -94,11 +94,11 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         fit = _refloored(gauss_newton(last.fit.without(name), before=last), base)
         if tuple(e.name for e in fit.model.effects[base:]) == kept[-1].added:
             fit = kept.pop().fit
-        steps = _climbed(fit, base, library, kept, unsure)
+        steps = _steps_from(fit, base, library, kept, unsure)
     return tuple(steps)
 
 
-def _climbed(
+def _steps_from(
     fit: Fit,
     base: int,
     library: Mapping[str, Effect],
