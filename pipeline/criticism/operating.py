@@ -292,6 +292,16 @@ class Operating(Samples):
             cache={},
         )
 
+    def sampled(self) -> Operating:
+        """The state at the samples [n] where it has more points than these; else itself."""
+        points = self.shaft.finer
+        return self if points == 1 else self.at(np.arange(0, self.theta_rad.size, points))
+
+    @property
+    def point_s(self) -> float:
+        """Time from point to point [s]."""
+        return self.ts_s / self.shaft.finer
+
     @property
     def i_a(self) -> Complex:
         """Complex rotor-frame current d + jq [A]."""

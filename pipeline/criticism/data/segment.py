@@ -80,6 +80,8 @@ class Instrument:
     stator
         Whether its transducer holds the motor's stator and so reads the reaction torque, which no
         inertia of the rotor is in; else it is in the shaft.
+    points
+        Points a sample that a logged voltage is the mean of; 1 of a log as fast as its PWM.
 
     """
 
@@ -89,6 +91,7 @@ class Instrument:
     ammeter: str = "gain_current"
     frame: float = 0.0
     stator: bool = False
+    points: int = 1
 
 
 @dataclass(frozen=True, slots=True)

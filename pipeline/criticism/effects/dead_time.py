@@ -51,7 +51,7 @@ def _phases(x: Operating, lag_s: float) -> tuple[Complex, Array, Array]:
     """Unit vector of the rotor [n], phase currents [3, n, A] and angle [n, rad], a lag before."""
     before, eps = x.i_a, x.eps_rad
     if lag_s:
-        before = before - np.gradient(before) * (lag_s / x.ts_s)
+        before = before - np.gradient(before) * (lag_s / x.point_s)
         eps = _lagging(x, lag_s)
     turn = x.once(eps, "turning", lambda: turning(eps))
     return turn, phases_of(before * turn), eps

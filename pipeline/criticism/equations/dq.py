@@ -30,13 +30,19 @@ from pipeline.criticism.signals.shaft import (
     torque_reading,
     true_load,
 )
-from pipeline.criticism.signals.true_current import drive_current
-from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
+from pipeline.criticism.signals.true_current import drive_current, on_points
+from pipeline.criticism.signals.true_state import (
+    at_true_angle,
+    motion_of,
+    operating,
+    points_of_mean,
+)
 from pipeline.criticism.signals.voltage import (
     ahead,
     central,
     forward,
     held_voltage,
+    mean_voltage,
     recorded_voltage,
     rotor_voltage,
 )
@@ -101,7 +107,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     segment = segment_of(
         capture, "dq", "drive", period, columns, sensors, channels=channels, weak=weak
     )
-    return replace(segment, unthinned=Unthinned(full, log))
+    return replace(
+        segment,
+        unthinned=Unthinned(full, log),
+        instrument=replace(segment.instrument, points=points_of_mean(segment, machine)),
+    )
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
@@ -124,11 +134,12 @@ def state(segment: Segment, signals: Signals, model: Model, values: Values) -> O
         The state [n], with the logged voltage.
 
     """
-    motion = motion_of(segment, signals, model.machine)
+    motion = motion_of(segment, signals, model.machine, segment.instrument.points)
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     x = operating(segment, signals, model, values, current, motion)
     volts = (signals["vd_v"] + 1j * signals["vq_v"]).astype(np.complex128)
     volts = volts * (1.0 / (1.0 + values[segment.instrument.meter]))
+    volts = on_points(volts, motion.theta_rad.size)
     if segment.instrument.frame:
         turn = model.machine.pole_pairs * motion.omega_rad_s * x.supply.hold_s
         volts = volts * np.exp(-1j * segment.instrument.frame * turn)
@@ -191,7 +202,7 @@ def predicted(
 
     """
     voltage = _logged_voltage(segment, x, pieces, values)
-    voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)
+    voltage = recorded_voltage(voltage, segment, x.sampled(), model, values, in_frame=True)
     rows = [voltage.real, voltage.imag]
     if TORQUE in segment.channels:
         torque = net_torque(x, pieces) + torque_between(segment, x, pieces, values)
@@ -212,9 +223,13 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     it is right at steady state, and early by that where it changes.
     """
     period, is_held = segment.ts_s, segment.instrument.timing == "held"
-    difference = forward if is_held else central
+    difference, points = forward if is_held else central, segment.instrument.points
+    if points > 1:
+        voltage = mean_voltage(pieces, x.eps_rad, points, period, ahead=is_held)
+        pieces, x = pieces.every(points), x.sampled()
     omega, turn = x.once(x.theta_rad, "pace", lambda: _pace(segment, x, difference))
-    voltage = (held_voltage if is_held else rotor_voltage)(pieces, omega, period)
+    if points == 1:
+        voltage = (held_voltage if is_held else rotor_voltage)(pieces, omega, period)
     edge, shift = values["ripple_edge"], values["ripple_shift"]
     averaged = 1.0 if segment.instrument.timing != "instant" else 0.0
     share = averaged / 24.0 + edge

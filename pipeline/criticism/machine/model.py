@@ -327,6 +327,18 @@ class Pieces:
     drop_v: Complex
     drag_nm: Array
 
+    def every(self, points: int) -> Pieces:
+        """What the hooks give at the samples, of so many points each.
+
+        Parameters
+        ----------
+        points
+            Points a sample.
+
+        """
+        at = slice(None, None, points)
+        return Pieces(self.psi_wb[at], self.slope_wb[at], self.drop_v[at], self.drag_nm[at])
+
 
 HOOKS = frozenset({"flux", "drop", "torque"})
 """What an equation may have in it of a machine's hooks."""

@@ -38,7 +38,7 @@ def mean_current(x: Operating, values: Values) -> Operating:
         return x
     current = x.i_a
     slope = np.zeros(current.shape, dtype=complex)
-    slope[1:-1] = 0.5 * (current[2:] - current[:-2])
+    slope[1:-1] = 0.5 * x.shaft.finer * (current[2:] - current[:-2])
     _, below = ripple(x, values["ripple_mean"], values)
     mean = current - values["ripple_slope"] * slope - below
     return replace(x, id_a=mean.real, iq_a=mean.imag, eps_rad=_earlier(x, values["ripple_slope"]))

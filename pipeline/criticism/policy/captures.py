@@ -173,6 +173,9 @@ class Cutting:
         why="as the estimators have it: the noise of a smoothed speed is a hundredth of that",
     )  # fmt: skip
     coast_parts: int = chosen(48, "1", "parts of a coasting shaft's sample at the most", why=COST)
+    mean_points: int = chosen(
+        8, "1", "points of a sample that a logged voltage is the mean of at the most", why=COST
+    )
     log_parts: int = chosen(6, "1", "parts of a log's sample at the most", why=COST)
     load_window_s: float = calibrated(
         0.04, "s", "window in which a shaft's acceleration is held against its current",

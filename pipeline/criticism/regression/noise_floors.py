@@ -208,6 +208,7 @@ def _of_voltages(segment: Segment, model: Model, values: Values) -> Array:
         total = np.hypot(total, np.abs(projected(segment, unsampled)))
     if any(effect.drop is not None for effect in model.effects):
         steep = steep_drops(model, values, operate(segment, segment.recorded, model, values))
+        steep = steep[:: steep.size // segment.size]
         by_axis = {"vd_v": steep.real, "vq_v": steep.imag}
         axes = np.stack([by_axis[channel] for channel in segment.channels if channel in VOLTS])
         total = np.hypot(total, np.abs(projected(segment, axes)))

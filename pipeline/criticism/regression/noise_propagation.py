@@ -17,6 +17,9 @@ from pipeline.criticism.operating import Array, Signals, Values
 from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.criticism.residuals.residual import residual
 
+IN_ROTOR_FRAME = (("id_a", "iq_a"), ("vd_v", "vq_v"))
+"""Columns of the two axes that a recorder turns by the angle that it reads."""
+
 
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
     """What the sensors' noise alone makes of the weak residual.
@@ -167,7 +170,20 @@ class _Recording:
                 even, sensors.angle_step_rad, sensors.readings, shift + pace * ramp
             )
             moved_rad = theta + parabolas(error, sensors.parabola)
-            yield self.change({**self.segment.recorded, "theta_mech_rad": moved_rad})
+            turned = self._in_turned_frame(error)
+            yield self.change({**turned, "theta_mech_rad": moved_rad})
+
+    def _in_turned_frame(self, error_rad: Array) -> dict[str, Array]:
+        """The columns [n] with those of the rotor frame in one that is ahead by an error [rad] of
+        the mechanical angle.
+        """
+        recorded = dict(self.segment.recorded)
+        back = np.exp(-1j * self.model.machine.pole_pairs * error_rad)
+        for d, q in IN_ROTOR_FRAME:
+            if d in recorded and q in recorded:
+                turned = (recorded[d] + 1j * recorded[q]) * back
+                recorded |= {d: turned.real, q: turned.imag}
+        return recorded
 
 
 def _of_rounding(recording: _Recording, noise: Array) -> Array:

@@ -243,7 +243,7 @@ class Sampler:
         if not any(part.any() for part in parts):
             return None
         only_drag = effect.hook == "torque" and effect.parallel is None
-        if only_drag and self.equation.torque_in:
+        if only_drag and self.equation.torque_in and self.x.shaft.finer == 1:
             # a drag is in the torque alone: no voltage needs to be predicted for it
             drag = np.zeros_like(self.start)
             place = self.segment.channels.index(self.equation.torque_in)

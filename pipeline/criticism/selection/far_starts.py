@@ -25,7 +25,7 @@ from pipeline.criticism.regression.normal_equations import Descent
 from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.observability import observes
 from pipeline.criticism.selection.candidates import Candidate, searched
-from pipeline.criticism.selection.improvement import Standing, clears, fall_below_floor, share_of
+from pipeline.criticism.selection.improvement import FitQuality, clears, fall_below_floor, share_of
 from pipeline.criticism.selection.score_test import Score, paid_for, ranked
 
 
@@ -87,7 +87,7 @@ def with_starts(
     best = {score.candidate.effect.name: score for score in scores}
     thorough = wide.policy.selection.thorough
     base = wide.only(wide.model_columns)
-    before = Standing.of(
+    before = FitQuality.of(
         base, np.arange(len(base.columns)), base.normal_equations().best(*thorough)
     )
     for end in _best_ends(base, offered):
@@ -157,12 +157,12 @@ def _refitted_ends(base: LinearSystem, trials: Sequence[Sequence[_Trial]]) -> li
 
 
 def _score(
-    base: LinearSystem, end: _End, before: Standing, significant: NDArray[np.bool_]
+    base: LinearSystem, end: _End, before: FitQuality, significant: NDArray[np.bool_]
 ) -> Score:
     """The score of a trial, without what the search over candidates costs."""
     trial, machine, policy = end.trial, base.fit.machine, base.policy.selection
     effect, parameter = trial.candidate.effect, trial.parameter
-    after = Standing.of(end.system, np.arange(len(base.columns)), end.descent)
+    after = FitQuality.of(end.system, np.arange(len(base.columns)), end.descent)
     score = Score(
         trial.candidate,
         before.deviance - after.deviance,

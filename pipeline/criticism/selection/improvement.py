@@ -14,8 +14,8 @@ from pipeline.criticism.regression.normal_equations import Descent, deviance_of
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
-    """How well a fit stands.
+class FitQuality:
+    """How well a fit explains its captures.
 
     Attributes
     ----------
@@ -33,8 +33,8 @@ class Standing:
     prior_cost: float
 
     @classmethod
-    def of(cls, system: LinearSystem, places: NDArray[np.int64], end: Descent) -> Standing:
-        """How well a system stands after a descent.
+    def of(cls, system: LinearSystem, places: NDArray[np.int64], end: Descent) -> FitQuality:
+        """Quality of a system after a descent.
 
         Parameters
         ----------
@@ -77,7 +77,7 @@ def clears(
     return bool(significant.any()) and float(remaining[significant].sum()) < allowed
 
 
-def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Standing) -> float:
+def share_of(system: LinearSystem, effect: Effect, before: FitQuality, after: FitQuality) -> float:
     """Largest share of the removable deviance that an effect removes.
 
     Parameters

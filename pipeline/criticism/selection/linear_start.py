@@ -29,7 +29,7 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.candidates import Candidate, first_of_each, searched
-from pipeline.criticism.selection.improvement import Standing, clears, fall_below_floor, share_of
+from pipeline.criticism.selection.improvement import FitQuality, clears, fall_below_floor, share_of
 from pipeline.criticism.selection.score_test import Score, paid_for, ranked
 
 
@@ -135,7 +135,7 @@ def scored(wide: LinearSystem, candidate: Candidate, begun: Fit) -> Score:
     refitted = gauss_newton(replace(begun, sigma=floors(begun.segments, begun.model, begun.values)))
     end = _reweighted(refitted.fit, refitted.fit)
     base = _reweighted(wide.fit, end.fit)
-    before, after = _standing(base), _standing(end)
+    before, after = _quality(base), _quality(end)
     effect = begun.model.effects[-1]
     prefix, first = f"{effect.name}.", effect.parameters_of(wide.fit.machine)[0]
     values = {name: value for name, value in end.fit.values.items() if name.startswith(prefix)}
@@ -160,9 +160,9 @@ def _reweighted(fit: Fit, other: Fit) -> LinearSystem:
     return gauss_newton(replace(fit, sigma=sigma, near=other.values))
 
 
-def _standing(system: LinearSystem) -> Standing:
+def _quality(system: LinearSystem) -> FitQuality:
     chi2 = system.reduced_chi2(system.residual)
-    return Standing(system.deviance, chi2, float(system.prior_costs().sum()))
+    return FitQuality(system.deviance, chi2, float(system.prior_costs().sum()))
 
 
 def _fit_from_form(fit: Fit, effect: Effect, form: LinearForm) -> Fit | None:

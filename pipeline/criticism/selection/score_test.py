@@ -20,7 +20,7 @@ from pipeline.criticism.policy.selection import Selection
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import Descent, NormalEquations
 from pipeline.criticism.selection.candidates import Candidate, placed, searched
-from pipeline.criticism.selection.improvement import Standing, clears, fall_below_floor, share_of
+from pipeline.criticism.selection.improvement import FitQuality, clears, fall_below_floor, share_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,13 +187,13 @@ class _Scoring:
     system: LinearSystem
     normal_equations: NormalEquations
     model_columns: NDArray[np.int64]
-    before: Standing
+    before: FitQuality
     significant: NDArray[np.bool_]
 
     @classmethod
     def of(cls, system: LinearSystem, significant: NDArray[np.bool_] | None) -> _Scoring:
         model_columns, normal_equations = system.model_columns, system.normal_equations()
-        before = Standing.of(system, model_columns, normal_equations.only(model_columns).best())
+        before = FitQuality.of(system, model_columns, normal_equations.only(model_columns).best())
         remaining = np.zeros(len(system.labels), dtype=bool) if significant is None else significant
         return cls(system, normal_equations, model_columns, before, remaining)
 
@@ -220,7 +220,7 @@ class _Scoring:
             for name, value in step.items()
             if parameters[name].negligible > 0
         ]
-        after = Standing.of(system, np.concatenate([self.model_columns, live]), end)
+        after = FitQuality.of(system, np.concatenate([self.model_columns, live]), end)
         names = self._names(self.model_columns)
         return Score(
             candidate,

@@ -184,8 +184,9 @@ def sensed_torque(
     its gain.
 
     """
-    finer = x.theta_rad.size // segment.size
-    torque = averaged(torque_nm, finer) if finer > 1 else torque_nm
+    finer, torque = x.theta_rad.size // segment.size, torque_nm
+    if finer > 1:
+        torque = torque_nm[::finer] if x.shaft.held else averaged(torque_nm, finer)
     if not segment.instrument.stator and not segment.sensors.held_speed:
         acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
         torque = torque - values["j_kgm2"] * acceleration

@@ -44,10 +44,29 @@ def drive_current(
         back = segment.once(theta, "back", pairs, lambda: np.exp(-1j * eps))
         recorded = replace(recorded, i_a=recorded.i_a - zero * back)
     current = true_current(recorded, segment.instrument.ammeter, model, values)
-    if current.size < size:
-        at = np.arange(size) * (current.size / size)
-        current = np.interp(at, np.arange(current.size), current)
-    return current
+    return on_points(current, size)
+
+
+def on_points(signal: Complex, size: int) -> Complex:
+    """A signal at one or more points a sample, on straight lines between samples.
+
+    Parameters
+    ----------
+    signal
+        At the samples [n, any unit].
+    size
+        Points wanted, a multiple of n.
+
+    Returns
+    -------
+    array [size]
+        The last sample is held.
+
+    """
+    if signal.size == size:
+        return signal
+    at = np.arange(size) * (signal.size / size)
+    return np.interp(at, np.arange(signal.size), signal)
 
 
 def table_current(

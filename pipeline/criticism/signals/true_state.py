@@ -137,6 +137,31 @@ def finer_of(segment: Segment, machine: Machine, finest: int) -> int:
     return min(max(int(np.ceil(turn / policy.part_rad)), policy.least_parts), finest)
 
 
+def points_of_mean(segment: Segment, machine: Machine) -> int:
+    """How many points a sample a logged voltage is the mean of.
+
+    Parameters
+    ----------
+    segment
+        A drive's log with an angle.
+    machine
+        Orders of its torque, and policy.
+
+    Returns
+    -------
+    int
+        1 of a log as fast as its PWM, of an instant, and where no order turns far in a sample; else
+        an even number.
+
+    """
+    motion, policy = motion_of(segment, segment.recorded, machine), machine.policy.cutting
+    held = hold_s(segment, motion.omega_rad_s, machine) == segment.ts_s
+    if held or segment.instrument.timing == "instant":
+        return 1
+    points = finer_of(segment, machine, policy.mean_points)
+    return points if points == 1 else 2 * ((points + 1) // 2)
+
+
 def operating(
     segment: Segment,
     signals: Signals,

@@ -70,6 +70,39 @@ def held_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Compl
     return drop + slope + 1j * omega_e_rad_s * psi
 
 
+def mean_voltage(
+    pieces: Pieces, eps_rad: Array, points: int, period_s: float, *, ahead: bool
+) -> Complex:
+    """Mean of the voltage in the rotor frame over a sample in which the rotor turns far.
+
+    Parameters
+    ----------
+    pieces
+        Flux linkage [n·m, Wb] and voltage drop [n·m, V].
+    eps_rad
+        Electrical angle [n·m].
+    points
+        Points m a sample, an even number.
+    period_s
+        Sample period T [s].
+    ahead
+        Whether it is the mean from each sample to the next, or over half a period either side.
+
+    Returns
+    -------
+    complex array [n], V
+        (1/T) ∫ (drop + dψ/dt + j ψ dε/dt) dt; of the first and the last sample a part.
+
+    """
+    psi, size = pieces.psi_wb, pieces.psi_wb.size
+    drop = 0.5 / points * (pieces.drop_v[1:] + pieces.drop_v[:-1])
+    turned = 0.5j / period_s * (psi[1:] + psi[:-1]) * np.diff(eps_rad)
+    total = np.concatenate([[0.0], np.cumsum(drop + turned)]) + psi / period_s
+    first = np.arange(0, size, points) - (0 if ahead else points // 2)
+    mean: Complex = total[np.minimum(first + points, size - 1)] - total[np.maximum(first, 0)]
+    return mean
+
+
 def recorded_voltage(
     voltage: Complex,
     segment: Segment,

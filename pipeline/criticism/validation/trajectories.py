@@ -138,7 +138,9 @@ def batch_of(segment: Segment, model: Model, values: Values) -> Batch | None:
     currents = equation_of(segment).use.currents
     load = "torque_shaft_nm" in segment.channels and not segment.instrument.stator
     shaft = load or not currents
-    short = replace(segment, recorded=cut, weak=None)
+    # integrated from sample to sample
+    instrument = replace(segment.instrument, points=1)
+    short = replace(segment, recorded=cut, weak=None, instrument=instrument)
     return Batch(short, model, values, starts.size, length, pad, shaft, allowed)
 
 

@@ -1,0 +1,184 @@
+"""Logs in which the rotor turns far from sample to sample: what a mean of the voltage contains."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.data.segment import projected, row_index
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, Pieces, zero
+from pipeline.criticism.regression.columns import effect_columns
+from pipeline.criticism.regression.linearise import linearise
+from pipeline.criticism.regression.noise_floors import Floor
+from pipeline.criticism.regression.noise_propagation import noise_floor
+from pipeline.criticism.residuals.residual import operate, residual
+from pipeline.criticism.signals.true_state import points_of_mean
+from pipeline.criticism.signals.voltage import mean_voltage, rotor_voltage
+from tests.unit.criticism.machines import BASE, log, machine
+
+LIBRARY = effects()
+PLAIN = Model(machine(), ())
+PAIRS, SIZE = 7, 400
+
+
+def slow_log(turn_rad: float, timing: str = "centred"):
+    """A log of a steady current at 1 kHz under 20 kHz PWM; the rotor turns so far in a sample."""
+    period = 1e-3
+    omega = turn_rad / (PAIRS * period)
+    current = -2.0 + 5.0j
+    psi = BASE["psi_wb"] + BASE["ld_h"] * current.real + 1j * BASE["lq_h"] * current.imag
+    volts = BASE["r_ohm"] * current + 1j * PAIRS * omega * psi
+    # vectors that the stationary frame holds for a period of the PWM, in the rotor's
+    volts *= np.sinc(turn_rad * 0.05 / (2.0 * np.pi))
+    held = np.ones(SIZE)
+    segment = replace(log(), ts_s=period, weak=None, channels=("vd_v", "vq_v"))
+    return replace(
+        segment,
+        instrument=replace(segment.instrument, timing=timing),
+        fixed={**segment.fixed, "pwm_s": 5e-5, "vdc_v": 24.0},
+        recorded={
+            "id_a": current.real * held,
+            "iq_a": current.imag * held,
+            "vd_v": volts.real * held,
+            "vq_v": volts.imag * held,
+            "theta_mech_rad": omega * period * np.arange(SIZE) + 0.3,
+            "temp_winding_degc": 25.0 * held,
+            "temp_magnet_degc": 25.0 * held,
+        },
+    )
+
+
+def averaging(segment):
+    points = points_of_mean(segment, PLAIN.machine)
+    return replace(segment, instrument=replace(segment.instrument, points=points))
+
+
+@pytest.mark.parametrize("points", [8, 16])
+def test_a_mean_over_a_sample_is_that_of_the_closed_form(points):
+    """ψ = ψ_m + a e^{j6ε}: v = jω ψ_m + 7jω a e^{j6ε}, whose mean over a turn φ is a sinc."""
+    turn, period, a = 0.8, 1e-3, 1e-4
+    at = np.arange(SIZE * points) / points
+    eps = turn * at
+    psi = BASE["psi_wb"] + a * np.exp(6j * eps)
+    nothing = np.zeros(eps.size)
+    pieces = Pieces(psi, nothing, np.full(eps.size, 0.4 + 0j), nothing)
+    samples = turn * np.arange(SIZE)
+    for ahead, middle in ((False, 0.0), (True, 0.5 * turn)):
+        share = np.sinc(3.0 * turn / np.pi)
+        exact = 7j * turn / period * a * share * np.exp(6j * (samples + middle))
+        exact = exact + 0.4 + 1j * turn / period * BASE["psi_wb"]
+        mean = mean_voltage(pieces, eps, points, period, ahead=ahead)
+        wave = 7.0 * turn / period * a * share
+        assert np.abs(mean - exact)[1:-1].max() < 0.02 * wave
+    instants = Pieces(psi[::points], nothing, pieces.drop_v[::points], nothing)
+    sampled = rotor_voltage(instants, np.full(SIZE, turn / period), period)
+    exact = exact * 0 + 7j * turn / period * a * share * np.exp(6j * samples)
+    exact = exact + 0.4 + 1j * turn / period * BASE["psi_wb"]
+    assert np.abs(sampled - exact)[1:-1].max() > 0.3 * wave
+
+
+def test_a_dead_time_is_in_a_mean_as_its_mean():
+    """The loss of each leg by the sign of its current, averaged at 2,000 instants a sample."""
+    loss, width, turn = 0.2, 0.05, 2.3
+    segment = averaging(slow_log(turn))
+    effect = LIBRARY["dead_time"]
+    model = PLAIN.with_effects(effect)
+    values = {**BASE, **zero(effect, model)}
+    values |= {"dead_time.loss_v": loss, "dead_time.width_a": width, "dead_time.ripple": 0.0}
+    recorded = dict(segment.recorded)
+    current = recorded["id_a"][0] + 1j * recorded["iq_a"][0]
+    part = turn * ((np.arange(2000) + 0.5) / 2000 - 0.5)
+    eps = PAIRS * recorded["theta_mech_rad"][:, None] + part[None, :]
+    lost = np.zeros(eps.shape, dtype=complex)
+    for k in range(3):
+        axis = np.exp(2j * np.pi * k / 3.0)
+        phase = (current * np.exp(1j * eps) * np.conj(axis)).real
+        lost += 2.0 / 3.0 * loss * np.tanh(phase / width) * axis
+    mean = (lost * np.exp(-1j * eps)).mean(axis=1)
+    recorded["vd_v"] = recorded["vd_v"] + mean.real
+    recorded["vq_v"] = recorded["vq_v"] + mean.imag
+    averaged, sampled = (
+        residual(replace(segment, recorded=recorded, instrument=one), model, values)[:2, 5:-5]
+        for one in (segment.instrument, replace(segment.instrument, points=1))
+    )
+    assert segment.instrument.points > 1
+    assert averaged.std() < 0.05 * loss
+    assert np.abs(averaged.mean(axis=1)).max() < 0.005 * loss
+    assert sampled.std() > 0.1 * loss, "an instant of the loss is not its mean"
+
+
+@pytest.mark.parametrize(
+    ("turn", "timing", "many"),
+    [
+        (2.3, "centred", True),
+        (2.3, "held", True),
+        (2.3, "instant", False),
+        (1e-3, "centred", False),
+    ],
+)
+def test_only_means_over_a_far_turn_need_more_points_than_samples(turn, timing, many):
+    assert (points_of_mean(slow_log(turn, timing), PLAIN.machine) > 1) == many
+
+
+def test_a_log_as_fast_as_its_pwm_holds_one_vector_a_sample():
+    segment = slow_log(2.3)
+    fast = replace(segment, fixed={**segment.fixed, "pwm_s": segment.ts_s})
+    assert points_of_mean(fast, PLAIN.machine) == 1
+
+
+@pytest.mark.parametrize("timing", ["centred", "held"])
+def test_a_sound_machine_leaves_nothing_in_a_slow_log(timing):
+    segment = averaging(slow_log(2.3, timing))
+    left = residual(segment, PLAIN, BASE)[:2, 5:-5]
+    assert np.abs(left).max() < 1e-6 * np.abs(segment.recorded["vq_v"]).max()
+    x = operate(segment, segment.recorded, PLAIN, BASE)
+    assert x.sampled().theta_rad == pytest.approx(segment.recorded["theta_mech_rad"])
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_a_column_of_a_slow_log_is_the_change_of_its_residual(name):
+    """With a torque channel and windows, at several points a sample."""
+    segment = log()
+    slow = replace(
+        segment,
+        instrument=replace(segment.instrument, timing="centred", points=4),
+        fixed={**segment.fixed, "pwm_s": 1e-5, "vdc_v": 24.0},
+    )
+    effect = LIBRARY[name]
+    sigma = np.ones_like(noise_floor(slow, PLAIN, BASE, 1))
+    columns = effect_columns(effect, PLAIN)
+    model = PLAIN.with_effects(effect)
+    start = {**BASE, **zero(effect, model)}
+    before = linearise(slow, PLAIN, BASE, columns, Floor(sigma, BASE))
+    for n, column in enumerate(columns):
+        moved = {**start, column.name: start[column.name] + column.step}
+        after = linearise(slow, model, moved, [], Floor(sigma, BASE))
+        expected = (after.residual - before.residual) / column.step
+        size = np.abs(expected).max()
+        assert before.columns[:, n] == pytest.approx(expected, abs=0.02 * size + 1e-12)
+
+
+def test_the_frame_of_a_coarse_encoder_is_in_the_noise_floor():
+    """A drive turns its currents and voltages by the angle that its encoder rounds: at 512 counts
+    a turn of a machine of seven pole pairs, by up to 2.5 degrees.
+    """
+    segment, step = log(), 2.0 * np.pi / 512.0
+    theta = segment.recorded["theta_mech_rad"]
+    coarse = np.round(theta / step) * step
+    back = np.exp(-1j * PAIRS * (coarse - theta))
+    recorded = {**segment.recorded, "theta_mech_rad": coarse}
+    for d, q in (("id_a", "iq_a"), ("vd_v", "vq_v")):
+        turned = (recorded[d] + 1j * recorded[q]) * back
+        recorded |= {d: turned.real, q: turned.imag}
+    silent = dict.fromkeys(segment.sensors.noise, 0.0)
+    sensors = replace(segment.sensors, angle_step_rad=step, noise=silent)
+    rounded = replace(segment, recorded=recorded, sensors=sensors)
+    group, _, valid, groups = row_index(rounded)
+    rows = projected(rounded, residual(rounded, PLAIN, BASE))[valid]
+    rows /= noise_floor(rounded, PLAIN, BASE, 1)
+    for axis in ("vd_v", "vq_v"):
+        left = rows[group[valid] == groups.index((axis, 0))]
+        assert 0.2 < np.mean(left**2) < 2.0
