@@ -69,6 +69,8 @@ class ShaftState:
         Angle turned from each reversal to the next [runs, rad], negative backwards.
     behind_nm
         Recorded torque over one that follows it with a play [n], where a transducer recorded it.
+    age_s
+        Time since the capture began [n], where friction may change with it.
 
     """
 
@@ -79,6 +81,7 @@ class ShaftState:
     run: NDArray[np.int64] | None = None
     runs_rad: Array | None = None
     behind_nm: Array | None = None
+    age_s: Array | None = None
 
 
 @dataclass(slots=True, kw_only=True)
@@ -282,10 +285,11 @@ class Operating(Samples):
         samples = {one.name: getattr(self, one.name)[rows] for one in fields(Samples)}
         run = None if self.shaft.run is None else self.shaft.run[rows]
         behind = None if self.shaft.behind_nm is None else self.shaft.behind_nm[rows]
+        age_s = None if self.shaft.age_s is None else self.shaft.age_s[rows]
         return replace(
             self,
             **samples,
-            shaft=replace(self.shaft, run=run, behind_nm=behind, finer=1),
+            shaft=replace(self.shaft, run=run, behind_nm=behind, age_s=age_s, finer=1),
             supply=replace(self.supply, volts_v=None),
             psi_wb=None,
             torque_em_nm=None,

@@ -12,11 +12,13 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from pipeline.criticism.data.segment import clock
 from pipeline.criticism.discovery.changed_constants import Change, changed_constant
 from pipeline.criticism.discovery.changed_within import ChangeWithin, changed_within
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.machine.model import EARLY_S, EARLY_SHARES
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
@@ -24,6 +26,7 @@ from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.changed_between import SHARES, free_tests
+from pipeline.criticism.selection.changed_over_time import changes
 from pipeline.criticism.selection.drift import drifting_segments
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.order_scan import orders_left
@@ -46,9 +49,16 @@ _ALONE = (
 _SHARE_OF = {
     "coast_dry_share": "dry friction",
     "coast_viscous_share": "viscous friction",
+    "early_dry_share": "dry friction",
+    "early_viscous_share": "viscous friction",
     "open_flux_share": "psi_wb",
 }
 """What a share that is left free is of."""
+_STILL_CHANGING = ", which none of these captures reaches"
+_REPEAT = (
+    "let it run warm, then record several coasts from different speeds in each sense, one after "
+    "the other"
+)
 _LOOKS_ALIKE = {
     "spin_down": "a part on the shaft or a clock that is off there",
     "open_circuit": "a clock that is off there, or a gain of voltages or torques,",
@@ -202,6 +212,7 @@ def _freed_share_notes(system: LinearSystem) -> Iterator[str]:
     """What the shares that a fit left free say, in a sentence, where they are large enough to
     matter.
     """
+    yield from _changing_friction_notes(system)
     fit = system.fit
     variance = system.covariance(system.model_columns).diagonal()
     for test in free_tests(fit):
@@ -219,6 +230,32 @@ def _freed_share_notes(system: LinearSystem) -> Iterator[str]:
             f"{' and '.join(sizes)} in {captures} than in the other captures: changed between "
             f"them; {_LOOKS_ALIKE[test]} would look the same"
         )
+
+
+def _changing_friction_notes(system: LinearSystem) -> Iterator[str]:
+    """How friction changes with time, in a sentence, where that is large enough to matter."""
+    fit = system.fit
+    if not changes(fit):
+        return
+    variance, tau_s = system.covariance(system.model_columns).diagonal(), abs(fit.values[EARLY_S])
+    begin = {s.capture: float(clock(s)[-1]) for s in fit.segments if EARLY_S in s.fixed}
+    over = 1.0 - math.exp(-max(begin.values()) / tau_s)
+    shares = {name: fit.values[name] for name in EARLY_SHARES}
+    if over * max(map(abs, shares.values())) < system.policy.discovery.changed_share:
+        return
+    sizes = (
+        f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± "
+        f"{100.0 * math.sqrt(variance[system.place([name])[0]]):.2g} % "
+        f"{'higher' if share > 0 else 'lower'}"
+        for name, share in shares.items()
+    )
+    yield (
+        f"{' and '.join(sizes)} at the start of {', '.join(sorted(begin))} than it comes to, with "
+        f"a time constant of {tau_s:.3g} s: it changes within these captures, with no state of the "
+        "machine; constants of friction are those that it comes to"
+        + (_STILL_CHANGING if tau_s > max(begin.values()) else "")
+        + f"; {_REPEAT}"
+    )
 
 
 def _changed_constant(system: LinearSystem) -> Change | ChangeWithin | None:

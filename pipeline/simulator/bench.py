@@ -94,7 +94,9 @@ def record(
     protocol
         Fields of the test's dataclass in `protocols`; `changed`: constants of the motor [units of
         `design.Motor`] that are others in this capture, such as a magnet that has lost flux;
-        `changed_from`: of a torque map or a drive the share of the capture [1] from which on.
+        `changed_from`: of a torque map or a drive the share of the capture [1] from which on;
+        `friction_over_time`: of a coast, a torque map or a drive pairs of time [s] and of the share
+        of its friction [1] that the motor then has, linear between them.
 
     Returns
     -------
@@ -115,11 +117,14 @@ def record(
     since = protocol.pop("changed_from", 0.0)
     if since > 0.0 and test not in ("torque_map", "drive"):
         raise ValueError(f"nothing changes within a {test}")
+    course = tuple(protocol.pop("friction_over_time", ()))
+    if course and test not in ("torque_map", "drive", "spin_down"):
+        raise ValueError(f"no friction changes within a {test}")
     motor = motor if since > 0.0 else other
     protocol_of, recorded = _TESTS[test]
     how = protocol_of(**protocol)
     plants = plant_of(motor), plant_of(other)
-    session = Session(motor, plants[0], bench, bench.drawn(rng), rng, plants[1], since)
+    session = Session(motor, plants[0], bench, bench.drawn(rng), rng, plants[1], since, course)
     recording = recorded(session, how)
     if bench.temperature_hz is None:
         return recording

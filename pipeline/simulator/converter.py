@@ -174,7 +174,9 @@ def run_on(
 
 
 @njit(cache=True)
-def drive(reference: Array, noise: Array, c: Control, p: Plant, later: Plant, change: int) -> Array:
+def drive(
+    reference: Array, friction: Array, noise: Array, c: Control, p: Plant, later: Plant, change: int
+) -> Array:
     """Field-oriented control over some periods.
 
     Parameters
@@ -182,6 +184,8 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant, later: Plant, ch
     reference
         d current [A], q current [A] or speed [rad/s], load torque [N·m], speed that the dynamometer
         holds [rad/s], a row a period [n, 4].
+    friction
+        Share of the stated friction in each period [n, 1].
     noise
         Of the three phase currents [A] and of the angle [rad], [n, 4].
     c
@@ -210,6 +214,7 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant, later: Plant, ch
     for k in range(reference.shape[0]):
         if k == change:
             p = later
+        p.friction = friction[k]
         want, copper = reference[k], work[1]
         newest = run_on(y, work, volt, want, warm, c.substeps_before, history, newest, c, p)
         true = stator_current(y, warm[1], p)

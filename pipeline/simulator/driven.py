@@ -265,7 +265,9 @@ def torque_map(session: Session, how: protocols.TorqueMap) -> Recording:
     dyno = {"dyno_nms": stiff, "dyno_nm": 0.25 * width * stiff}
     loop = control(session, 1.0 / pwm_hz, how.voltage_timing, omega, warm, **dyno)
     noise = loop_noise(session, i_d.size, 1.0 / pwm_hz)
-    rows = drive(reference, noise, loop, session.plant, *session.then(i_d.size))
+    friction = session.friction(np.arange(i_d.size) / pwm_hz)
+    then = session.then(i_d.size)
+    rows = drive(reference, friction, noise, loop, session.plant, *then)
     meta = _meta(session, "torque_map", how.voltage_timing, pwm_hz)
     return Recording("torque_map", meta, (log(session, rows, 1.0 / pwm_hz),))
 
@@ -326,6 +328,8 @@ def drive(session: Session, how: protocols.Drive) -> Recording:
         ki_speed=0.25 * width * kp,
     )
     noise = loop_noise(session, reference.shape[0], 1.0 / pwm_hz)
-    rows = converter.drive(reference, noise, loop, session.plant, *session.then(len(reference)))
+    friction = session.friction(np.arange(len(reference)) / pwm_hz)
+    then = session.then(len(reference))
+    rows = converter.drive(reference, friction, noise, loop, session.plant, *then)
     meta = _meta(session, "drive", how.voltage_timing, pwm_hz)
     return Recording("drive", meta, (log(session, rows, 1.0 / pwm_hz),))

@@ -31,8 +31,9 @@ def grip(omega: float, torque: float, flux_ratio: float, p: Plant) -> float:
 
     Notes
     -----
-    T_c + μ |T| + T_s/(1 + (ω/ω_s)²) + T_h (ψ/ψ_pm)^1.6: Coulomb, load-dependent, Stribeck and
-    magnetic hysteresis, the last by Steinmetz's exponent.
+    f (T_c + μ |T| + T_s/(1 + (ω/ω_s)²)) + T_h (ψ/ψ_pm)^1.6: Coulomb, load-dependent, Stribeck and
+    magnetic hysteresis, the last by Steinmetz's exponent. f is `friction`, by which bearings and
+    seals differ at this time from what the motor states.
 
     References
     ----------
@@ -43,6 +44,7 @@ def grip(omega: float, torque: float, flux_ratio: float, p: Plant) -> float:
     size = p.coulomb + p.load_friction * abs(torque)
     if p.stribeck != 0.0:
         size += p.stribeck / (1.0 + (omega / p.stribeck_w) ** 2)
+    size *= p.friction
     if p.hysteresis != 0.0:
         size += p.hysteresis * flux_ratio**1.6
     return float(size)
@@ -68,11 +70,11 @@ def fluid(omega: float, flux_ratio: float, p: Plant) -> float:
 
     Notes
     -----
-    B ω + T_w |ω/ω_rated|ⁿ sign ω + k ω (ψ/ψ_pm)²/(1 + (ω/ω_k)²): viscous, windage, and eddy
+    f B ω + T_w |ω/ω_rated|ⁿ sign ω + k ω (ψ/ψ_pm)²/(1 + (ω/ω_k)²): viscous, windage, and eddy
     currents that their own field keeps out at high speed.
 
     """
-    drag = p.b_visc * omega
+    drag = p.friction * p.b_visc * omega
     if p.windage != 0.0:
         u = abs(omega) / p.omega_rated
         drag += math.copysign(p.windage * u**p.windage_exponent, omega)

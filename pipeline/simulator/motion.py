@@ -136,7 +136,9 @@ def free_rates(mechanics: Mechanics, bristle: float, t_m: float, p: Plant) -> Pa
 
 
 @njit(cache=True)
-def coast(start: Pair, step_s: float, substeps: int, count: int, t_m: float, p: Plant) -> Array:
+def coast(
+    start: Pair, step_s: float, substeps: int, friction: Array, t_m: float, p: Plant
+) -> Array:
     """A rotor that coasts with open terminals.
 
     Parameters
@@ -148,8 +150,8 @@ def coast(start: Pair, step_s: float, substeps: int, count: int, t_m: float, p: 
         Time from one row to the next [s].
     substeps
         Integration steps a row.
-    count
-        Rows.
+    friction
+        Share of the stated friction in each row [count, 1].
     t_m
         Temperature of the magnets [degC].
     p
@@ -162,12 +164,13 @@ def coast(start: Pair, step_s: float, substeps: int, count: int, t_m: float, p: 
         four.
 
     """
-    rows = np.empty((count, 2))
+    rows = np.empty((friction.size, 2))
     h = step_s / substeps
     theta, omega = start
     far, far_omega = start
     bristle = math.copysign(p.bristle, omega)
-    for k in range(count):
+    for k in range(friction.size):
+        p.friction = friction[k]
         rows[k, 0], rows[k, 1] = theta, omega
         for _ in range(substeps):
             a1, b1 = free_rates((theta, omega, far, far_omega), bristle, t_m, p)

@@ -16,9 +16,9 @@ NUMBERS = """
     dead_knee_a given_v given_ramp_a psi_wb alpha_magnet h5 h7 h11 h13 p5 p7 p11 p13 ld_h
     lq_h nu_d nu_q nu_phase
     sat_form sat_exponent sat_psi_q sat_q sat_d x0_wb cross j_rotor j_load stiffness damping
-    half_gap b_visc coulomb stribeck stribeck_w windage windage_exponent omega_rated omega_eps
-    load_friction bristle eddy eddy_knee hysteresis unbalance unbalance_phase rth_wa rth_wm
-    rth_ma cth_w cth_m
+    half_gap b_visc friction coulomb stribeck stribeck_w windage windage_exponent omega_rated
+    omega_eps load_friction bristle eddy eddy_knee hysteresis unbalance unbalance_phase rth_wa
+    rth_wm rth_ma cth_w cth_m
 """
 LINES, EXTRAS, POINTS = 8, 6, 129
 LAYOUT = np.dtype(
@@ -197,6 +197,7 @@ def _friction(motor: Motor, on: dict[str, dict[str, float]]) -> dict[str, float]
         return on[name][key] if name in on else absent
 
     return {
+        "friction": 1.0,
         "coulomb": of("coulomb_friction"),
         "stribeck": of("stribeck"),
         "stribeck_w": of("stribeck", "omega_s_rad_s", 1.0),

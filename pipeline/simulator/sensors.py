@@ -118,7 +118,8 @@ def late(signal: Array, t_s: Array, delay_s: float) -> Array:
 class Session:
     """One motor on one station with its instruments as they really are, and its randomness.
 
-    `later`: the plant that it is from the share `since` of a capture on.
+    `later`: the plant that it is from the share `since` of a capture on. `course`: share of its
+    friction [1] at times [s] of the capture.
     """
 
     motor: Motor
@@ -128,6 +129,7 @@ class Session:
     rng: np.random.Generator
     later: Plant | None = None
     since: float = 0.0
+    course: tuple[tuple[float, float], ...] = ()
 
     def then(self, n: int) -> tuple[Plant, int]:
         """The plant that the motor is later in a capture of `n` periods, and the period of that.
@@ -139,6 +141,20 @@ class Session:
 
         """
         return (self.plant, 0) if self.later is None else (self.later, round(self.since * n))
+
+    def friction(self, t_s: Array) -> Array:
+        """Share of its stated friction that the motor has over a capture [n, 1].
+
+        Parameters
+        ----------
+        t_s
+            Time from the first sample [n, s].
+
+        """
+        if not self.course:
+            return np.ones(t_s.size)
+        at, share = np.array(self.course, dtype=np.float64).T
+        return np.interp(t_s, at, share)
 
     def fault(self, name: str, key: str = "size") -> float:
         """Parameter of a sensor effect, 0 where the effect is absent.

@@ -202,7 +202,8 @@ def spin_down(session: Session, how: protocols.SpinDown) -> Recording:
     steps = min(400, max(2, math.ceil(fastest / rate / 0.5)))
     start = session.rng.uniform(0.0, 2.0 * math.pi)
     degc = motor.ambient_degc if how.temp_magnet_degc is None else how.temp_magnet_degc
-    true = coast((start, how.direction * omega_0), 1.0 / rate, steps, count, degc, plant)
+    friction = session.friction(np.arange(count) / rate)
+    true = coast((start, how.direction * omega_0), 1.0 / rate, steps, friction, degc, plant)
     still = np.flatnonzero(how.direction * true[:, 1] < how.end * omega_0)
     n = int(still[0]) if still.size else count
     theta, omega = true[:n, 0], true[:n, 1]

@@ -205,7 +205,7 @@ def predicted(
     voltage = recorded_voltage(voltage, segment, x.sampled(), model, values, in_frame=True)
     rows = [voltage.real, voltage.imag]
     if TORQUE in segment.channels:
-        torque = net_torque(x, pieces) + torque_between(segment, x, pieces, values)
+        torque = net_torque(x, pieces, values) + torque_between(segment, x, pieces, values)
         rows.append(sensed_torque(segment, x, torque, model, values))
     return np.stack(rows)
 

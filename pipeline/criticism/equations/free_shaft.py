@@ -217,7 +217,7 @@ def predicted(
     that of other tests; −drags − J d²θ/dt² where a transducer drives the shaft.
 
     """
-    torque = net_torque(x, pieces)
+    torque = net_torque(x, pieces, values)
     if SPEED in segment.channels:
         torque += _further_drag(segment, x, torque, values)
         stretch = 1.0 + clock_gain(RECORDER, model, values)

@@ -90,7 +90,7 @@ def state(segment: Segment, signals: Signals, model: Model, values: Values) -> O
 
 def _holding(x: Operating, pieces: Pieces, values: Values) -> Array:
     """The q current [n, A] that balances the drags, which are those at the current of `x`."""
-    lacking = net_torque(x, pieces) / (1.5 * x.machine.pole_pairs * values["psi_wb"])
+    lacking = net_torque(x, pieces, values) / (1.5 * x.machine.pole_pairs * values["psi_wb"])
     current: Array = x.i_a.imag - lacking
     return current
 

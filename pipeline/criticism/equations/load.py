@@ -119,7 +119,7 @@ def predicted(
     IEEE Std 1812-2014, 4.4 (torque against current).
 
     """
-    torque = net_torque(x, pieces)
+    torque = net_torque(x, pieces, values)
     if SHARE in segment.fixed:
         share = values[SHARE] * values["psi_wb"]
         torque = torque + 1.5 * x.machine.pole_pairs * share * x.iq_a

@@ -122,7 +122,7 @@ def predicted(
 
     """
     stretch = 1.0 + clock_gain(RECORDER, model, values)
-    torque = net_torque(x, pieces) + torque_between(segment, x, pieces, values)
+    torque = net_torque(x, pieces, values) + torque_between(segment, x, pieces, values)
     return unexplained_acceleration(segment, x, torque, values, stretch)[None]
 
 

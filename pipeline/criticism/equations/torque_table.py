@@ -99,7 +99,7 @@ def predicted(_: Segment, x: Operating, pieces: Pieces, model: Model, values: Va
     IEEE Std 1812-2014 (tests of permanent magnet machines: torque of a blocked rotor).
 
     """
-    return as_sensed(net_torque(x, pieces), model, values)[None]
+    return as_sensed(net_torque(x, pieces, values), model, values)[None]
 
 
 def _parts(current: Array, policy: Tables) -> NDArray[np.int64] | None:

@@ -118,6 +118,15 @@ BASE: tuple[Constant, ...] = (
     _of_log("open_flux_share", "1", "magnet of open windings over that of others, less one"),
     _unlogged("unlogged_rest_k", words="the same of a winding in tests at rest"),
 )
+EARLY_SHARES = ("early_dry_share", "early_viscous_share")
+"""Shares of friction that a capture has more at its start than later, where they are left free."""
+EARLY_S = "early_s"
+"""Time constant by which they vanish."""
+_EARLY = (
+    *(_of_log(name, "1", "drag at the start of a capture over the later, less one",
+              prior="coast_dry_share") for name in EARLY_SHARES),
+    _of_log(EARLY_S, "s", "time constant of that", prior="coast_dry_share", curved=True),
+)  # fmt: skip
 UNLOGGED_AT_REST = "unlogged_rest_k"
 """That of the winding in tests at rest: they warm it little, and show nothing of one that turns."""
 _NOTHING = 1e-6
@@ -136,7 +145,7 @@ COAST_SHARES = ("coast_dry_share", "coast_viscous_share")
 """Nuisances of a coast beside other tests with drags: friction repeats to some percent."""
 OPEN_FLUX = "open_flux_share"
 """Nuisance of an open-circuit test beside other tests that turn: a magnet may have lost flux."""
-CURVED = (*(constant.name for constant in BASE if constant.curved), *WARMING.values())
+CURVED = (*(c.name for c in (*BASE, *_EARLY) if c.curved), *WARMING.values())
 """How the names of nuisances begin along which no residual is linear."""
 OF_SIGNALS = frozenset(c.name for c in BASE if c.hook in ("gain", "log"))
 """Constants of sensors and logs: a segment observes them as its sensors and `fixed` say."""
@@ -146,8 +155,9 @@ PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 
 
 def base_of(machine: Machine) -> tuple[Constant, ...]:
-    """The constants of the base model, gains of further instruments that the station has, and
-    temperatures that single captures do not record.
+    """The constants of the base model, gains of further instruments that the station has, friction
+    that changes with time where it is left free, and temperatures that single captures do not
+    record.
 
     Parameters
     ----------
@@ -155,14 +165,15 @@ def base_of(machine: Machine) -> tuple[Constant, ...]:
         Its `stated_u` names the gains, its `unlogged` the temperatures.
 
     """
-    known = {constant.name for constant in BASE}
+    early = tuple(constant for constant in _EARLY if constant.name in machine.stated_u)
+    known = {constant.name for constant in (*BASE, *early)}
     further = sorted(set(machine.stated_u) - known)
     gains = (_gain(name, words="gain of a further instrument") for name in further)
     warmth = (
         _unlogged(name, words=f"{column} of {path} over that of others, or its rise there")
         for name, (column, path) in machine.unlogged.items()
     )
-    return (*BASE, *gains, *warmth)
+    return (*BASE, *early, *gains, *warmth)
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,32 @@ class Discovery:
         4, "windows", "fewest windows before and after a change within a capture",
         why="what lasts for less is an event and no other value",
     )  # fmt: skip
+    friction_scales: tuple[float, ...] = chosen(
+        (0.05, 5.0), "1", "shortest and longest time constant of friction that is tried, of the "
+        "longest capture",
+        why="what is over in a few windows is an event, what is slower is straight in them",
+    )  # fmt: skip
+    friction_trials: int = chosen(
+        5, "1", "time constants of friction that are tried",
+        why="three apart: refining goes on from there",
+    )  # fmt: skip
+    friction_captures: int = derived(
+        2, "1", "fewest captures that tell friction over time from friction over speed",
+        source="in one coast every time has one speed",
+    )  # fmt: skip
+    friction_u: float = chosen(
+        10.0, "1", "standard uncertainty of the shares of a friction that changes with time, and "
+        "of its time constant over the longest capture",
+        why="any: no friction is ten times what it comes to",
+    )  # fmt: skip
+    friction_powers: tuple[float, ...] = chosen(
+        (1.5, 2.0, 3.0, 4.0), "1", "powers of speed in a friction of any form over speed",
+        why="windage and iron, of any exponent and knee",
+    )  # fmt: skip
+    friction_widths: tuple[float, ...] = chosen(
+        (0.02, 0.05, 0.12, 0.3), "1", "widths of exponentials in it, of the highest speed",
+        why="Stribeck's excess of any width, 2.4 apart",
+    )  # fmt: skip
     knot_exponent: float = chosen(
         1.6, "1", "exponent that crowds the knots of a curve near zero, where friction bends most",
         why="at 1 they are even, at 3 the upper half of the range has two",

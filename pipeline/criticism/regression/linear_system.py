@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.machine.model import COAST_SHARES, CURVED, Model
+from pipeline.criticism.machine.model import COAST_SHARES, CURVED, EARLY_S, EARLY_SHARES, Model
 from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.regression import NoiseFloors
@@ -504,7 +505,10 @@ def _is_valid(column: Column, made_at: Values, fit: Fit) -> bool:
     model, now, far = fit.model, fit.values, fit.policy.fit.stale_share
     if any(abs(now[n] - made_at[n]) > far * abs(made_at[n]) for n in _STEADY):
         return False
-    if column.name in COAST_SHARES or any(abs(now[n] - made_at[n]) > far for n in COAST_SHARES):
+    shares = [n for n in (*COAST_SHARES, *EARLY_SHARES) if n in now]
+    if column.name in shares or any(abs(now[n] - made_at.get(n, 0.0)) > far for n in shares):
+        return False
+    if EARLY_S in now and abs(now[EARLY_S] / made_at.get(EARLY_S, math.inf) - 1.0) > far:
         return False
     if column.name == "j_kgm2":
         return abs(now["j_kgm2"] / made_at["j_kgm2"] - 1.0) < far

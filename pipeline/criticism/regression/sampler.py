@@ -30,7 +30,7 @@ from pipeline.criticism.regression.columns import Column, ColumnKey
 from pipeline.criticism.residuals.channels import of_acceleration
 from pipeline.criticism.residuals.observability import constants_in, hooks_in, observes
 from pipeline.criticism.residuals.residual import measured, operate, predicted, residual
-from pipeline.criticism.signals.shaft import TORQUE_RIPPLES
+from pipeline.criticism.signals.shaft import TORQUE_RIPPLES, drag_course
 from pipeline.criticism.signals.voltage import RIPPLES
 
 _NOTHING = 1e-40
@@ -91,7 +91,8 @@ class Sampler:
         self.start = predicted(segment, self.x, pieces, model, values)
         self.base_residual = measured(segment, segment.recorded, model, values) - self.start
         # a hook's own column does without the small terms between samples
-        self.quiet = {**values, "j_kgm2": 0.0, **dict.fromkeys(RIPPLES + TORQUE_RIPPLES, 0.0)}
+        none = ("j_kgm2", "b_nm_s_rad", *RIPPLES, *TORQUE_RIPPLES)
+        self.quiet = {**values, **dict.fromkeys(none, 0.0)}
 
     def at(self, segment: Segment, model: Model, values: Values) -> bool:
         """Whether this is the sampler of a segment at a point."""
@@ -247,7 +248,9 @@ class Sampler:
             # a drag is in the torque alone: no voltage needs to be predicted for it
             drag = np.zeros_like(self.start)
             place = self.segment.channels.index(self.equation.torque_in)
-            drag[place] = change.drag_nm * (1.0 + self.values["gain_torque"]) / column.step
+            dry, _ = drag_course(self.x, self.values)
+            gain = 1.0 + self.values["gain_torque"]
+            drag[place] = dry * change.drag_nm * gain / column.step
             return drag if np.any(drag) else None
         model = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
         if self.equation.form == "affine":

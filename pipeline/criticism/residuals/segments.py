@@ -13,8 +13,16 @@ from pipeline.criticism.data.sensor_noise import is_rounded, rounding_step
 from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equation_of, equations
-from pipeline.criticism.machine.model import COAST_SHARES, LATE_SPEED, OPEN_FLUX, UNLOGGED_AT_REST
+from pipeline.criticism.machine.model import (
+    COAST_SHARES,
+    EARLY_S,
+    EARLY_SHARES,
+    LATE_SPEED,
+    OPEN_FLUX,
+    UNLOGGED_AT_REST,
+)
 from pipeline.criticism.parameter import UNLOGGED, Machine
+from pipeline.criticism.residuals.observability import hooks_in
 from pipeline.numerics.coast_setups import Limits, Setup, coast_setups
 from pipeline.records.capture import Campaign, Capture
 
@@ -60,7 +68,8 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
     undivided = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
     cut_segments = [replace(s, blocks=None) if s.kind in undivided else s for s in cut_segments]
     return tuple(
-        replace(s, fixed={**s.fixed, **_shares_of_repeats(s, cut_segments)}) for s in cut_segments
+        replace(s, fixed={**s.fixed, **_shares_of_repeats(s, cut_segments), **_early(s)})
+        for s in cut_segments
     )
 
 
@@ -111,6 +120,15 @@ def _shares_of_repeats(segment: Segment, others: Sequence[Segment]) -> dict[str,
         if other.test != segment.test
     )
     return dict.fromkeys(shares, 1.0) if shown else {}
+
+
+def _early(segment: Segment) -> dict[str, float]:
+    """Nuisances of a friction that changes with time, of what turns a shaft freely from its start
+    on; they are left free where that explains the captures (`selection.changed_over_time`).
+    """
+    free = segment.test in ("spin_down", "drive") and "t_s" in segment.recorded
+    of_shaft = free and "torque" in hooks_in(segment)
+    return dict.fromkeys((*EARLY_SHARES, EARLY_S), 1.0) if of_shaft else {}
 
 
 def _unlogged(segment: Segment, equation: Equation, machine: Machine) -> dict[str, float]:

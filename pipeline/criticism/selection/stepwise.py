@@ -24,6 +24,7 @@ from pipeline.criticism.selection.acceptance import (
 )
 from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.changed_between import with_free_shares
+from pipeline.criticism.selection.changed_over_time import with_changing_friction
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
@@ -80,8 +81,11 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
     -----
     Shares of friction or magnet left free, or another reading of a column, that explain as much as
     the best effect, within a `tie`, are taken instead; what full logs show of that effect counts
-    for it. An effect of the last step whose size may be zero, now that all others are in, goes with
-    every step that has it; the search goes on without it.
+    for it. Friction that changes with time is taken where it explains more by a `tie`: in one coast
+    it looks as friction that changes with speed, which is commoner.
+
+    An effect of the last step whose size may be zero, now that all others are in, goes with every
+    step that has it; the search goes on without it.
 
     """
     base = len(fit.model.effects)
@@ -128,9 +132,14 @@ def _steps_from(
         chosen = _chosen(wide, passing, fit.model.effects[base:], unsure)
         unnamed = filter(None, (with_free_shares(wide), other_reading(wide)))
         alternative = min(unnamed, key=lambda system: system.deviance, default=None)
-        if alternative is not None and (
-            chosen is None or alternative.deviance < _with_full_logs(chosen) + policy.tie
-        ):
+        changing = with_changing_friction(wide)
+        least = math.inf if chosen is None else _with_full_logs(chosen)
+        if alternative is not None and alternative.deviance >= least + policy.tie:
+            alternative = None
+        if changing is not None and changing.deviance < least - policy.tie:
+            better = alternative is None or changing.deviance < alternative.deviance - policy.tie
+            alternative = changing if better else alternative
+        if alternative is not None:
             fit = alternative.fit
             del steps[-1]
             continue

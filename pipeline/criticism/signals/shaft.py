@@ -8,7 +8,14 @@ import numpy as np
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.coenergy import air_gap_torque
-from pipeline.criticism.machine.model import LATE_TORQUE, Model, Pieces, values_of
+from pipeline.criticism.machine.model import (
+    EARLY_S,
+    EARLY_SHARES,
+    LATE_TORQUE,
+    Model,
+    Pieces,
+    values_of,
+)
 from pipeline.criticism.machine.sample_period import ripple
 from pipeline.criticism.operating import Array, Complex, Operating, Recorded, Signals, Values
 from pipeline.criticism.signals.true_current import ahead_in
@@ -18,7 +25,34 @@ TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
 """Nuisances of the current's ripple that are in the torque (`model.BASE`)."""
 
 
-def net_torque(x: Operating, pieces: Pieces) -> Array:
+def drag_course(x: Operating, values: Values) -> tuple[Array | float, Array | float]:
+    """Dry and viscous drags over those that a capture ends with.
+
+    Parameters
+    ----------
+    x
+        True state [n].
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    tuple
+        Each [n, 1], or 1 where friction does not change.
+
+    Notes
+    -----
+    1 + s exp(−t/τ) at a time t since the capture began.
+
+    """
+    if x.shaft.age_s is None:
+        return 1.0, 1.0
+    left = np.exp(-x.shaft.age_s / max(abs(values[EARLY_S]), x.ts_s))
+    dry, viscous = (1.0 + values[name] * left for name in EARLY_SHARES)
+    return dry, viscous
+
+
+def net_torque(x: Operating, pieces: Pieces, values: Values) -> Array:
     """Torque of the air gap less the drags.
 
     Parameters
@@ -27,6 +61,8 @@ def net_torque(x: Operating, pieces: Pieces) -> Array:
         True state [n].
     pieces
         Flux and drags of the model there.
+    values
+        Parameters by full name.
 
     Returns
     -------
@@ -34,7 +70,12 @@ def net_torque(x: Operating, pieces: Pieces) -> Array:
         1.5 p [Im(ψ* i) + ∂W/∂ε] − drags [N·m].
 
     """
-    return air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - pieces.drag_nm
+    drag_nm = pieces.drag_nm
+    if x.shaft.age_s is not None:
+        dry, viscous = drag_course(x, values)
+        of_speed = values["b_nm_s_rad"] * x.omega_rad_s
+        drag_nm = dry * drag_nm + (viscous - dry) * of_speed
+    return air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - drag_nm
 
 
 def torque_reading(segment: Segment, model: Model, values: Values) -> Array:

@@ -8,9 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import Segment, slow_orders
+from pipeline.criticism.data.segment import Segment, clock, slow_orders
 from pipeline.criticism.data.traces import smoothed
-from pipeline.criticism.machine.model import LATE_SPEED, UNLOGGED_AT_REST, Model, clock_gain
+from pipeline.criticism.machine.model import (
+    EARLY_S,
+    LATE_SPEED,
+    UNLOGGED_AT_REST,
+    Model,
+    clock_gain,
+)
 from pipeline.criticism.operating import (
     Array,
     Complex,
@@ -222,6 +228,7 @@ def operating(
             run=_run(signals, theta.size),
             runs_rad=segment.sensors.runs_rad,
             behind_nm=_torque_behind(signals, theta.size),
+            age_s=_age(segment, theta.size, model.machine),
         ),
     )
 
@@ -348,6 +355,13 @@ def _run(signals: Signals, size: int) -> NDArray[np.int64]:
     if run is None:
         return np.zeros(size, dtype=np.int64)
     return np.repeat(run.astype(np.int64), size // run.size)
+
+
+def _age(segment: Segment, size: int, machine: Machine) -> Array | None:
+    """Time since the capture began [n m, s], where friction may change with it."""
+    if EARLY_S not in machine.stated_u or EARLY_S not in segment.fixed:
+        return None
+    return np.repeat(clock(segment), size // segment.size)
 
 
 def _torque_behind(signals: Signals, size: int) -> Array | None:

@@ -16,7 +16,8 @@ from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.electrical.ripple_torque import RIPPLE, winding_of
 from pipeline.estimation.mechanical.drag import drag_of
 from pipeline.estimation.mechanical.drag_fit import DragFit, drag_description
-from pipeline.estimation.mechanical.drag_forms import DRAG_FORMS
+from pipeline.estimation.mechanical.drag_forms import DRAG_FORMS, DRAG_NAMES
+from pipeline.estimation.mechanical.drag_over_time import DragOverTime, drag_over_time
 from pipeline.estimation.mechanical.drive_windows import (
     coasts_decide,
     too_short,
@@ -24,6 +25,7 @@ from pipeline.estimation.mechanical.drive_windows import (
 )
 from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.setups import another_setup, setups_of
+from pipeline.estimation.mechanical.shaft_doubts import DRAGS, Doubts
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, SAMPLED, ShaftRows, shaft_rows
 from pipeline.estimation.mechanical.torque_constant import UNKNOWN, USES, torque_constant
@@ -38,7 +40,6 @@ from pipeline.estimation.uncertainty.instruments import (
     torque_source,
     unstated_note,
 )
-from pipeline.estimation.uncertainty.regimes import Disagreement
 from pipeline.numerics.coast_setups import Setup, setup_words
 from pipeline.numerics.identifiability import within
 from pipeline.numerics.least_squares import linear_fit
@@ -46,10 +47,10 @@ from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import BETWEEN, Budget, Contribution, propagate
+from pipeline.records.uncertainty import Budget, Contribution, propagate
 
 METHOD = Method("inertia")
-GIVES = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")
+GIVES = DRAGS
 EXPERIMENT = (
     "record a drive with iq_a and theta_mech_rad that accelerates and brakes hard in both senses "
     "(torque_shaft_nm if a load is coupled), and a spin_down from full speed"
@@ -206,7 +207,8 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
     strange = _share_of_no_torque(rows, drag)
     if strange > policy().drag.loaded_share and not _load_logged(rows):
         return METHOD.nothing(GIVES, f"{_of_no_torque(strange)}; {LOAD}")
-    doubts = Doubts(strange, drag_disagreements(rows, drag, options["level"]))
+    regimes = drag_disagreements(rows, drag, options["level"])
+    doubts = Doubts(strange, regimes, _over_time(rows, driving, drag, options["level"]))
     sampled = () if coasts_decide(rows) else sampling_drag(rows.captures, torque.kt_nm_a, known)
     estimates = _estimates(rows, torque, drag, doubts, _left_out(rows, campaign), sampled)
     if strange > policy().drag.unexplained_share and not _load_logged(rows):
@@ -218,48 +220,13 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
     return Fit(_of_a_known_sign(estimates), _evidence(rows, y, drag))
 
 
-@dataclass(frozen=True, slots=True)
-class Doubts:
-    """What contradicts the law: the acceleration's `share` that the torque does not explain,
-    and where regimes differ in J, T_c/J, B/J.
-    """
-
-    share: float
-    regimes: tuple[Disagreement | None, Disagreement | None, Disagreement | None]
-
-    def parts(self, index: int, value: float, logged: bool) -> list[Contribution]:
-        """Contributions to J, T_c or B; T_c and B are scaled by J, and so by its doubts."""
-        if logged:
-            parts = [Contribution(f"{BETWEEN}{METHOD.name}:unexplained", self.share * value, "B")]
-        else:
-            half = 0.5 * self.share * value / self.middle(logged)
-            parts = [Contribution("assumed:free_shaft", half, "B")]
-        for k in {0, index}:
-            regime = self.regimes[k]
-            if regime is not None:
-                parts.append(regime.part(f"{METHOD.name}:{GIVES[k]}", value))
-        return parts
-
-    def middle(self, logged: bool) -> float:
-        """Middle of where the inertia may lie, over the one by which acceleration follows torque.
-
-        With a load that nothing logged, J is that one where the current does not answer the load,
-        and less by the unexplained share, as current follows acceleration, where a speed loop has
-        the current hold against all of it. Between both it may be any. Reference: Frisch,
-        Statistical Confluence Analysis, 1934 (the two regressions are bounds).
-        """
-        return 1.0 if logged else 1.0 - 0.5 * self.share
-
-    def words(self, logged: bool) -> list[str]:
-        """What the regimes and the share say, where they say something."""
-        names = ("the inertia", "Coulomb friction over inertia", "viscous friction over inertia")
-        words = [d.words(n) for d, n in zip(self.regimes, names, strict=True) if d is not None]
-        if self.share > policy().drag.unexplained_share:
-            words.append(
-                f"{100.0 * self.share:.2g} % of the square of the drives' acceleration follows "
-                f"neither current nor load{'' if logged else ', which nothing logged'}"
-            )
-        return words
+def _over_time(
+    rows: ShaftRows, driving_nm: Array, drag: DragFit, level: float
+) -> DragOverTime | None:
+    """The change of the drag with time, where drives and coasts show one."""
+    beside = [k for k, n in enumerate(drag.names) if n != "torque" and n not in DRAG_NAMES]
+    law = acceleration(rows, driving_nm)
+    return drag_over_time(rows, law, drag.design[:, beside], (drag.design,), level)
 
 
 def _of_a_known_sign(estimates: tuple[Estimate, ...]) -> tuple[Estimate, ...]:
@@ -386,12 +353,12 @@ def _estimates(
     at = {"omega_mech_rad_s": rows.fastest_rad_s, "temp_magnet_degc": 25.0}
     estimates = []
     for i, name in enumerate(GIVES):
-        if drag.reasons[i]:
-            estimates.append(METHOD.missing(name, drag.reasons[i]))
+        if reason := doubts.reason(i) or drag.reasons[i]:
+            estimates.append(METHOD.missing(name, reason))
             continue
         parts = [METHOD.scatter(f"{k}", float(u), drag.dof) for k, u in enumerate(scatter[i])]
         parts.append(Contribution("assumed:drag_form", float(drag.u_form[i]), "B"))
-        parts += doubts.parts(i, float(constants[i]), logged)
+        parts += doubts.parts(i, float(constants[i]), float(constants[0]), logged)
         parts += sampled if name == "b_visc_nm_s_rad" else ()
         parts += _of_a_speed(rows, float(constants[i]))
         parts += _of_a_d_current(rows, float(per_kt[i]) * torque.kt_nm_a)

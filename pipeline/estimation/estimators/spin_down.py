@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from pipeline.estimation.mechanical.coasts_over_time import by_time
 from pipeline.estimation.mechanical.drag_forms import DRAG_FORMS, STRIBECK
 from pipeline.estimation.mechanical.setups import setups_of
 from pipeline.estimation.method import Method
@@ -186,9 +187,15 @@ def _fit(captures: Sequence[Capture], options: Mapping[str, float]) -> Fit:
             GIVES, f"no coast-down of {LEAST_SAMPLES} samples or more; {EXPERIMENT}"
         )
     motion, solution = _solved(coasts, options["level"])
+    by_speed = _of_speed(coasts, motion, solution, options["level"])
+    return by_time(METHOD, by_speed, captures, motion.extras, options["level"])
+
+
+def _of_speed(coasts: Sequence[Coast], motion: Motion, solution: NonlinearFit, level: float) -> Fit:
+    """T_c/J and B/J by a drag that goes by speed, and perhaps by sense."""
     senses = [[c for c in coasts if c.sense == sense] for sense in (1, -1)]
     if all(senses) and _residual(solution) > policy().coast_down.unexplained:
-        each = [(of_sense, *_solved(of_sense, options["level"])) for of_sense in senses]
+        each = [(of_sense, *_solved(of_sense, level)) for of_sense in senses]
         if all(_residual(one[2]) <= policy().coast_down.unexplained for one in each):
             return _of_both_senses(each)
     if not np.isfinite([solution.u(0), solution.u(1)]).all():

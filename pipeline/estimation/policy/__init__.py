@@ -26,6 +26,7 @@ from pipeline.estimation.policy.mechanical import (
     CoastDown,
     Cogging,
     Drag,
+    DragOverTime,
     Ripple,
     RippleTorque,
     ShaftRows,
@@ -61,6 +62,7 @@ class Policy:
     shaft_rows: ShaftRows = section(ShaftRows)
     drag: Drag = section(Drag)
     coast_down: CoastDown = section(CoastDown)
+    drag_over_time: DragOverTime = section(DragOverTime)
     torque_map: TorqueMap = section(TorqueMap)
     torque_slope: TorqueSlope = section(TorqueSlope)
     ripple: Ripple = section(Ripple)

@@ -111,6 +111,24 @@ class Drag:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DragOverTime:
+    """How a drag that changes with time within captures is looked for."""
+
+    scales: tuple[float, ...] = chosen(
+        (0.03, 10.0), "1", "shortest and longest time constant, of the longest capture",
+        why="what is over in one window of a coast is an event; what is slower is straight in it",
+    )  # fmt: skip
+    captures: int = derived(
+        2, "1", "fewest captures that tell drag over time from drag over speed",
+        source="in one coast every time has one speed",
+    )  # fmt: skip
+    trials: int = chosen(
+        12, "1", "time constants, and times of a step, that are tried",
+        why="neighbours are 1.7 apart, and refining goes on from there",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CoastDown:
     """How a coast-down is fitted."""
 

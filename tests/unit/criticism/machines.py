@@ -128,6 +128,16 @@ def log(n: int = 8000, seed: int = 5, noise: float = 0.0) -> Segment:
     )
 
 
+def in_frame_of(theta_rad: np.ndarray, recorded: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns of a log of seven pole pairs whose encoder showed another angle than recorded."""
+    back = np.exp(-7j * (theta_rad - recorded["theta_mech_rad"]))
+    turned = {"theta_mech_rad": theta_rad}
+    for d, q in (("id_a", "iq_a"), ("vd_v", "vq_v")):
+        vector = (recorded[d] + 1j * recorded[q]) * back
+        turned |= {d: vector.real, q: vector.imag}
+    return {**recorded, **turned}
+
+
 def unit_floor(segment: Segment) -> np.ndarray:
     """A noise floor of one for each of a segment's weak samples."""
     return np.ones(int(row_index(segment)[2].sum()))

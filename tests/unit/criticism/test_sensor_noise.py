@@ -25,7 +25,7 @@ from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.regression.noise_propagation import _readings_error, noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import _by_encoder
-from tests.unit.criticism.machines import BASE, coasting, log, machine
+from tests.unit.criticism.machines import BASE, coasting, in_frame_of, log, machine
 
 SENSORS = DEFAULT.sensor_noise
 
@@ -211,15 +211,16 @@ def test_an_angle_that_hides_its_pace_is_as_loud_as_what_it_may_hide():
     mine = group[valid] == groups.index(("torque_shaft_nm", 0))
     model, rows = Model(machine(), ()), np.arange(even.size)
 
-    def weak(theta):
-        recorded = {**even.recorded, "theta_mech_rad": theta}
+    def weak(recorded):
         return projected(even, residual(even, model, BASE, recorded))[valid][mine]
 
     power, random = np.zeros(mine.sum()), np.random.default_rng(8)
     for _ in range(60):
         pace = 1.0 + random.uniform(-1.0, 1.0) / even.weak.length
         exact = pace * rows + random.uniform(0.0, 1.0)
-        power += (weak(step * np.round(exact)) - weak(step * exact)) ** 2 / 60.0
+        turned = {**even.recorded, "theta_mech_rad": step * exact}
+        rounded = in_frame_of(step * np.round(exact), turned)
+        power += (weak(rounded) - weak(turned)) ** 2 / 60.0
     quiet = dict.fromkeys(even.sensors.noise, 0.0)
     locked = {**even.recorded, "theta_mech_rad": step * rows}
     segment = replace(even, recorded=locked, sensors=Sensors(quiet, angle_step_rad=step))

@@ -17,7 +17,7 @@ from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.signals.true_state import points_of_mean
 from pipeline.criticism.signals.voltage import mean_voltage, rotor_voltage
-from tests.unit.criticism.machines import BASE, log, machine
+from tests.unit.criticism.machines import BASE, in_frame_of, log, machine
 
 LIBRARY = effects()
 PLAIN = Model(machine(), ())
@@ -168,11 +168,7 @@ def test_the_frame_of_a_coarse_encoder_is_in_the_noise_floor():
     segment, step = log(), 2.0 * np.pi / 512.0
     theta = segment.recorded["theta_mech_rad"]
     coarse = np.round(theta / step) * step
-    back = np.exp(-1j * PAIRS * (coarse - theta))
-    recorded = {**segment.recorded, "theta_mech_rad": coarse}
-    for d, q in (("id_a", "iq_a"), ("vd_v", "vq_v")):
-        turned = (recorded[d] + 1j * recorded[q]) * back
-        recorded |= {d: turned.real, q: turned.imag}
+    recorded = in_frame_of(coarse, segment.recorded)
     silent = dict.fromkeys(segment.sensors.noise, 0.0)
     sensors = replace(segment.sensors, angle_step_rad=step, noise=silent)
     rounded = replace(segment, recorded=recorded, sensors=sensors)

@@ -1,0 +1,154 @@
+"""Friction that changes with time within captures: cold grease, a seal that runs in.
+
+No state of the machine predicts it. The shares by which friction is more at the start of a capture
+than later, and the time constant by which that vanishes, are common to coasts and drives. They are
+left free where that explains the captures better than any effect. In one coast, speed and time are
+one to one: a drag of another form over speed explains it as well, and then that is named.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.segment import clock
+from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+from pipeline.criticism.machine.model import EARLY_S, EARLY_SHARES
+from pipeline.criticism.policy.discovery import Discovery
+from pipeline.criticism.regression.columns import effect_columns
+from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.goodness import over_floor
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
+from pipeline.criticism.residuals.channels import channel_of
+
+
+def with_changing_friction(system: LinearSystem) -> LinearSystem | None:
+    """The fit with a friction that changes with the time since a capture began.
+
+    Parameters
+    ----------
+    system
+        Around a fit.
+
+    Returns
+    -------
+    LinearSystem or None
+        None where nothing is left in a signal of a shaft that may change so, where friction is
+        free already, and where the deviance falls by no more than the penalty of the parameters
+        and a `tie`, or a friction of any form over speed explains the captures as well.
+
+    """
+    fit = system.fit
+    spans = {s.capture: float(clock(s)[-1]) for s in fit.segments if EARLY_S in s.fixed}
+    policy = system.policy
+    if len(spans) < policy.discovery.friction_captures or changes(fit) or not _misses(system):
+        return None
+    span = max(spans.values())
+    shortest, longest = policy.discovery.friction_scales
+    scales = span * np.geomspace(shortest, longest, policy.discovery.friction_trials)
+    begun = min(_begun(system, span, scales), key=lambda start: start[0], default=None)
+    penalty = 3.0 * math.log(system.size) + 2.0 * math.log(scales.size)
+    least = system.deviance - penalty - policy.selection.tie
+    if begun is None or begun[0] > least:
+        return None
+    tried = gauss_newton(begun[1])
+    least = min(least, _by_speed(system) - penalty - policy.selection.tie)
+    return tried if tried.deviance < least else None
+
+
+def _by_speed(system: LinearSystem) -> float:
+    """Least deviance, its penalty paid, of drags that are curves of speed, alike in both senses or
+    not.
+    """
+    discovery = system.policy.discovery
+    curves = [_curve(discovery, even=even) for even in (False, True)]
+    columns = [effect_columns(curve, system.fit.model) for curve in curves]
+    wide = linear_system(system.fit, [c for of_curve in columns for c in of_curve], system)
+    first, costs = wide.model_columns.size, []
+    for count in np.cumsum([len(of_curve) for of_curve in columns]).tolist():
+        places = np.arange(first + count)
+        end = wide.normal_equations(places).best(*system.policy.selection.thorough)
+        costs.append(end.deviance + count * math.log(system.size))
+    return min(costs)
+
+
+def _curve(policy: Discovery, *, even: bool) -> Effect:
+    """A drag of any form over speed: opposed to it, or that part which either sense has alike."""
+    powers, widths = policy.friction_powers, policy.friction_widths
+    count = 3 if even else len(powers) + len(widths)
+
+    def torque(x: Operating, q: Values) -> Array:
+        share = np.abs(x.omega_rad_s) / x.machine.scales["speed_rad_s"]
+        if even:
+            parts = [share**n for n in range(count)]
+        else:
+            sense = np.sign(x.omega_rad_s)
+            parts = [sense * share**power for power in powers]
+            parts += [sense * np.exp(-share / width) for width in widths]
+        total = np.zeros(share.shape)
+        for part, weight in zip(parts, q.values(), strict=True):
+            if weight:
+                total = total + weight * part
+        return total
+
+    names = (f"c{n}" for n in range(count))
+    bounds = (-math.inf, math.inf)
+    parameters = tuple(Parameter(n, "N·m", 0.01, 0.0, "torque_nm", *bounds) for n in names)
+    words = "a drag that either sense has alike" if even else "a drag as a curve of speed"
+    return Effect(
+        name="speed_curve_even" if even else "speed_curve",
+        words=words,
+        signature="",
+        tests=(),
+        experiment="",
+        reference="",
+        parameters=parameters,
+        torque=torque,
+    )
+
+
+def changes(fit: Fit) -> bool:
+    """Whether a fit leaves the friction free to change with time.
+
+    Parameters
+    ----------
+    fit
+        A fit.
+
+    """
+    return EARLY_S in fit.model.machine.stated_u
+
+
+def _misses(system: LinearSystem) -> bool:
+    """Whether a signal of the shaft is over its floor where friction may change, however little:
+    friction is a small part of a machine's torque.
+    """
+    free = {
+        (s.capture, channel)
+        for s in system.segments
+        for channel in s.channels
+        if EARLY_S in s.fixed and channel_of(s, channel).scale == "torque_nm"
+    }
+    return any((excess.capture, excess.signal) in free for excess in over_floor(system))
+
+
+def _begun(system: LinearSystem, span: float, scales: Array) -> Iterator[tuple[float, Fit]]:
+    """Deviance to first order with each time constant, and the fit from which it is refined."""
+    fit = system.fit
+    u = fit.policy.discovery.friction_u
+    free = {**dict.fromkeys(EARLY_SHARES, u), EARLY_S: u * span}
+    machine = replace(fit.machine, stated_u={**fit.machine.stated_u, **free})
+    for scale in scales.tolist():
+        absent = {**dict.fromkeys(EARLY_SHARES, 0.0), EARLY_S: scale}
+        start = replace(
+            fit, model=replace(fit.model, machine=machine), near={**fit.near, **absent}
+        ).at(absent)
+        around = linear_system(start, before=system)
+        columns = around.model_columns
+        end = around.normal_equations(columns).best(*fit.policy.selection.thorough)
+        moved = start.moved([around.columns[n] for n in columns], end.step)
+        yield end.deviance, moved.at({EARLY_S: scale})
