@@ -28,6 +28,7 @@ from pipeline.criticism.selection.changed_over_time import with_changing_frictio
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
+from pipeline.criticism.selection.improvement import clears
 from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.log_start import with_log_start
 from pipeline.criticism.selection.other_readings import other_reading
@@ -85,17 +86,17 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
     it looks as friction that changes with speed, which is commoner.
 
     An effect of the last step whose size may be zero, now that all others are in, goes with every
-    step that has it; the search goes on without it.
+    step that has it, unless it takes most of an error; the search goes on without it.
 
     """
     base = len(fit.model.effects)
     steps = _steps_from(fit, base, library)
     unsure: frozenset[str] = frozenset()
-    while (name := _unsure(steps[-1].system, base)) is not None:
+    while (found := _unsure(steps[-1].system, base)) is not None:
+        name, without = found
         unsure |= {name}
         kept = [step for step in steps if name not in step.added]
-        last = steps[-1].system
-        fit = _refloored(gauss_newton(last.fit.without(name), before=last), base)
+        fit = _refloored(without, base)
         if tuple(e.name for e in fit.model.effects[base:]) == kept[-1].added:
             fit = kept.pop().fit
         steps = _steps_from(fit, base, library, kept, unsure)
@@ -328,10 +329,12 @@ def begin_from(fit: Fit, score: Score) -> Fit:
     return replace(fit, model=model).at(start)
 
 
-def _unsure(wide: LinearSystem, base: int) -> str | None:
-    """The name of an effect that was added to the first `base` and whose size may be zero, fitted
-    with all others; of several the one that explains least. One may be unsure as long as another
-    stands for it as well, so they go one at a time.
+def _unsure(wide: LinearSystem, base: int) -> tuple[str, LinearSystem] | None:
+    """An effect that was added to the first `base` and whose size may be zero, fitted with all
+    others, and the fit without it; of several the one that explains least.
+
+    One may be unsure as long as another stands for it as well, so they go one at a time. One that
+    takes most of an error is there, however badly its size is known.
     """
     added = wide.fit.model.effects[base:]
     if not added:
@@ -339,7 +342,12 @@ def _unsure(wide: LinearSystem, base: int) -> str | None:
     system = wide.only(np.arange(wide.model_column_count))
     held_out = leave_out(system)
     unsure = [e.name for e in added if not sure_amplitudes(system, held_out, e)]
-    return min(unsure, key=lambda name: loss_without(system, (name,)), default=None)
+    for name in sorted(unsure, key=lambda name: loss_without(system, (name,))):
+        without = gauss_newton(system.fit.without(name), before=system)
+        chi2 = [fitted.reduced_chi2(fitted.residual) for fitted in (without, system)]
+        if not clears(system, significant_groups(without), *chi2):
+            return name, without
+    return None
 
 
 def _backward(system: LinearSystem, base: int) -> LinearSystem:

@@ -87,7 +87,7 @@ def test_energy_in_is_heat_plus_field_plus_motion(effects):
     want = np.zeros((n, 4))
     want[:, 0] = -3.0
     want[:, 1] = np.where(np.arange(n) // 300 % 2 == 0, 3.0, -2.0)
-    rows = converter.drive(want, np.zeros((n, 4)), loop(motor), plant, plant, 0)
+    rows = converter.drive(want, np.ones(n), np.zeros((n, 4)), loop(motor), plant, plant, 0)
     theta, omega = rows[:, AT["theta"]], rows[:, AT["omega"]]
     eps = motor.pole_pairs * theta
     psi = (rows[:, AT["psi_alpha"]] + 1j * rows[:, AT["psi_beta"]]) * np.exp(-1j * eps)
@@ -111,7 +111,7 @@ def test_steady_state_is_the_voltage_equation():
     want = np.tile([-2.0, 5.0, 0.0, omega], (n, 1))
     c = loop(motor, held_speed=True, omega=omega)
     plant = plant_of(motor)
-    rows = converter.drive(want, np.zeros((n, 4)), c, plant, plant, 0)[-1]
+    rows = converter.drive(want, np.ones(n), np.zeros((n, 4)), c, plant, plant, 0)[-1]
     turn = np.exp(-1j * motor.pole_pairs * rows[AT["theta"]])
     v = complex(rows[AT["v_alpha"]], rows[AT["v_beta"]]) * turn
     i = complex(rows[AT["i_alpha_true"]], rows[AT["i_beta_true"]]) * turn
@@ -139,7 +139,7 @@ def test_logged_voltage_makes_the_flux_change_that_its_timing_says(before, right
     want = np.tile([0.0, 4.0, 0.0, 150.0], (400, 1))
     c = loop(motor, held_speed=True, omega=150.0, substeps_before=before)
     plant = plant_of(motor)
-    rows = converter.drive(want, np.zeros((400, 4)), c, plant, plant, 0)
+    rows = converter.drive(want, np.ones(400), np.zeros((400, 4)), c, plant, plant, 0)
     psi = rows[:, AT["psi_alpha"]] + 1j * rows[:, AT["psi_beta"]]
     v = rows[:, AT["v_alpha"]] + 1j * rows[:, AT["v_beta"]]
     i = rows[:, AT["i_alpha_true"]] + 1j * rows[:, AT["i_beta_true"]]
