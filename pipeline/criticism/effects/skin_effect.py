@@ -64,8 +64,8 @@ def _in_a_step(x: Operating, q: Values) -> Complex:
     as the current in a resistance beside L_i is, straight lines from sample to sample.
     """
     late = _late_s(x, q)
-    decay = math.exp(-x.point_s / late)
-    new = 1.0 - (1.0 - decay) * late / x.point_s
+    decay = math.exp(-x.ts_s / late)
+    new = 1.0 - (1.0 - decay) * late / x.ts_s
     current = np.asarray(x.i_a)
     moves = new * current[1:] + (1.0 - decay - new) * current[:-1]
     inwards = accumulate(moves.tolist(), lambda now, move: decay * now + move, initial=current[0])

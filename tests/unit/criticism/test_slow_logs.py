@@ -10,6 +10,8 @@ import pytest
 from pipeline.criticism.data.segment import projected, row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, Pieces, zero
+from pipeline.criticism.machine.sample_period import mean_current
+from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.linearise import linearise
 from pipeline.criticism.regression.noise_floors import Floor
@@ -17,7 +19,7 @@ from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.signals.true_state import points_of_mean
 from pipeline.criticism.signals.voltage import mean_voltage, rotor_voltage
-from tests.unit.criticism.machines import BASE, in_frame_of, log, machine
+from tests.unit.criticism.machines import BASE, in_frame_of, log, machine, operating
 
 LIBRARY = effects()
 PLAIN = Model(machine(), ())
@@ -178,3 +180,29 @@ def test_the_frame_of_a_coarse_encoder_is_in_the_noise_floor():
     for axis in ("vd_v", "vq_v"):
         left = rows[group[valid] == groups.index((axis, 0))]
         assert 0.2 < np.mean(left**2) < 2.0
+
+
+def test_times_count_alike_at_one_point_a_sample_or_eight():
+    """A ramp of current at steady speed: its mean of an earlier instant, and a loss with a lag."""
+    at = np.arange(8 * 60) / 8.0
+    ramp = 4.0 - 0.02 * at + 1j * (3.0 + 0.05 * at)
+    theta = 2e-3 * at
+    fine = replace(
+        operating(8 * 60),
+        id_a=ramp.real,
+        iq_a=ramp.imag,
+        theta_rad=theta,
+        eps_rad=PAIRS * theta,
+        omega_rad_s=np.full(at.size, 2e-3 / 5e-5),
+        shaft=ShaftState(finer=8),
+    )
+    lagging = {**BASE, "ripple_slope": 0.4}
+    means = [mean_current(x, lagging) for x in (fine, fine.sampled())]
+    assert means[0].i_a[::8][1:-1] == pytest.approx(means[1].i_a[1:-1], abs=1e-9)
+    assert means[0].eps_rad[::8] == pytest.approx(means[1].eps_rad, abs=1e-9)
+    effect = LIBRARY["dead_time"]
+    lost = {name.partition(".")[2]: v for name, v in zero(effect, PLAIN).items()}
+    lost |= {"loss_v": 0.3, "width_a": 8.0, "lag_s": 4e-5, "ripple": 0.0}
+    drops = [effect.drop(x, lost) for x in (fine, fine.sampled())]
+    assert np.ptp(drops[1].real) > 1e-3
+    assert drops[0][::8][1:-1] == pytest.approx(drops[1][1:-1], abs=1e-9)
