@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.data.segment import Instrument, Segment, Sensors, row_index
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.model import BASE, STATE, Model
+from pipeline.criticism.machine.model import BASE, STATE, Model, zero
 from pipeline.criticism.operating import Operating
 from pipeline.criticism.parameter import Machine
+from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.linearise import linearise
+from pipeline.criticism.regression.noise_floors import Floor
 from pipeline.numerics.projection import projection
 
 BASE = {
@@ -141,6 +146,24 @@ def in_frame_of(theta_rad: np.ndarray, recorded: dict[str, np.ndarray]) -> dict[
 def unit_floor(segment: Segment) -> np.ndarray:
     """A noise floor of one for each of a segment's weak samples."""
     return np.ones(int(row_index(segment)[2].sum()))
+
+
+def columns_and_changes(
+    segment: Segment, effect: Effect, sigma: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Each column of an effect, and what its step changes in a residual that is computed anew."""
+    plain = Model(machine(), ())
+    columns, model, floor = (
+        effect_columns(effect, plain),
+        plain.with_effects(effect),
+        Floor(sigma, BASE),
+    )
+    start = {**BASE, **zero(effect, model)}
+    before = linearise(segment, plain, BASE, columns, floor)
+    for n, column in enumerate(columns):
+        moved = {**start, column.name: start[column.name] + column.step}
+        after = linearise(segment, model, moved, [], floor)
+        yield before.columns[:, n], (after.residual - before.residual) / column.step
 
 
 def coasting(n: int = 3000, seed: int = 5) -> Segment:

@@ -10,19 +10,24 @@ import pytest
 from pipeline.criticism.data.segment import Sensors, projected, row_index, slow_orders
 from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.machine.model import Model
 from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.columns import effect_columns
-from pipeline.criticism.regression.linearise import linearise
-from pipeline.criticism.regression.noise_floors import Floor, reading_error
+from pipeline.criticism.regression.noise_floors import reading_error
 from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.signals.shaft import averaged
 from pipeline.criticism.signals.true_state import finer_of
 from pipeline.numerics.projection import projection
-from tests.unit.criticism.machines import BASE, coasting, log, machine, operating
+from tests.unit.criticism.machines import (
+    BASE,
+    coasting,
+    columns_and_changes,
+    log,
+    machine,
+    operating,
+)
 
 LIBRARY = effects()
 PLAIN = Model(machine(), ())
@@ -56,18 +61,10 @@ def test_a_wrong_constant_shows_as_its_own_signal(constant, channel, closed):
 @pytest.mark.parametrize("name", LIBRARY)
 def test_a_column_is_the_change_of_the_whole_residual(name):
     """The hook's own column against a residual computed anew with the effect in the model."""
-    effect, segment = LIBRARY[name], log()
-    sigma = noise_floor(segment, PLAIN, BASE, 1)
-    columns = effect_columns(effect, PLAIN)
-    model = PLAIN.with_effects(effect)
-    start = {**BASE, **zero(effect, model)}
-    before = linearise(segment, PLAIN, BASE, columns, Floor(sigma, BASE))
-    for n, column in enumerate(columns):
-        moved = {**start, column.name: start[column.name] + column.step}
-        after = linearise(segment, model, moved, [], Floor(sigma, BASE))
-        expected = (after.residual - before.residual) / column.step
-        size = np.abs(expected).max()
-        assert before.columns[:, n] == pytest.approx(expected, abs=0.02 * size + 1e-12)
+    sigma = noise_floor(log(), PLAIN, BASE, 1)
+    for column, change in columns_and_changes(log(), LIBRARY[name], sigma):
+        size = np.abs(change).max()
+        assert column == pytest.approx(change, abs=0.02 * size + 1e-12)
 
 
 def one_period(turn: float) -> tuple[np.ndarray, float]:

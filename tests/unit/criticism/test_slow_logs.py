@@ -12,14 +12,19 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, Pieces, zero
 from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import ShaftState
-from pipeline.criticism.regression.columns import effect_columns
-from pipeline.criticism.regression.linearise import linearise
-from pipeline.criticism.regression.noise_floors import Floor
 from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.signals.true_state import points_of_mean
 from pipeline.criticism.signals.voltage import mean_voltage, rotor_voltage
-from tests.unit.criticism.machines import BASE, in_frame_of, log, machine, operating
+from tests.unit.criticism.machines import (
+    BASE,
+    columns_and_changes,
+    in_frame_of,
+    log,
+    machine,
+    operating,
+    unit_floor,
+)
 
 LIBRARY = effects()
 PLAIN = Model(machine(), ())
@@ -149,18 +154,9 @@ def test_a_column_of_a_slow_log_is_the_change_of_its_residual(name):
         instrument=replace(segment.instrument, timing="centred", points=4),
         fixed={**segment.fixed, "pwm_s": 1e-5, "vdc_v": 24.0},
     )
-    effect = LIBRARY[name]
-    sigma = np.ones_like(noise_floor(slow, PLAIN, BASE, 1))
-    columns = effect_columns(effect, PLAIN)
-    model = PLAIN.with_effects(effect)
-    start = {**BASE, **zero(effect, model)}
-    before = linearise(slow, PLAIN, BASE, columns, Floor(sigma, BASE))
-    for n, column in enumerate(columns):
-        moved = {**start, column.name: start[column.name] + column.step}
-        after = linearise(slow, model, moved, [], Floor(sigma, BASE))
-        expected = (after.residual - before.residual) / column.step
-        size = np.abs(expected).max()
-        assert before.columns[:, n] == pytest.approx(expected, abs=0.02 * size + 1e-12)
+    for column, change in columns_and_changes(slow, LIBRARY[name], unit_floor(slow)):
+        size = np.abs(change).max()
+        assert column == pytest.approx(change, abs=0.02 * size + 1e-12)
 
 
 def test_the_frame_of_a_coarse_encoder_is_in_the_noise_floor():
