@@ -156,7 +156,7 @@ EFFECT = Effect(
             "current_a",
             low=0.0003,
             high=0.5,
-            scan=(0.03,),
+            scan=(0.03, 0.2),
             optional=2,
             words="over which the compensation changes over",
         ),

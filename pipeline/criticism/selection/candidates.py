@@ -38,7 +38,8 @@ class Candidate:
 
 
 def candidates(library: Mapping[str, Effect], model: Model) -> tuple[Candidate, ...]:
-    """Every effect that is not in the model, once for each combination of trial shapes.
+    """Every effect that is not in the model, once for each combination of trial shapes; those of
+    an optional term are tried when the effect is in (`pruning.regained`).
 
     Parameters
     ----------
@@ -54,7 +55,8 @@ def candidates(library: Mapping[str, Effect], model: Model) -> tuple[Candidate, 
         if effect.name in inside or not effect.gone_through(model.machine):
             continue
         shapes = [p for p in effect.parameters_of(model.machine) if not p.amplitude]
-        grids = [[(p.name, v * model.machine.scale(p)) for v in p.scan] for p in shapes]
+        tried = [(p, p.scan[:1] if p.optional else p.scan) for p in shapes]
+        grids = [[(p.name, v * model.machine.scale(p)) for v in scan] for p, scan in tried]
         for at in product(*grids):
             columns = tuple(effect_columns(effect, model, at))
             start = zero(effect, model)

@@ -44,14 +44,28 @@ def reconsidered(system: LinearSystem) -> LinearSystem:
             fit = system.fit
             start = replace(fit, values={**fit.values, **other})
             limit = system.deviance - fit.policy.selection.tie
-            if _lowest(start, system) < limit:
+            if lowest_from(start, system) < limit:
                 tried = gauss_newton(start, before=system)
                 system = tried if tried.deviance < limit else system
     return system
 
 
-def _lowest(start: Fit, before: LinearSystem) -> float:
-    """The deviance that a fit may come down to from a start, judged by the columns of `before`."""
+def lowest_from(start: Fit, before: LinearSystem) -> float:
+    """The deviance that a fit may come down to, judged by the columns of another one.
+
+    Parameters
+    ----------
+    start
+        Where the fit begins.
+    before
+        The other one.
+
+    Returns
+    -------
+    float
+        The start's, less `policy.selection.choice_falls` times its fall to first order.
+
+    """
     begun = linear_system(start, before=before, chord=True)
     end = begun.normal_equations(begun.model_columns).best().deviance
     return begun.deviance - start.policy.selection.choice_falls * (begun.deviance - end)

@@ -6,7 +6,8 @@ cannot fit both where the shaft gathers speed under load, as another test knows 
 
 A control loop computes a voltage in the rotor frame of its sampled angle and turns it ahead.
 Firmware logs the vector from before or behind that: in the frame of the sampling instant, from
-which on it is held, or of the middle of its hold.
+which on it is held, or of the middle of its hold. That is known only where each sample is stated
+to be the mean about the middle of one hold.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ _STATOR = (
     "rotor is in it; in the shaft it would miss by more"
 )
 _SAMPLED = (
-    "held voltages of {} captures are taken in the rotor frame of the sampling instant, which "
-    "explains them better than that of the middle of their period"
+    "voltages of {} captures are taken in the rotor frame of the sampling instant, which explains "
+    "them better than that of the middle of their PWM period"
 )
 
 
@@ -95,9 +96,12 @@ def reading_notes(segments: Sequence[Segment]) -> tuple[str, ...]:
 
 def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
     """The fit by the other reading of each column that may have one."""
-    if any(_has_held_vectors(segment) for segment in system.segments):
-        turned = (_in_other_frame(s) if _has_held_vectors(s) else s for s in system.segments)
-        yield gauss_newton(replace(system.fit, segments=tuple(turned)))
+    share = system.policy.cutting.slower_share
+    held = [_has_held_vectors(segment, share) for segment in system.segments]
+    if any(held):
+        each = zip(system.segments, held, strict=True)
+        turned = tuple(_in_other_frame(s) if its_own else s for s, its_own in each)
+        yield gauss_newton(replace(system.fit, segments=turned))
     significant = significant_groups(system)
     torques = significant & [channel == TORQUE for _, channel, _ in system.labels]
     if torques.any():
@@ -111,9 +115,17 @@ def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
             yield other
 
 
-def _has_held_vectors(segment: Segment) -> bool:
-    """Whether a segment has voltage vectors that are held from their sample on."""
-    return segment.instrument.timing == "held" and "vd_v" in segment.channels
+def _has_held_vectors(segment: Segment, slower_share: float) -> bool:
+    """Whether a segment has voltage vectors that are held while the rotor turns, in a frame that no
+    metadata state: those held from a sample on, and those of a drive whose PWM period is known, but
+    for means about the middle of one.
+
+    A PWM period below `slower_share` of the sample period is one of many in a sample.
+    """
+    timing, pwm_s = segment.instrument.timing, segment.fixed.get("pwm_s")
+    commanded = segment.instrument.meter == "gain_commanded" and pwm_s is not None
+    is_open = commanded and (timing == "instant" or pwm_s < slower_share * segment.ts_s)
+    return "vd_v" in segment.channels and (timing == "held" or is_open)
 
 
 def _in_other_frame(segment: Segment) -> Segment:

@@ -1,4 +1,4 @@
-"""Terms inside an effect: those that the captures do not support are left out.
+"""Terms inside an effect: those that the captures do not support are left out, others come back.
 
 Reference: Schwarz, Ann. Stat. 6 (1978), the penalty of a parameter.
 """
@@ -6,7 +6,7 @@ Reference: Schwarz, Ann. Stat. 6 (1978), the penalty of a parameter.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +15,10 @@ from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import zero
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import NormalEquations
+from pipeline.criticism.selection.choices import lowest_from
 
 
 def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
@@ -79,6 +81,56 @@ def with_all_terms(fit: Fit) -> Fit:
     for effect in complete:
         values = {**zero(effect, full), **values}
     return replace(fit, model=full, values=values)
+
+
+def regained(system: LinearSystem) -> LinearSystem:
+    """The fit with terms that were left out, from another trial value of their shape, where these
+    are worth their parameters.
+
+    Parameters
+    ----------
+    system
+        The fit.
+
+    Returns
+    -------
+    LinearSystem
+        The same where nothing is over the floor. A term that would not be worth its parameters by
+        `policy.selection.choice_falls` times what it explains to first order is not fitted.
+
+    Notes
+    -----
+    What a compensation gives back over as little current as a dead time loses it is that dead time,
+    less of it; only over a wider one is it a term of its own. At zero no tangent leads there.
+
+    """
+    penalty = math.log(max(system.size, 2))
+    for effect in system.fit.model.effects:
+        for start, count in _other_shapes(system.fit, effect):
+            if not significant_groups(system).any():
+                return system
+            limit = system.deviance - penalty * count
+            if lowest_from(start, system) < limit:
+                tried = gauss_newton(start, before=system)
+                system = tried if tried.deviance < limit else system
+    return system
+
+
+def _other_shapes(fit: Fit, effect: Effect) -> Iterator[tuple[Fit, int]]:
+    """Where fits begin with a term that an effect was left without, at zero and at another than the
+    first trial value of a shape of it; and how many parameters each term has.
+    """
+    machine, left_out = fit.machine, effect.left_out
+    for term in left_out:
+        having = replace(effect, left_out=tuple(t for t in left_out if t != term))
+        parameters = [p for p in having.parameters_of(machine) if p.optional == term]
+        others = (having if e.name == effect.name else e for e in fit.model.effects)
+        model = replace(fit.model, effects=tuple(others))
+        for shape in parameters:
+            for value in shape.scan[1:]:
+                values = zero(having, model, [(shape.name, value * machine.scale(shape))])
+                start = replace(fit, model=model, values={**values, **fit.values})
+                yield start, len(parameters)
 
 
 def _unless_worth(

@@ -10,7 +10,9 @@ import pytest
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.pruning import regained
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -65,6 +67,29 @@ def test_a_compensation_is_told_from_the_dead_time_that_it_gives_back() -> None:
     assert values["dead_time.ramp_a"] == pytest.approx(RAMP_A / 1.4, rel=0.2)
     after, before = (float(one.reduced_chi2(one.residual).max()) for one in (system, plain))
     assert after < 0.1 * before
+
+
+def test_a_compensation_is_found_over_a_wider_current_than_it_was_first_tried_at() -> None:
+    """At the width of the dead time itself it is the same thing, and is left out as such."""
+    plain = fitted(1, 2)
+    system = regained(plain)
+    assert system.fit.effect("dead_time").left_out == (1,)
+    assert system.fit.values["dead_time.ramp_a"] > 3.0 * system.fit.values["dead_time.width_a"]
+    after, before = (float(one.reduced_chi2(one.residual).max()) for one in (system, plain))
+    assert after < 0.1 * before
+
+
+def test_a_term_that_is_not_worth_its_parameters_does_not_come_back() -> None:
+    """Of a dead time of its own form, with a little of another effect left over."""
+    plain = log(noise=1.0)
+    again = log(noise=1.0, seed=6)
+    bent = 0.05 * again.recorded["iq_a"] * np.abs(again.recorded["iq_a"])
+    volts = {"vq_v": again.recorded["vq_v"] + bent}
+    segments = [plain, replace(again, capture="again", recorded={**again.recorded, **volts})]
+    effect = replace(LIBRARY["dead_time"], left_out=(1, 2))
+    system = fit_of(segments, Model(machine(), (effect,))).system
+    assert significant_groups(system).any()
+    assert regained(system).fit.effect("dead_time").left_out == (1, 2)
 
 
 @pytest.mark.slow

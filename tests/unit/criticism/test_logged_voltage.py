@@ -105,11 +105,33 @@ def test_the_frame_of_held_voltages_is_the_one_that_explains_them(frame: float) 
     assert system.fit.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
 
 
-def test_only_held_voltages_have_a_frame_to_choose() -> None:
-    late = held(0.5, 1.0)
-    centred = replace(late, instrument=replace(late.instrument, timing="centred"))
-    system = by_best_readings(fit_of([centred], Model(machine(), ())).system)
-    assert system.segments[0].instrument.frame == 0.0
+HOLDS_A_SAMPLE = 5.0
+
+
+@pytest.mark.parametrize(
+    ("timing", "meter", "many", "chosen"),
+    [
+        ("instant", "gain_commanded", 1.0, 0.5),
+        ("instant", "gain_commanded", HOLDS_A_SAMPLE, 0.5),
+        ("centred", "gain_commanded", HOLDS_A_SAMPLE, 0.5),
+        ("centred", "gain_commanded", 1.0, 0.0),
+        ("instant", "gain_voltage", 1.0, 0.0),
+        ("instant", "gain_commanded", None, 0.0),
+    ],
+)
+def test_a_frame_is_chosen_where_it_is_not_stated(timing, meter, many, chosen) -> None:
+    """Of commands of a known PWM, but for means about the middle of one hold, it is not."""
+    plain = log(noise=1.0)
+    hold_s = plain.ts_s / (many or 1.0)
+    omega = PAIRS * np.gradient(plain.recorded["theta_mech_rad"], plain.ts_s)
+    vector = plain.recorded["vd_v"] + 1j * plain.recorded["vq_v"]
+    vector = vector * np.exp(0.5j * hold_s * omega)
+    recorded = {**plain.recorded, "vd_v": vector.real, "vq_v": vector.imag}
+    fixed = {**plain.fixed, **({} if many is None else {"pwm_s": hold_s})}
+    instrument = replace(plain.instrument, timing=timing, meter=meter)
+    segment = replace(plain, recorded=recorded, fixed=fixed, instrument=instrument)
+    system = by_best_readings(fit_of([segment], Model(machine(), ())).system)
+    assert system.segments[0].instrument.frame == chosen
 
 
 def test_the_frame_is_asked_again_when_an_effect_joins() -> None:

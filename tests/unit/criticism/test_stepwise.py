@@ -269,6 +269,16 @@ def test_no_more_of_an_effect_is_named_than_there_can_be(part, possible):
     assert material(Fit((), model, values, (), values), clock) is possible
 
 
+@pytest.mark.parametrize(("mean", "possible"), [(0.01, True), (-0.3, False)])
+def test_what_goes_with_an_effect_is_no_larger_than_there_can_be(mean, possible):
+    """No current sensor reads a third too little: with that, its ripple stood for a dead time."""
+    gain = effects()["current_gain"]
+    model = Model(machine(), (gain,))
+    sizes = {"cosine": 0.02, "sine": 0.0, "mean": mean, "shunts": 0.0, "bench": 0.0}
+    values = {**BASE, **{f"current_gain.{name}": value for name, value in sizes.items()}}
+    assert material(Fit((), model, values, (), values), gain) is possible
+
+
 def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkeypatch):
     def unsure(system, _):
         return system.fit.model.effects[-1].name != "windage"
