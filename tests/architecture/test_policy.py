@@ -45,6 +45,7 @@ ARITHMETIC = {
     "selection/changed_between.py": {"_FREE"},  # the whole of a share
     "signals/voltage.py": {"_EIGHTH_ORDER"},  # of a difference
     "residuals/segments.py": {"_ALTERNATING"},  # of third differences
+    "signals/between_rows.py": {"ORDERS"},  # of three equal phases
     "selection/other_readings.py": {"_HALF_HOLD"},  # from the start of a hold to its middle
     "regression/fit.py": {"_SEED"},
     "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart

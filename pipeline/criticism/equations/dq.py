@@ -23,6 +23,7 @@ from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Us
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
+from pipeline.criticism.signals.between_rows import on_points
 from pipeline.criticism.signals.shaft import (
     net_torque,
     sensed_torque,
@@ -30,7 +31,7 @@ from pipeline.criticism.signals.shaft import (
     torque_reading,
     true_load,
 )
-from pipeline.criticism.signals.true_current import drive_current, on_points
+from pipeline.criticism.signals.true_current import drive_current
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
     motion_of,

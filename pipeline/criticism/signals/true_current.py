@@ -11,6 +11,7 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import Model, values_of
 from pipeline.criticism.operating import Array, Complex, Recorded, Signals, Values, between
 from pipeline.criticism.signals.angle_sensor import both_axes
+from pipeline.criticism.signals.between_rows import Waves, on_points
 
 
 def drive_current(
@@ -29,7 +30,7 @@ def drive_current(
     values
         Parameters by full name.
     size
-        Points wanted; beyond the samples, on straight lines between them.
+        Points wanted; beyond the samples, waves of the angle on straight lines between them.
 
     Returns
     -------
@@ -44,29 +45,21 @@ def drive_current(
         back = segment.once(theta, "back", pairs, lambda: np.exp(-1j * eps))
         recorded = replace(recorded, i_a=recorded.i_a - zero * back)
     current = true_current(recorded, segment.instrument.ammeter, model, values)
-    return on_points(current, size)
+    if size == current.size:
+        return current
+    return on_points(current, size) + _waves(segment, model, size).added(current, size)
 
 
-def on_points(signal: Complex, size: int) -> Complex:
-    """A signal at one or more points a sample, on straight lines between samples.
+def _waves(segment: Segment, model: Model, size: int) -> Waves:
+    """The waves of the current that a log recorded, at so many points."""
+    signals, pairs, policy = segment.recorded, model.machine.pole_pairs, model.policy.cutting
+    theta, points = signals["theta_mech_rad"], size // segment.size
 
-    Parameters
-    ----------
-    signal
-        At the samples [n, any unit].
-    size
-        Points wanted, a multiple of n.
+    def made() -> Waves:
+        current = _recorded(segment, signals, model).i_a
+        return Waves.of(segment, current, pairs * theta, points, policy)
 
-    Returns
-    -------
-    array [size]
-        The last sample is held.
-
-    """
-    if signal.size == size:
-        return signal
-    at = np.arange(size) * (signal.size / size)
-    return np.interp(at, np.arange(signal.size), signal)
+    return segment.once(theta, "waves", (points, pairs, policy), made)
 
 
 def table_current(

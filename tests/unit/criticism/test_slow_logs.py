@@ -117,6 +117,22 @@ def test_a_dead_time_is_in_a_mean_as_its_mean():
     assert sampled.std() > 0.1 * loss, "an instant of the loss is not its mean"
 
 
+def test_the_state_between_rows_has_the_waves_of_the_current():
+    segment = averaging(slow_log(1.6))
+    eps = PAIRS * np.interp(
+        np.arange(SIZE * segment.instrument.points) / segment.instrument.points,
+        np.arange(SIZE),
+        segment.recorded["theta_mech_rad"],
+    )
+    current = -2.0 + 5.0j + 0.3 * np.exp(6j * eps)
+    rows = current[:: segment.instrument.points]
+    recorded = {**segment.recorded, "id_a": rows.real, "iq_a": rows.imag}
+    segment = replace(segment, recorded=recorded)
+    x = operate(segment, recorded, PLAIN, BASE)
+    inside = slice(segment.instrument.points, -2 * segment.instrument.points)
+    assert x.i_a[inside] == pytest.approx(current[inside], abs=0.01)
+
+
 @pytest.mark.parametrize(
     ("turn", "timing", "many"),
     [

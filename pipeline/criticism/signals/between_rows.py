@@ -1,0 +1,171 @@
+"""Currents between the rows of a log in which the rotor turns far from row to row.
+
+Three equal phases make waves of 6 and 12 a turn of the electrical angle in the currents of the
+rotor's frame: harmonics of the back-EMF do, and dead time. Where the rotor turns by a radian from
+row to row, a straight line between rows misses them. But the angle of every row is known, and ever
+another one: some dozens of rows determine the waves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment, clock
+from pipeline.criticism.operating import Array, Complex
+from pipeline.criticism.policy.captures import Cutting
+
+ORDERS = (6, 12)
+"""Waves a turn of the electrical angle; the winding's inductance leaves little of higher ones."""
+
+
+def on_points(signal: Complex, size: int) -> Complex:
+    """A signal at one or more points a sample, on straight lines between samples.
+
+    Parameters
+    ----------
+    signal
+        At the samples [n, any unit].
+    size
+        Points wanted, a multiple of n.
+
+    Returns
+    -------
+    array [size]
+        The last sample is held.
+
+    """
+    if signal.size == size:
+        return signal
+    at = np.arange(size) * (signal.size / size)
+    return np.interp(at, np.arange(signal.size), signal)
+
+
+@dataclass(frozen=True, slots=True)
+class Waves:
+    """The waves of a log's current, block of rows by block: what they add to straight lines.
+
+    Attributes
+    ----------
+    rows
+        Rows [b, w] that determine the waves of each block.
+    fit
+        Size of each wave by the current of these rows [b, k, w].
+    places
+        Points [b, p] of each block; those of overlapping blocks are the same.
+    beyond
+        Of each wave the part [b, p, k] that straight lines between rows miss.
+
+    """
+
+    rows: NDArray[np.int64]
+    fit: Array
+    places: NDArray[np.int64]
+    beyond: Array
+
+    @classmethod
+    def of(
+        cls, segment: Segment, current: Complex, eps_rad: Array, points: int, policy: Cutting
+    ) -> Self:
+        """The waves of a log.
+
+        Parameters
+        ----------
+        segment
+            Its clock; nothing is taken across a gap.
+        current
+            Of the rows [n, A]: how much of it are waves.
+        eps_rad
+            Electrical angle of the rows [n].
+        points
+            Points a row.
+        policy
+            Rows a block, and how sure waves are to be.
+
+        Notes
+        -----
+        By least squares beside cosines of time: a wave whose rows come at phases that move on
+        slowly is no other than a slow current, and stays zero.
+
+        """
+        width, step = policy.wave_rows, policy.wave_rows // 4
+        blocks = [
+            (first, min(max(first - (width - step) // 2, start), end - width), end)
+            for start, end in _runs(segment, eps_rad.size)
+            if end - start >= width
+            for first in range(start, end, step)
+        ]
+        firsts, lows, ends = np.array(blocks, dtype=np.int64).reshape(-1, 3).T[:, :, None]
+        rows = lows + np.arange(width)
+        waves = _waves(eps_rad[rows])
+        halves = np.arange(round(2.0 * policy.wave_slow * width))
+        slow, _ = np.linalg.qr(np.cos(np.pi / width * np.outer(np.arange(width) + 0.5, halves)))
+        apart = waves - slow @ (slow.T @ waves)
+        fit = _fitted(apart, slow, current[rows], policy.wave_sure)
+        at = np.minimum(firsts + np.arange(step * points) / points, ends - 1)
+        before = np.minimum(at.astype(np.int64), ends - 2)
+        part = (at - before)[:, :, None]
+        eps = np.interp(at, np.arange(eps_rad.size), eps_rad)
+        straight = (1.0 - part) * _waves(eps_rad[before]) + part * _waves(eps_rad[before + 1])
+        return cls(rows, fit, np.rint(points * at).astype(np.int64), _waves(eps) - straight)
+
+    def added(self, current: Complex, size: int) -> Complex:
+        """What the waves add to straight lines.
+
+        Parameters
+        ----------
+        current
+            At the rows [n, A].
+        size
+            Points.
+
+        Returns
+        -------
+        array [size], complex
+            In A; zero where too few rows are in a run.
+
+        """
+        total = np.zeros(size, dtype=np.complex128)
+        total[self.places] = (self.beyond @ (self.fit @ current[self.rows][:, :, None]))[:, :, 0]
+        return total
+
+
+def _fitted(apart: Array, slow: Array, current: Complex, sure: float) -> Array:
+    """Regression [b, k, w] of waves on the current of the rows of each block [b, w, A].
+
+    `apart` are the waves [b, w, k] less what the `slow` cosines [w, s] have of them. The ridge is
+    what the rows leave over the power of the waves. Without it, waves that come to nearly the same
+    phase in every row would be anything. Blocks whose waves explain less than `sure` times what as
+    many of anything would have none.
+    """
+    width, waves = apart.shape[1:]
+    across, columns = np.swapaxes(apart, 1, 2), current[:, :, None]
+    gram, one = across @ apart, np.eye(waves)
+    of_waves = apart @ (np.linalg.pinv(apart) @ columns)
+    left = columns - of_waves
+    left = left - slow @ (slow.T @ left)
+    noise = (np.abs(left) ** 2).sum((1, 2)) / (width - waves - slow.shape[1])
+    explained = (np.abs(of_waves) ** 2).sum((1, 2))
+    there = explained > sure * waves * noise
+    power = explained[there] / np.trace(gram[there], axis1=1, axis2=2)
+    ridge = (noise[there] / power)[:, None, None] * one
+    fit = np.zeros(across.shape)
+    fit[there] = np.linalg.solve(gram[there] + ridge, across[there])
+    return fit
+
+
+def _waves(eps_rad: Array) -> Array:
+    """Cosine and sine of each order at angles [b, n]: [b, n, k]."""
+    turning = eps_rad[:, :, None] * np.array(ORDERS)
+    return np.concatenate([np.cos(turning), np.sin(turning)], axis=2)
+
+
+def _runs(segment: Segment, size: int) -> list[tuple[int, int]]:
+    """First row of each run of rows without a gap, and the one behind its last."""
+    gaps = np.flatnonzero(np.abs(np.diff(clock(segment)) / segment.ts_s - 1.0) > 0.5) + 1
+    edges = [0, *gaps.tolist(), size]
+    return list(pairwise(edges))

@@ -1,0 +1,83 @@
+"""What a current does between the rows of a log in which the rotor turns far from row to row."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.policy.captures import Cutting
+from pipeline.criticism.signals.between_rows import Waves, on_points
+from tests.unit.criticism.machines import log
+
+ROWS, POINTS, ROW_S = 400, 8, 1e-3
+POLICY = Cutting()
+AT = np.arange(ROWS * POINTS) / POINTS
+NOISE = 0.004 * np.random.default_rng(3).normal(size=(ROWS, 2)) @ (1.0, 1.0j)
+
+
+def clock(t_s: np.ndarray) -> Segment:
+    """A log of so many rows."""
+    return replace(log(), ts_s=ROW_S, recorded={"t_s": t_s})
+
+
+def slow(at: np.ndarray) -> np.ndarray:
+    """A current that a speed loop moves."""
+    return 1.0 + 0.4 * np.sin(at / 40.0) + 0.5j * np.cos(at / 55.0)
+
+
+def rippling(eps: np.ndarray) -> np.ndarray:
+    return 0.2 * np.exp(6j * eps) + 0.1 * np.exp(-6j * eps + 0.3j) - 0.05j * np.cos(12.0 * eps)
+
+
+def missed(turn_rad: float, ripple: float = 1.0, t_s: np.ndarray | None = None) -> tuple:
+    """Rms error [A] of straight lines, and of them with waves, away from the ends."""
+    eps = turn_rad * AT * (1.0 + 1e-4 * AT)
+    true = slow(AT) + ripple * rippling(eps)
+    current = true[::POINTS] + NOISE
+    segment = clock(ROW_S * np.arange(ROWS) if t_s is None else t_s)
+    waves = Waves.of(segment, current, eps[::POINTS], POINTS, POLICY)
+    lines = on_points(current, AT.size)
+    with_waves = lines + waves.added(current, AT.size)
+    return tuple(np.std((one - true)[8:-8]) for one in (lines, with_waves))
+
+
+@pytest.mark.parametrize("turn_rad", [0.35, 1.6, 2.3])
+def test_waves_of_the_angle_are_found_between_rows(turn_rad: float) -> None:
+    straight, with_waves = missed(turn_rad)
+    assert straight > 0.09
+    assert with_waves < 0.1 * straight
+
+
+def test_a_current_without_waves_stays_on_straight_lines() -> None:
+    straight, with_waves = missed(1.6, ripple=0.0)
+    assert with_waves == straight
+
+
+def test_a_wave_that_every_row_has_at_nearly_the_same_phase_is_a_slow_current() -> None:
+    """Six turns of 59/60 of a sixth: by the rows it moves on once in sixty of them."""
+    turn_rad = 2.0 * np.pi / 6.0 * 59.0 / 60.0
+    current = slow(AT)[::POINTS] + NOISE
+    current[ROWS // 2 :] += 2.0
+    eps = turn_rad * np.arange(ROWS)
+    waves = Waves.of(clock(ROW_S * np.arange(ROWS)), current, eps, POINTS, POLICY)
+    assert np.abs(waves.added(current, AT.size)).max() < 0.01
+
+
+def test_a_step_of_the_current_is_no_wave() -> None:
+    current = slow(AT)[::POINTS] + NOISE
+    current[ROWS // 2 :] += 2.0
+    waves = Waves.of(clock(ROW_S * np.arange(ROWS)), current, 1.6 * np.arange(ROWS), POINTS, POLICY)
+    assert np.abs(waves.added(current, AT.size)).max() < 0.01
+
+
+def test_no_wave_goes_across_a_gap_and_short_runs_have_none() -> None:
+    """Of two parts with a gap each is as good as alone; pieces of thirty rows determine nothing."""
+    t_s = ROW_S * (np.arange(ROWS) + 500.0 * (np.arange(ROWS) >= ROWS // 2))
+    straight, with_waves = missed(1.6, t_s=t_s)
+    assert with_waves < 0.1 * straight
+    pieces = ROW_S * (np.arange(ROWS) + 500.0 * (np.arange(ROWS) // 30))
+    straight, with_waves = missed(1.6, t_s=pieces)
+    assert with_waves == straight
