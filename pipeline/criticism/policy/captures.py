@@ -176,19 +176,6 @@ class Cutting:
     mean_points: int = chosen(
         8, "1", "points of a sample that a logged voltage is the mean of at the most", why=COST
     )
-    wave_rows: int = calibrated(
-        64, "rows", "rows of a log that determine the waves of its current between rows",
-        by="32 to 96 rows", on="harmonics of the back-EMF in 1 kHz telemetry: fewer leave three "
-        "times the deviance",
-    )  # fmt: skip
-    wave_slow: float = chosen(
-        0.1, "cycles a row", "how slowly phases move on at which a wave is taken as a slow current",
-        why="a control loop moves the current in some ten rows",
-    )  # fmt: skip
-    wave_sure: float = calibrated(
-        8.0, "1", "times what as many of anything would explain, from which on waves are there",
-        by="0, 4 and 8", on="sound motors: steps of a speed's reference pass for waves at 4",
-    )  # fmt: skip
     log_parts: int = chosen(6, "1", "parts of a log's sample at the most", why=COST)
     load_window_s: float = calibrated(
         0.04, "s", "window in which a shaft's acceleration is held against its current",

@@ -1,10 +1,10 @@
-"""Constants of judgement of `machine`: the twist of a shaft in two parts."""
+"""Constants of judgement of a shaft in two parts, and of currents between the rows of a log."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.records.policy import chosen, derived
+from pipeline.records.policy import calibrated, chosen, derived
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,4 +82,23 @@ class Torsion:
     odd: float = chosen(
         25.0, "1", "the most that this χ²/n may be",
         why="where most windows miss the equation by more, none is usual",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ripple:
+    """Waves of a log's current between its rows."""
+
+    rows: int = calibrated(
+        64, "rows", "rows of a log that determine the waves of its current between rows",
+        by="32 to 96 rows", on="harmonics of the back-EMF in 1 kHz telemetry: fewer leave three "
+        "times the deviance",
+    )  # fmt: skip
+    slow: float = chosen(
+        0.1, "cycles a row", "how slowly phases move on at which a wave is taken as a slow current",
+        why="a control loop moves the current in some ten rows",
+    )  # fmt: skip
+    sure: float = calibrated(
+        8.0, "1", "times what as many of anything would explain, from which on waves are there",
+        by="0, 4 and 8", on="sound motors: steps of a speed's reference pass for waves at 4",
     )  # fmt: skip

@@ -9,7 +9,7 @@ from typing import Any
 from pipeline.criticism.policy.captures import Cutting, Priors, Tables
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.policy.discovery import Discovery
-from pipeline.criticism.policy.machine import Torsion
+from pipeline.criticism.policy.machine import Ripple, Torsion
 from pipeline.criticism.policy.regression import GaussNewton, Goodness, MainsHum, NoiseFloors
 from pipeline.criticism.policy.selection import OrderScan, Selection
 from pipeline.criticism.policy.sensors import SensorNoise
@@ -34,6 +34,7 @@ class Policy:
     tables: Tables = section(Tables)
     priors: Priors = section(Priors)
     torsion: Torsion = section(Torsion)
+    ripple: Ripple = section(Ripple)
     sensor_noise: SensorNoise = section(SensorNoise)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, clock
 from pipeline.criticism.operating import Array, Complex
-from pipeline.criticism.policy.captures import Cutting
+from pipeline.criticism.policy.machine import Ripple
 
 ORDERS = (6, 12)
 """Waves a turn of the electrical angle; the winding's inductance leaves little of higher ones."""
@@ -69,7 +69,7 @@ class Waves:
 
     @classmethod
     def of(
-        cls, segment: Segment, current: Complex, eps_rad: Array, points: int, policy: Cutting
+        cls, segment: Segment, current: Complex, eps_rad: Array, points: int, policy: Ripple
     ) -> Self:
         """The waves of a log.
 
@@ -92,7 +92,7 @@ class Waves:
         slowly is no other than a slow current, and stays zero.
 
         """
-        width, step = policy.wave_rows, policy.wave_rows // 4
+        width, step = policy.rows, policy.rows // 4
         blocks = [
             (first, min(max(first - (width - step) // 2, start), end - width), end)
             for start, end in _runs(segment, eps_rad.size)
@@ -102,10 +102,10 @@ class Waves:
         firsts, lows, ends = np.array(blocks, dtype=np.int64).reshape(-1, 3).T[:, :, None]
         rows = lows + np.arange(width)
         waves = _waves(eps_rad[rows])
-        halves = np.arange(round(2.0 * policy.wave_slow * width))
+        halves = np.arange(round(2.0 * policy.slow * width))
         slow, _ = np.linalg.qr(np.cos(np.pi / width * np.outer(np.arange(width) + 0.5, halves)))
         apart = waves - slow @ (slow.T @ waves)
-        fit = _fitted(apart, slow, current[rows], policy.wave_sure)
+        fit = _fitted(apart, slow, current[rows], policy.sure)
         at = np.minimum(firsts + np.arange(step * points) / points, ends - 1)
         before = np.minimum(at.astype(np.int64), ends - 2)
         part = (at - before)[:, :, None]

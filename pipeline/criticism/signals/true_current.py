@@ -52,7 +52,7 @@ def drive_current(
 
 def _waves(segment: Segment, model: Model, size: int) -> Waves:
     """The waves of the current that a log recorded, at so many points."""
-    signals, pairs, policy = segment.recorded, model.machine.pole_pairs, model.policy.cutting
+    signals, pairs, policy = segment.recorded, model.machine.pole_pairs, model.policy.ripple
     theta, points = signals["theta_mech_rad"], size // segment.size
 
     def made() -> Waves:

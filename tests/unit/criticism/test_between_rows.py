@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.policy.captures import Cutting
+from pipeline.criticism.policy.machine import Ripple
 from pipeline.criticism.signals.between_rows import Waves, on_points
 from tests.unit.criticism.machines import log
 
 ROWS, POINTS, ROW_S = 400, 8, 1e-3
-POLICY = Cutting()
+POLICY = Ripple()
 AT = np.arange(ROWS * POINTS) / POINTS
 NOISE = 0.004 * np.random.default_rng(3).normal(size=(ROWS, 2)) @ (1.0, 1.0j)
 
