@@ -24,7 +24,6 @@ def seconds(fit: Fit) -> tuple[float, LinearSystem]:
     return time.process_time() - begun, system
 
 
-
 def of_a_time_constant(known: LinearSystem, scale_s: float, *, kept: bool) -> LinearSystem:
     """A friction that may change with time and does not yet, around a `known` fit."""
     fit = known.fit
@@ -33,6 +32,7 @@ def of_a_time_constant(known: LinearSystem, scale_s: float, *, kept: bool) -> Li
     absent = {**dict.fromkeys(EARLY_SHARES, 0.0), EARLY_S: scale_s}
     start = replace(fit, model=model, near={**fit.near, **absent}).at(absent)
     return linear_system(start, before=known if kept else None)
+
 
 def test_the_columns_of_a_known_point_cost_less_than_half_of_new_ones():
     """A search asks for them again beside other floors; a third of its time went there."""
