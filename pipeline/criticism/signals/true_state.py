@@ -31,7 +31,6 @@ from pipeline.criticism.parameter import UNLOGGED, WARMING, Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.angle_sensor import angle_error, frame_turn, zero_angle
 
-
 Number = TypeVar("Number", np.float64, np.int64)
 
 
