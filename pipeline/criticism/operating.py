@@ -116,6 +116,7 @@ class Samples:
     freq_hz: Array
 
 
+_COLUMNS = tuple(one.name for one in fields(Samples))
 _MOTION = {"eps_rad", "theta_rad", "omega_rad_s"}
 """Columns of the motion."""
 
@@ -168,8 +169,9 @@ class Operating(Samples):
         """
         columns = {
             name: theirs
-            for name in (one.name for one in fields(Samples))
-            if np.array_equal(getattr(self, name), theirs := getattr(other, name))
+            for name in _COLUMNS
+            if (ours := getattr(self, name)) is (theirs := getattr(other, name))
+            or np.array_equal(ours, theirs)
         }
         same = columns.keys() >= _MOTION and self.ts_s == other.ts_s
         return replace(self, **columns, cache=dict(other.cache)) if same else self
@@ -187,8 +189,7 @@ class Operating(Samples):
         same_volts = volts is theirs or (
             volts is not None and theirs is not None and np.array_equal(volts, theirs)
         )
-        columns = (one.name for one in fields(Samples))
-        return same_volts and all(getattr(self, n) is getattr(other, n) for n in columns)
+        return same_volts and all(getattr(self, n) is getattr(other, n) for n in _COLUMNS)
 
     def once(self, column: Any, name: Hashable, make: Callable[[], Made]) -> Made:
         """What depends on one array alone, computed once for all copies of the state that share the
@@ -282,7 +283,7 @@ class Operating(Samples):
             Without flux, torque and logged voltage, and without what `once` computed.
 
         """
-        samples = {one.name: getattr(self, one.name)[rows] for one in fields(Samples)}
+        samples = {name: getattr(self, name)[rows] for name in _COLUMNS}
         run = None if self.shaft.run is None else self.shaft.run[rows]
         behind = None if self.shaft.behind_nm is None else self.shaft.behind_nm[rows]
         age_s = None if self.shaft.age_s is None else self.shaft.age_s[rows]

@@ -130,8 +130,12 @@ def play_lag(signal: Array, share: float) -> Array:
 
     """
     half = share * float(np.abs(signal).max(initial=0.0))
-    lag, follower = np.empty(signal.size), float(signal[0]) if signal.size else 0.0
-    for n, value in enumerate(signal.tolist()):
-        follower = min(max(follower, value - half), value + half)
-        lag[n] = value - follower
-    return lag
+    lag, follower = [], float(signal[0]) if signal.size else 0.0
+    for value in signal.tolist():
+        # comparisons: min and max take three times as long
+        if follower < value - half:
+            follower = value - half
+        elif follower > value + half:
+            follower = value + half
+        lag.append(value - follower)
+    return np.array(lag, dtype=np.float64)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values, choice
@@ -13,6 +15,8 @@ from pipeline.criticism.machine.inverter import (
     vector_of,
 )
 
+_SWITCHED = ("r_ohm", "ld_h", "lq_h")
+"""Constants by which a current moves within a switching period."""
 _EDGES, _MOMENTS = 1.0, 2.0
 """Choices of `ripple`."""
 
@@ -27,15 +31,31 @@ def _drop(x: Operating, q: Values) -> Complex:
     on: Complex = q["on_v"] / x.machine.scales["current_a"] * x.i_a
     if not (q["loss_v"] or q["given_v"]):
         return on
-    turn, phases, eps = _phases(x, q["lag_s"])
-    if q["ripple"] == _EDGES:
-        shares = lost_shares(x, eps, phases, whole_v, q["width_a"])
-    elif q["ripple"] == _MOMENTS:
-        shares = swept_shares(x, eps, phases, q["width_a"])
-    else:
-        shares = np.tanh(phases / q["width_a"])
-    rotor: Complex = whole_v * vector_of(shares) * np.conj(turn) - given_v
+    rotor: Complex = whole_v * _lost(x, q, whole_v) - given_v
     return rotor + on if q["on_v"] else rotor
+
+
+def _lost(x: Operating, q: Values, whole_v: float) -> Complex:
+    """What is lost [n] of a voltage `whole_v` [V], in the rotor frame; once a state, whatever the
+    drop of the switches is, and but for the edges whatever the voltage is.
+    """
+    lag_s, ripple, width_a = q["lag_s"], q["ripple"], q["width_a"]
+
+    def lost() -> tuple[list[Any], Complex]:
+        turn, phases, eps = _phases(x, lag_s)
+        if ripple == _EDGES:
+            shares = lost_shares(x, eps, phases, whole_v, width_a)
+        elif ripple == _MOMENTS:
+            shares = swept_shares(x, eps, phases, width_a)
+        else:
+            shares = np.tanh(phases / width_a)
+        return of, vector_of(shares) * np.conj(turn)
+
+    of = [x.eps_rad, x.omega_rad_s, x.psi_wb, x.supply.volts_v]
+    numbers = (*(x.base[name] for name in _SWITCHED), lag_s, ripple, width_a)
+    numbers += x.ts_s, x.supply.pwm_s, x.supply.vdc_v
+    loss_v = whole_v if ripple == _EDGES else 0.0
+    return x.once(x.i_a, ("lost", *map(id, of), *numbers, loss_v), lost)[1]
 
 
 def _given(x: Operating, q: Values) -> Complex:

@@ -100,7 +100,8 @@ def effect_flux(effect: Hooks, x: Operating, q: Values) -> tuple[Complex, Array]
     by_q = slope(replace(x, iq_a=_stepped(x, x.iq_a)))
     flux: Complex = by_d + 1j * by_q
     used = frozenset(name for name, value in q.items() if value)
-    if not x.once(x.eps_rad, (hook, used), lambda: _turns(hook, x.one_sample(), q)):
+    first = x.once(x.eps_rad, "first", x.one_sample)
+    if not x.once(x.eps_rad, (hook, used), lambda: _turns(hook, first, q)):
         return flux, np.zeros(shape)
     return flux, slope(replace(x, eps_rad=_stepped(x, x.eps_rad)))
 

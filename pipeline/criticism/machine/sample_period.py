@@ -36,12 +36,17 @@ def mean_current(x: Operating, values: Values) -> Operating:
     """
     if not x.inverter or not (values["ripple_slope"] or values["ripple_mean"]):
         return x
-    current = x.i_a
-    slope = np.zeros(current.shape, dtype=complex)
-    slope[1:-1] = 0.5 * x.shaft.finer * (current[2:] - current[:-2])
+    current, periods = x.i_a, values["ripple_slope"]
     _, below = ripple(x, values["ripple_mean"], values)
-    mean = current - values["ripple_slope"] * slope - below
-    return replace(x, id_a=mean.real, iq_a=mean.imag, eps_rad=_earlier(x, values["ripple_slope"]))
+
+    def mean() -> tuple[Complex, Array, Array]:
+        slope = np.zeros(current.shape, dtype=complex)
+        slope[1:-1] = 0.5 * x.shaft.finer * (current[2:] - current[:-2])
+        of_period = current - periods * slope - below
+        return below, of_period.real, of_period.imag
+
+    _, id_a, iq_a = x.once(current, ("mean", periods, id(below)), mean)
+    return replace(x, id_a=id_a, iq_a=iq_a, eps_rad=_earlier(x, periods))
 
 
 def _earlier(x: Operating, periods: float) -> Array:

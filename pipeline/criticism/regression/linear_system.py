@@ -499,8 +499,9 @@ def _is_valid(column: Column, made_at: Values, fit: Fit) -> bool:
     """Whether a column is near what it would be at a fit.
 
     It goes with the constants; that of J with J, since a coasting shaft goes by 1/J; a coast's
-    friction and its share are a product; those of sensors and shapes go with other effects'
-    parameters, by their typical sizes if these are larger.
+    friction and its share are a product, and so are a friction that changes and the time constant
+    by which it does; those of sensors and shapes go with other effects' parameters, by their
+    typical sizes if these are larger.
     """
     model, now, far = fit.model, fit.values, fit.policy.fit.stale_share
     if any(abs(now[n] - made_at[n]) > far * abs(made_at[n]) for n in _STEADY):
@@ -508,7 +509,8 @@ def _is_valid(column: Column, made_at: Values, fit: Fit) -> bool:
     shares = [n for n in (*COAST_SHARES, *EARLY_SHARES) if n in now]
     if column.name in shares or any(abs(now[n] - made_at.get(n, 0.0)) > far for n in shares):
         return False
-    if EARLY_S in now and abs(now[EARLY_S] / made_at.get(EARLY_S, math.inf) - 1.0) > far:
+    early = any(one.get(n, 0.0) for one in (now, made_at) for n in EARLY_SHARES)
+    if early and abs(now[EARLY_S] / made_at.get(EARLY_S, math.inf) - 1.0) > far:
         return False
     if column.name == "j_kgm2":
         return abs(now["j_kgm2"] / made_at["j_kgm2"] - 1.0) < far

@@ -15,6 +15,7 @@ from pipeline.criticism.data.traces import parabolas
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.operating import Array, Signals, Values
 from pipeline.criticism.policy.sensors import SensorNoise
+from pipeline.criticism.regression.sampler import Sampler
 from pipeline.criticism.residuals.residual import residual
 
 IN_ROTOR_FRAME = (("id_a", "iq_a"), ("vd_v", "vq_v"))
@@ -53,7 +54,7 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     replicates = max(policy.replicates, min(policy.pooled // recording.windows, policy.pooled))
     if segment.sensors.steps:
         replicates = max(replicates, policy.shifts)
-    variance = recording.pooled(recording.changes(seed, replicates))
+    variance = recording.pooled(map(recording.change, recording.noisy(seed, replicates)))
     if UNSMOOTHED in segment.recorded:
         rough = {**segment.recorded, "theta_mech_rad": segment.recorded[UNSMOOTHED]}
         variance += recording.pooled([recording.change(rough)])
@@ -96,11 +97,18 @@ def noise_growth(segment: Segment, model: Model, values: Values, near: Values, s
 
 
 def _noise_of_few(segment: Segment, model: Model, values: Values, seed: int) -> Array:
-    """Variance of the weak residual [groups] by a few samples of its noise and roundings."""
+    """Variance of the weak residual [groups] by a few samples of its noise and roundings. These are
+    kept: a search asks for them at every fit that it tries.
+    """
     for effect in model.effects:
         values = {**zero(effect, model), **values}
     recording, few = _Recording.of(segment, model, values), model.policy.noise_floors.few
-    return recording.pooled([*recording.changes(seed, few), *recording.roundings(few)]) + 1e-300
+    by = seed, model.machine.pole_pairs, model.policy
+    known = segment.cache.get("few")
+    if known is None or known[0] is not segment or known[1] != by:
+        recorded = [*recording.noisy(seed, few), *recording.rounded(few)]
+        known = segment.cache["few"] = segment, by, recorded
+    return recording.pooled(map(recording.change, known[2])) + 1e-300
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +133,12 @@ class _Recording:
         group = group[valid]
         counts = np.maximum(np.bincount(group, minlength=len(groups)), 1).astype(float)
         even = _before_rounding(segment, model.policy.sensor_noise)
-        unperturbed = projected(segment, residual(segment, model, values))[valid]
+        sampler: Sampler | None = segment.cache.get("sampler")
+        if sampler is not None and sampler.at(segment, model, values):
+            sampled = sampler.base_residual
+        else:
+            sampled = residual(segment, model, values)
+        unperturbed = projected(segment, sampled)[valid]
         return cls(segment, model, values, even, group, counts, unperturbed)
 
     @property
@@ -144,16 +157,20 @@ class _Recording:
         means = [np.bincount(self.group, one**2, self.counts.size) / self.counts for one in changes]
         return np.mean(means, axis=0) if means else np.zeros(self.counts.size)
 
-    def changes(self, seed: int, count: int) -> Iterator[Array]:
-        """Changes of the weak residual [R] by noise, but for the rounding of an angle."""
+    def noisy(self, seed: int, count: int) -> Iterator[dict[str, Array]]:
+        """The columns with other noise of their sensors, but for the rounding of an angle."""
         shifts = _shifts(self.segment, count, seed)
         for replicate in range(count):
             shift = {name: shifts[name][replicate] for name in self.segment.sensors.steps}
             generator = np.random.default_rng([seed, replicate])
-            yield self.change(_noisy(self.segment, self.even, shift, generator))
+            yield _noisy(self.segment, self.even, shift, generator)
 
     def roundings(self, count: int) -> Iterator[Array]:
-        """Changes of the weak residual [R] by the rounding of an angle, none where it is not.
+        """Changes of the weak residual [R] by the rounding of an angle, none where it is not."""
+        return map(self.change, self.rounded(count))
+
+    def rounded(self, count: int) -> Iterator[dict[str, Array]]:
+        """The columns with an angle that is rounded anew, none where it is not rounded.
 
         A rounded angle shows neither where between two steps it began nor, to a step a window, how
         fast it was: both are spread evenly.
@@ -171,7 +188,7 @@ class _Recording:
             )
             moved_rad = theta + parabolas(error, sensors.parabola)
             turned = self._in_turned_frame(error)
-            yield self.change({**turned, "theta_mech_rad": moved_rad})
+            yield {**turned, "theta_mech_rad": moved_rad}
 
     def _in_turned_frame(self, error_rad: Array) -> dict[str, Array]:
         """The columns [n] with those of the rotor frame in one that is ahead by an error [rad] of
@@ -214,14 +231,15 @@ def _noisy(
     coarse signals are moved.
     """
     sensors = segment.sensors
-    noisy = {
-        name: column + _smoothed(segment, name, generator.normal(size=column.size))
-        for name, column in segment.recorded.items()
-    }
+    noisy = {}
+    for name, column in segment.recorded.items():
+        noise = _smoothed(segment, name, generator.normal(size=column.size))
+        noisy[name] = column + noise if noise.any() else column
     if sensors.speed_noise_rad_s is not None:
-        noisy["theta_mech_rad"] += generator.uniform(0.0, 2.0 * math.pi)
+        anywhere = generator.uniform(0.0, 2.0 * math.pi)
+        noisy["theta_mech_rad"] = noisy["theta_mech_rad"] + anywhere
     for name, step in sensors.steps.items():
-        noisy[name] += rounding_error(even[name], step, shift[name])
+        noisy[name] = noisy[name] + rounding_error(even[name], step, shift[name])
     if sensors.angle_step_rad:
         noisy["theta_mech_rad"] = segment.recorded["theta_mech_rad"]
     return noisy

@@ -48,7 +48,7 @@ def with_free_shares(system: LinearSystem) -> LinearSystem | None:
         return None
     machine, names = fit.model.machine, SHARES[test]
     free = replace(machine, stated_u={**machine.stated_u, **dict.fromkeys(names, _FREE)})
-    tried = gauss_newton(replace(fit, model=replace(fit.model, machine=free)))
+    tried = gauss_newton(replace(fit, model=replace(fit.model, machine=free)), before=system)
     gain = system.deviance - tried.deviance - penalty * len(names)
     return tried if gain > least else None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,8 @@ from pipeline.criticism.parameter import UNLOGGED, WARMING, Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.angle_sensor import angle_error, frame_turn, zero_angle
 
+Number = TypeVar("Number", np.float64, np.int64)
+
 
 @dataclass(frozen=True, slots=True)
 class Motion:
@@ -52,7 +55,8 @@ class Motion:
 
 
 def on_true_clock(segment: Segment, recorder: str | None, model: Model, values: Values) -> Segment:
-    """The segment with its true sample period in place of the recorded one.
+    """The segment with its true sample period in place of the recorded one. The last one is kept:
+    state, reading and prediction of a point are all asked for it.
 
     Parameters
     ----------
@@ -67,7 +71,14 @@ def on_true_clock(segment: Segment, recorder: str | None, model: Model, values: 
 
     """
     gain = clock_gain(recorder, model, values)
-    return replace(segment, ts_s=segment.ts_s / (1.0 + gain)) if gain else segment
+    if not gain:
+        return segment
+    known = segment.cache.get("true clock")
+    if known is None or known[0] is not segment or known[1] != gain:
+        paced = replace(segment, ts_s=segment.ts_s / (1.0 + gain))
+        known = segment.cache["true clock"] = segment, gain, paced
+    paced_before: Segment = known[2]
+    return paced_before
 
 
 def at_rest(size: int) -> Motion:
@@ -335,7 +346,7 @@ def _warmth(segment: Segment, signals: Signals, name: str, size: int, values: Va
         rise = sum(values[one] for one in segment.fixed if one.startswith(WARMING[name]))
         return segment.fixed["ambient_k"] + warmed + rise * np.linspace(-0.5, 0.5, size)
     warm = signals[name] - 25.0 - values["offset_temp_k"]
-    return np.repeat(warm, size // warm.size)
+    return _held(warm, size)
 
 
 def _travel(signals: Signals, size: int) -> Array:
@@ -350,20 +361,26 @@ def _travel(signals: Signals, size: int) -> Array:
     return np.where(known[at.astype(np.int64)], turned, np.inf)
 
 
+def _held(column: NDArray[Number], size: int) -> NDArray[Number]:
+    """A column [n] at every point [n m] of its samples; the column itself where m is 1."""
+    points = size // column.size
+    return column if points == 1 else np.repeat(column, points)
+
+
 def _run(signals: Signals, size: int) -> NDArray[np.int64]:
     run = signals.get("run")
     if run is None:
         return np.zeros(size, dtype=np.int64)
-    return np.repeat(run.astype(np.int64), size // run.size)
+    return _held(run.astype(np.int64), size)
 
 
 def _age(segment: Segment, size: int, machine: Machine) -> Array | None:
     """Time since the capture began [n m, s], where friction may change with it."""
     if EARLY_S not in machine.stated_u or EARLY_S not in segment.fixed:
         return None
-    return np.repeat(clock(segment), size // segment.size)
+    return _held(clock(segment), size)
 
 
 def _torque_behind(signals: Signals, size: int) -> Array | None:
     behind = signals.get("behind_nm")
-    return None if behind is None else np.repeat(behind, size // behind.size)
+    return None if behind is None else _held(behind, size)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pipeline.criticism.data.machine_scale import counted_pole_pairs
-from pipeline.estimation.registry import fit_all
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 
@@ -30,4 +29,8 @@ def start_constants(campaign: Campaign, fitted: Constants | None = None) -> Cons
     """
     if not starts_from_fits(campaign):
         return Constants()
-    return fit_all(campaign, {})[0] if fitted is None else fitted
+    if fitted is not None:
+        return fitted
+    from pipeline.estimation.registry import fit_all  # imports scipy, and most campaigns do without
+
+    return fit_all(campaign, {})[0]
