@@ -36,6 +36,10 @@ class Supply:
         Time for which a voltage vector is constant while the rotor turns [s]; 0 where not known.
     measured
         Whether the voltage is stated to be measured, so that nothing of the inverter is in it.
+    hold_ends
+        Of a log of snapshots from one of which to the next the rotor turns far: where the vector
+        of a sample begins and ends, behind the sample [s], and by what the current exceeds the
+        sample's there [n, A]; None for any other log.
 
     """
 
@@ -45,6 +49,7 @@ class Supply:
     q_alone: bool = False
     hold_s: float = 0.0
     measured: bool = False
+    hold_ends: tuple[tuple[float, Complex], tuple[float, Complex]] | None = None
 
 
 @dataclass(frozen=True, slots=True)

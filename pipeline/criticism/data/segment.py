@@ -82,6 +82,8 @@ class Instrument:
         inertia of the rotor is in; else it is in the shaft.
     points
         Points a sample that a logged voltage is the mean of; 1 of a log as fast as its PWM.
+    snapshots
+        Whether a logged voltage is one vector, from one of which to the next the rotor turns far.
 
     """
 
@@ -92,6 +94,7 @@ class Instrument:
     frame: float = 0.0
     stator: bool = False
     points: int = 1
+    snapshots: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,12 +31,12 @@ from pipeline.criticism.signals.shaft import (
     torque_reading,
     true_load,
 )
-from pipeline.criticism.signals.true_current import drive_current
+from pipeline.criticism.signals.true_current import between, drive_current
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
+    averaging,
     motion_of,
     operating,
-    points_of_mean,
 )
 from pipeline.criticism.signals.voltage import (
     ahead,
@@ -111,7 +111,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     return replace(
         segment,
         unthinned=Unthinned(full, log),
-        instrument=replace(segment.instrument, points=points_of_mean(segment, machine)),
+        instrument=averaging(segment, machine),
     )
 
 
@@ -138,13 +138,26 @@ def state(segment: Segment, signals: Signals, model: Model, values: Values) -> O
     motion = motion_of(segment, signals, model.machine, segment.instrument.points)
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     x = operating(segment, signals, model, values, current, motion)
+    ends = _hold_ends(segment, x, current, model) if segment.instrument.snapshots else None
     volts = (signals["vd_v"] + 1j * signals["vq_v"]).astype(np.complex128)
     volts = volts * (1.0 / (1.0 + values[segment.instrument.meter]))
     volts = on_points(volts, motion.theta_rad.size)
     if segment.instrument.frame:
         turn = model.machine.pole_pairs * motion.omega_rad_s * x.supply.hold_s
         volts = volts * np.exp(-1j * segment.instrument.frame * turn)
-    return at_true_angle(segment, x.fed(volts_v=volts), model, values)
+    return at_true_angle(segment, x.fed(volts_v=volts, hold_ends=ends), model, values)
+
+
+def _hold_ends(
+    segment: Segment, x: Operating, current: Complex, model: Model
+) -> tuple[tuple[float, Complex], tuple[float, Complex]]:
+    """When the vector that a snapshot shows begins and ends, and the current then
+    (`Supply.hold_ends`).
+    """
+    begin, end = (segment.instrument.frame + part for part in (-0.5, 0.5))
+    parts = (begin * x.supply.hold_s / segment.ts_s, end * x.supply.hold_s / segment.ts_s)
+    first, last = between(segment, current, model, parts).reshape(-1, 2).T
+    return (begin * x.supply.hold_s, first - current), (end * x.supply.hold_s, last - current)
 
 
 def measured(segment: Segment, signals: Signals, model: Model, values: Values) -> Array:

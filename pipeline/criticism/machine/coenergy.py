@@ -9,7 +9,7 @@ References: Woodson & Melcher, Electromechanical Dynamics (1968), ch. 3 (torque 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -104,6 +104,48 @@ def effect_flux(effect: Hooks, x: Operating, q: Values) -> tuple[Complex, Array]
     if not x.once(x.eps_rad, (hook, used), lambda: _turns(hook, first, q)):
         return flux, np.zeros(shape)
     return flux, slope(replace(x, eps_rad=_stepped(x, x.eps_rad)))
+
+
+def unsampled_voltage(flux: Callable[[Operating], Complex], x: Operating) -> Complex:
+    """Voltage of a flux that differences between far samples miss.
+
+    Parameters
+    ----------
+    flux
+        Flux linkage [n, Wb] of a state.
+    x
+        State of the machine [n].
+
+    Returns
+    -------
+    array [n], complex
+        d + jq [V]; zero but of snapshots between which the rotor turns far.
+
+    Notes
+    -----
+    A vector that is held for h has the mean (ψ_end − ψ_begin)/h + jω (ψ_begin + ψ_end)/2. Samples
+    show (ψ_(k+1) − ψ_(k−1))/2T + jω ψ_k.
+
+    """
+    if x.supply.hold_ends is None:
+        return np.zeros(x.omega_rad_s.shape, dtype=complex)
+    omega = x.machine.pole_pairs * x.omega_rad_s
+    (begin_s, begin_a), (end_s, end_a) = x.supply.hold_ends
+    begin, end = (
+        flux(
+            replace(
+                x,
+                id_a=x.id_a + more_a.real,
+                iq_a=x.iq_a + more_a.imag,
+                eps_rad=x.eps_rad + omega * later_s,
+                cache={},
+            )
+        )
+        for later_s, more_a in ((begin_s, begin_a), (end_s, end_a))
+    )
+    sampled = flux(x)
+    held: Complex = (end - begin) / (end_s - begin_s) + 0.5j * omega * (begin + end)
+    return held - np.gradient(sampled, x.ts_s) - 1j * omega * sampled
 
 
 def _stepped(x: Operating, column: Array) -> Complex:

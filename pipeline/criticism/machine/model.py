@@ -19,7 +19,13 @@ from functools import partial
 import numpy as np
 
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.machine.coenergy import air_gap_torque, base_flux, effect_flux, flux_of
+from pipeline.criticism.machine.coenergy import (
+    air_gap_torque,
+    base_flux,
+    effect_flux,
+    flux_of,
+    unsampled_voltage,
+)
 from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import Array, Complex, Noted, Operating, Values
 from pipeline.criticism.parameter import WARMING, Machine, Parameter
@@ -393,8 +399,18 @@ def evaluate(model: Model, x: Operating, values: Values, hooks: frozenset[str] =
     x.psi_wb = flux
     x.torque_em_nm = air_gap_torque(x, flux, slope)
     drop = _drops(model, x, values) if "drop" in hooks else np.zeros_like(flux)
+    if "drop" in hooks and x.supply.hold_ends is not None:
+        drop = drop + unsampled_voltage(lambda at: base_flux(at, values), x)
+        for effect in model.effects:
+            if effect.coenergy is not None:
+                q = values_of(effect, model.machine, values)
+                drop = drop + unsampled_voltage(partial(_flux_of, effect, q), x)
     drag = _drags(model, x, values) if "torque" in hooks else np.zeros_like(slope)
     return Pieces(flux, slope, drop, drag)
+
+
+def _flux_of(effect: Effect, q: Values, x: Operating) -> Complex:
+    return effect_flux(effect, x, q)[0]
 
 
 def _drops(model: Model, x: Operating, values: Values) -> Complex:

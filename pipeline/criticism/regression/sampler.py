@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
-from pipeline.criticism.machine.coenergy import effect_flux, flux_of
+from pipeline.criticism.machine.coenergy import effect_flux, flux_of, unsampled_voltage
 from pipeline.criticism.machine.model import (
     CURVED,
     LATE_TORQUE,
@@ -280,6 +280,11 @@ class Sampler:
         x, drop, torque, parallel = self.x, effect.drop, effect.torque, effect.parallel
         if effect.coenergy is not None:
             yield "flux", lambda q: effect_flux(effect, x, q)
+            if "drop" in self.hooks and x.supply.hold_ends is not None:
+                yield (
+                    "unsampled",
+                    lambda q: unsampled_voltage(lambda at: effect_flux(effect, at, q)[0], x),
+                )
         if drop is not None and "drop" in self.hooks:
             yield "drop", lambda q: drop(self.mean, q)
         if torque is not None:
@@ -294,7 +299,8 @@ class Sampler:
         flux, slope = results.get("flux", (still, nothing))
         if "beside" in results:
             flux = flux - results["beside"]
-        return Pieces(flux, slope, results.get("drop", still), results.get("drag", nothing))
+        drop = results.get("drop", still) + results.get("unsampled", still)
+        return Pieces(flux, slope, drop, results.get("drag", nothing))
 
 
 def _difference(after: Pieces, before: Pieces) -> Pieces:

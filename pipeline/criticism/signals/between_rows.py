@@ -8,6 +8,7 @@ another one: some dozens of rows determine the waves.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Self
@@ -39,10 +40,32 @@ def on_points(signal: Complex, size: int) -> Complex:
         The last sample is held.
 
     """
-    if signal.size == size:
-        return signal
-    at = np.arange(size) * (signal.size / size)
-    return np.interp(at, np.arange(signal.size), signal)
+    return signal if signal.size == size else at_parts(signal, evenly(size // signal.size))
+
+
+def evenly(points: int) -> tuple[float, ...]:
+    """Where so many points are behind a sample [samples]."""
+    return tuple(n / points for n in range(points))
+
+
+def at_parts(signal: Complex, parts: Sequence[float]) -> Complex:
+    """A signal at parts of a sample behind each sample, on straight lines between samples.
+
+    Parameters
+    ----------
+    signal
+        At the samples [n, any unit].
+    parts
+        Of a sample, negative before it [p].
+
+    Returns
+    -------
+    array [n p]
+        By sample; what is before the first or behind the last is held.
+
+    """
+    samples = np.arange(signal.size)
+    return np.interp((samples[:, None] + np.array(parts)).ravel(), samples, signal)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +79,7 @@ class Waves:
     fit
         Size of each wave by the current of these rows [b, k, w].
     places
-        Points [b, p] of each block; those of overlapping blocks are the same.
+        Points [b, p] of each block, of as many a row as it was made for.
     beyond
         Of each wave the part [b, p, k] that straight lines between rows miss.
 
@@ -69,7 +92,12 @@ class Waves:
 
     @classmethod
     def of(
-        cls, segment: Segment, current: Complex, eps_rad: Array, points: int, policy: Ripple
+        cls,
+        segment: Segment,
+        current: Complex,
+        eps_rad: Array,
+        parts: Sequence[float],
+        policy: Ripple,
     ) -> Self:
         """The waves of a log.
 
@@ -81,8 +109,8 @@ class Waves:
             Of the rows [n, A]: how much of it are waves.
         eps_rad
             Electrical angle of the rows [n].
-        points
-            Points a row.
+        parts
+            Where its points are behind each row [rows].
         policy
             Rows a block, and how sure waves are to be.
 
@@ -94,24 +122,26 @@ class Waves:
         """
         width, step = policy.rows, policy.rows // 4
         blocks = [
-            (first, min(max(first - (width - step) // 2, start), end - width), end)
+            (first, min(max(first - (width - step) // 2, start), end - width), start, end)
             for start, end in _runs(segment, eps_rad.size)
             if end - start >= width
             for first in range(start, end, step)
         ]
-        firsts, lows, ends = np.array(blocks, dtype=np.int64).reshape(-1, 3).T[:, :, None]
+        firsts, lows, starts, ends = np.array(blocks, dtype=np.int64).reshape(-1, 4).T[:, :, None]
         rows = lows + np.arange(width)
         waves = _waves(eps_rad[rows])
         halves = np.arange(round(2.0 * policy.slow * width))
         slow, _ = np.linalg.qr(np.cos(np.pi / width * np.outer(np.arange(width) + 0.5, halves)))
         apart = waves - slow @ (slow.T @ waves)
         fit = _fitted(apart, slow, current[rows], policy.sure)
-        at = np.minimum(firsts + np.arange(step * points) / points, ends - 1)
+        row, part = np.divmod(np.arange(step * len(parts)), len(parts))
+        own = np.minimum(firsts + row, ends - 1)
+        at = np.clip(own + np.array(parts)[part], starts, ends - 1)
         before = np.minimum(at.astype(np.int64), ends - 2)
-        part = (at - before)[:, :, None]
+        share = (at - before)[:, :, None]
         eps = np.interp(at, np.arange(eps_rad.size), eps_rad)
-        straight = (1.0 - part) * _waves(eps_rad[before]) + part * _waves(eps_rad[before + 1])
-        return cls(rows, fit, np.rint(points * at).astype(np.int64), _waves(eps) - straight)
+        straight = (1.0 - share) * _waves(eps_rad[before]) + share * _waves(eps_rad[before + 1])
+        return cls(rows, fit, len(parts) * own + part, _waves(eps) - straight)
 
     def added(self, current: Complex, size: int) -> Complex:
         """What the waves add to straight lines.

@@ -9,9 +9,10 @@ import numpy as np
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import Model, values_of
-from pipeline.criticism.operating import Array, Complex, Recorded, Signals, Values, between
+from pipeline.criticism.operating import Array, Complex, Recorded, Signals, Values
+from pipeline.criticism.operating import between as interpolated
 from pipeline.criticism.signals.angle_sensor import both_axes
-from pipeline.criticism.signals.between_rows import Waves, on_points
+from pipeline.criticism.signals.between_rows import Waves, at_parts, evenly
 
 
 def drive_current(
@@ -38,28 +39,73 @@ def drive_current(
         d + jq [A].
 
     """
+    current = row_current(segment, signals, model, values)
+    return (
+        current
+        if size == current.size
+        else between(segment, current, model, evenly(size // current.size))
+    )
+
+
+def row_current(segment: Segment, signals: Signals, model: Model, values: Values) -> Complex:
+    """True current of a drive's log at its rows.
+
+    Parameters
+    ----------
+    segment
+        The log.
+    signals
+        Recorded columns [n].
+    model
+        Effects of the current sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [n], complex
+        d + jq [A].
+
+    """
     recorded = _recorded(segment, signals, model)
     zero = values["zero_alpha_a"] + 1j * values["zero_beta_a"]
     if zero and both_axes(segment):
         eps, theta, pairs = recorded.eps_rad, signals["theta_mech_rad"], model.machine.pole_pairs
         back = segment.once(theta, "back", pairs, lambda: np.exp(-1j * eps))
         recorded = replace(recorded, i_a=recorded.i_a - zero * back)
-    current = true_current(recorded, segment.instrument.ammeter, model, values)
-    if size == current.size:
-        return current
-    return on_points(current, size) + _waves(segment, model, size).added(current, size)
+    return true_current(recorded, segment.instrument.ammeter, model, values)
 
 
-def _waves(segment: Segment, model: Model, size: int) -> Waves:
-    """The waves of the current that a log recorded, at so many points."""
+def between(segment: Segment, current: Complex, model: Model, parts: tuple[float, ...]) -> Complex:
+    """A log's current between its rows: straight lines, and waves of the angle on them.
+
+    Parameters
+    ----------
+    segment
+        The log.
+    current
+        At its rows [n, A].
+    model
+        Pole pairs and policy.
+    parts
+        Where points are behind each row [p, rows].
+
+    Returns
+    -------
+    array [n p], complex
+        By row, in A.
+
+    """
     signals, pairs, policy = segment.recorded, model.machine.pole_pairs, model.policy.ripple
-    theta, points = signals["theta_mech_rad"], size // segment.size
+    theta = signals["theta_mech_rad"]
 
     def made() -> Waves:
-        current = _recorded(segment, signals, model).i_a
-        return Waves.of(segment, current, pairs * theta, points, policy)
+        recorded = _recorded(segment, signals, model).i_a
+        return Waves.of(segment, recorded, pairs * theta, parts, policy)
 
-    return segment.once(theta, "waves", (points, pairs, policy), made)
+    waves = segment.once(theta, "waves", (parts, pairs, policy), made)
+    lines = at_parts(current, parts)
+    return lines + waves.added(current, lines.size)
 
 
 def table_current(
@@ -156,7 +202,7 @@ def ahead_in(
     columns, now = segment.once(rows, "whole", None, whole)
 
     def ahead(delay_s: float) -> tuple[Complex, Array, Array]:
-        later = between(columns, at + delay_s / segment.ts_s)
+        later = interpolated(columns, at + delay_s / segment.ts_s)
         change = dict(zip(log, later - now, strict=True))
         zero = np.zeros(at.size)
         current = change.get("id_a", zero) + 1j * change.get("iq_a", zero)

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import Segment, clock, slow_orders
+from pipeline.criticism.data.segment import Instrument, Segment, clock, slow_orders
 from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.machine.model import (
     EARLY_S,
@@ -154,8 +154,8 @@ def finer_of(segment: Segment, machine: Machine, finest: int) -> int:
     return min(max(int(np.ceil(turn / policy.part_rad)), policy.least_parts), finest)
 
 
-def points_of_mean(segment: Segment, machine: Machine) -> int:
-    """How many points a sample a logged voltage is the mean of.
+def averaging(segment: Segment, machine: Machine) -> Instrument:
+    """The recorder of a log, with how many points of a sample its voltages are the mean of.
 
     Parameters
     ----------
@@ -166,17 +166,18 @@ def points_of_mean(segment: Segment, machine: Machine) -> int:
 
     Returns
     -------
-    int
-        1 of a log as fast as its PWM, of an instant, and where no order turns far in a sample; else
-        an even number.
+    Instrument
+        With 1 point of a log as fast as its PWM, of snapshots, and where no order turns far in a
+        sample; else an even number.
 
     """
     motion, policy = motion_of(segment, segment.recorded, machine), machine.policy.cutting
-    held = hold_s(segment, motion.omega_rad_s, machine) == segment.ts_s
-    if held or segment.instrument.timing == "instant":
-        return 1
     points = finer_of(segment, machine, policy.mean_points)
-    return points if points == 1 else 2 * ((points + 1) // 2)
+    if points == 1 or hold_s(segment, motion.omega_rad_s, machine) == segment.ts_s:
+        return segment.instrument
+    if segment.instrument.timing == "instant":
+        return replace(segment.instrument, snapshots=True)
+    return replace(segment.instrument, points=2 * ((points + 1) // 2))
 
 
 def operating(

@@ -9,11 +9,12 @@ import pytest
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.policy.machine import Ripple
-from pipeline.criticism.signals.between_rows import Waves, on_points
+from pipeline.criticism.signals.between_rows import Waves, evenly, on_points
 from tests.unit.criticism.machines import log
 
 ROWS, POINTS, ROW_S = 400, 8, 1e-3
 POLICY = Ripple()
+PARTS = evenly(POINTS)
 AT = np.arange(ROWS * POINTS) / POINTS
 NOISE = 0.004 * np.random.default_rng(3).normal(size=(ROWS, 2)) @ (1.0, 1.0j)
 
@@ -38,7 +39,7 @@ def missed(turn_rad: float, ripple: float = 1.0, t_s: np.ndarray | None = None) 
     true = slow(AT) + ripple * rippling(eps)
     current = true[::POINTS] + NOISE
     segment = clock(ROW_S * np.arange(ROWS) if t_s is None else t_s)
-    waves = Waves.of(segment, current, eps[::POINTS], POINTS, POLICY)
+    waves = Waves.of(segment, current, eps[::POINTS], PARTS, POLICY)
     lines = on_points(current, AT.size)
     with_waves = lines + waves.added(current, AT.size)
     return tuple(np.std((one - true)[8:-8]) for one in (lines, with_waves))
@@ -62,14 +63,14 @@ def test_a_wave_that_every_row_has_at_nearly_the_same_phase_is_a_slow_current() 
     current = slow(AT)[::POINTS] + NOISE
     current[ROWS // 2 :] += 2.0
     eps = turn_rad * np.arange(ROWS)
-    waves = Waves.of(clock(ROW_S * np.arange(ROWS)), current, eps, POINTS, POLICY)
+    waves = Waves.of(clock(ROW_S * np.arange(ROWS)), current, eps, PARTS, POLICY)
     assert np.abs(waves.added(current, AT.size)).max() < 0.01
 
 
 def test_a_step_of_the_current_is_no_wave() -> None:
     current = slow(AT)[::POINTS] + NOISE
     current[ROWS // 2 :] += 2.0
-    waves = Waves.of(clock(ROW_S * np.arange(ROWS)), current, 1.6 * np.arange(ROWS), POINTS, POLICY)
+    waves = Waves.of(clock(ROW_S * np.arange(ROWS)), current, 1.6 * np.arange(ROWS), PARTS, POLICY)
     assert np.abs(waves.added(current, AT.size)).max() < 0.01
 
 

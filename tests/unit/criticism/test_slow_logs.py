@@ -14,7 +14,7 @@ from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import operate, residual
-from pipeline.criticism.signals.true_state import points_of_mean
+from pipeline.criticism.signals.true_state import averaging
 from pipeline.criticism.signals.voltage import mean_voltage, rotor_voltage
 from tests.unit.criticism.machines import (
     BASE,
@@ -58,9 +58,8 @@ def slow_log(turn_rad: float, timing: str = "centred"):
     )
 
 
-def averaging(segment):
-    points = points_of_mean(segment, PLAIN.machine)
-    return replace(segment, instrument=replace(segment.instrument, points=points))
+def as_cut(segment):
+    return replace(segment, instrument=averaging(segment, PLAIN.machine))
 
 
 @pytest.mark.parametrize("points", [8, 16])
@@ -90,7 +89,7 @@ def test_a_mean_over_a_sample_is_that_of_the_closed_form(points):
 def test_a_dead_time_is_in_a_mean_as_its_mean():
     """The loss of each leg by the sign of its current, averaged at 2,000 instants a sample."""
     loss, width, turn = 0.2, 0.05, 2.3
-    segment = averaging(slow_log(turn))
+    segment = as_cut(slow_log(turn))
     effect = LIBRARY["dead_time"]
     model = PLAIN.with_effects(effect)
     values = {**BASE, **zero(effect, model)}
@@ -117,8 +116,39 @@ def test_a_dead_time_is_in_a_mean_as_its_mean():
     assert sampled.std() > 0.1 * loss, "an instant of the loss is not its mean"
 
 
+@pytest.mark.parametrize("frame", [0.0, 0.5])
+def test_a_snapshot_of_a_wave_is_its_mean_over_the_hold_of_one_vector(frame):
+    """ψ = ψ_m + ψ_m a e^{j6ε} by the harmonics of a back-EMF, whose mean over a turn is a sinc."""
+    turn, hold_s, a = 2.3, 5e-5, 0.004
+    segment = slow_log(turn, "instant")
+    segment = replace(segment, instrument=replace(segment.instrument, frame=frame))
+    segment = as_cut(segment)
+    omega, held = turn / segment.ts_s, turn * hold_s / segment.ts_s
+    eps = PAIRS * segment.recorded["theta_mech_rad"] + frame * held
+    share = np.sinc(3.0 * held / np.pi)
+    middle = 0.5 * (np.exp(6j * (eps + 0.5 * held)) + np.exp(6j * (eps - 0.5 * held)))
+    wave = 1j * omega * BASE["psi_wb"] * a * (6.0 * share * np.exp(6j * eps) + middle)
+    turned = wave * np.exp(1j * frame * held)
+    recorded = dict(segment.recorded)
+    clean = recorded["vd_v"] + 1j * recorded["vq_v"]
+    # what a held vector of the still machine is at the middle of its hold, in the frame of a sample
+    clean = clean / np.sinc(held / (2.0 * np.pi)) * np.exp(1j * frame * held)
+    recorded |= {"vd_v": (clean + turned).real, "vq_v": (clean + turned).imag}
+    effect = LIBRARY["bemf_harmonics"]
+    model = PLAIN.with_effects(effect)
+    values = {**BASE, **zero(effect, model)}
+    # a e^{j6ε} is a cos on the d axis and a sin on the q axis
+    values |= {"bemf_harmonics.d6_cos": a, "bemf_harmonics.q6_sin": a}
+    segment = replace(segment, recorded=recorded)
+    left = residual(segment, model, values)[:2, 5:-5]
+    size = np.abs(wave).mean()
+    assert np.abs(left).max() < 0.02 * size
+    plain = replace(segment, instrument=replace(segment.instrument, snapshots=False))
+    assert np.abs(residual(plain, model, values)[:2, 5:-5]).max() > 0.5 * size
+
+
 def test_the_state_between_rows_has_the_waves_of_the_current():
-    segment = averaging(slow_log(1.6))
+    segment = as_cut(slow_log(1.6))
     eps = PAIRS * np.interp(
         np.arange(SIZE * segment.instrument.points) / segment.instrument.points,
         np.arange(SIZE),
@@ -143,18 +173,18 @@ def test_the_state_between_rows_has_the_waves_of_the_current():
     ],
 )
 def test_only_means_over_a_far_turn_need_more_points_than_samples(turn, timing, many):
-    assert (points_of_mean(slow_log(turn, timing), PLAIN.machine) > 1) == many
+    assert (averaging(slow_log(turn, timing), PLAIN.machine).points > 1) == many
 
 
 def test_a_log_as_fast_as_its_pwm_holds_one_vector_a_sample():
     segment = slow_log(2.3)
     fast = replace(segment, fixed={**segment.fixed, "pwm_s": segment.ts_s})
-    assert points_of_mean(fast, PLAIN.machine) == 1
+    assert averaging(fast, PLAIN.machine) == fast.instrument
 
 
 @pytest.mark.parametrize("timing", ["centred", "held"])
 def test_a_sound_machine_leaves_nothing_in_a_slow_log(timing):
-    segment = averaging(slow_log(2.3, timing))
+    segment = as_cut(slow_log(2.3, timing))
     left = residual(segment, PLAIN, BASE)[:2, 5:-5]
     assert np.abs(left).max() < 1e-6 * np.abs(segment.recorded["vq_v"]).max()
     x = operate(segment, segment.recorded, PLAIN, BASE)
