@@ -400,17 +400,17 @@ def evaluate(model: Model, x: Operating, values: Values, hooks: frozenset[str] =
     x.torque_em_nm = air_gap_torque(x, flux, slope)
     drop = _drops(model, x, values) if "drop" in hooks else np.zeros_like(flux)
     if "drop" in hooks and x.supply.hold_ends is not None:
-        drop = drop + unsampled_voltage(lambda at: base_flux(at, values), x)
-        for effect in model.effects:
-            if effect.coenergy is not None:
-                q = values_of(effect, model.machine, values)
-                drop = drop + unsampled_voltage(partial(_flux_of, effect, q), x)
+        drop = drop + unsampled_voltage(lambda at: _flux(model, at, values), x)
     drag = _drags(model, x, values) if "torque" in hooks else np.zeros_like(slope)
     return Pieces(flux, slope, drop, drag)
 
 
-def _flux_of(effect: Effect, q: Values, x: Operating) -> Complex:
-    return effect_flux(effect, x, q)[0]
+def _flux(model: Model, x: Operating, values: Values) -> Complex:
+    """Flux linkage [n, Wb] of the base and of every effect that has a co-energy."""
+    flux = base_flux(x, values)
+    for effect in model.effects:
+        flux = flux + effect_flux(effect, x, values_of(effect, model.machine, values))[0]
+    return flux
 
 
 def _drops(model: Model, x: Operating, values: Values) -> Complex:
