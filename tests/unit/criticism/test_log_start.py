@@ -15,7 +15,7 @@ from pipeline.simulator.design import Bench
 from tests.simulated import campaign_of, design
 from tests.unit.criticism.test_torsion import SHARE, J, whole
 
-TESTS = ("resistance_ab", "torque_map_slow", "drive_0", "spin_down_forward")
+TESTS = ("resistance_ab", "torque_map_slow", "torque_map_backward", "drive_0", "spin_down_forward")
 BENCH = Bench(torque_in_coupling=True, encoder_bits=14)
 
 
