@@ -130,7 +130,8 @@ def check(
     --------
     >>> import pipeline
     >>> import polars as pl
-    >>> fits = pipeline.fit(pipeline.read("data/demo", motor="G52-1402"))
+    >>> recordings = pipeline.read("data/demo", motor="G52-1402")
+    >>> fits = pipeline.fit(recordings.only(tests=("resistance",)))
     >>> sheets = pipeline.check(fits, model=None)
     >>> sheets["G52-1402"].status
     'refused'

@@ -182,7 +182,8 @@ def fit(
     --------
     >>> import pipeline
     >>> import polars as pl
-    >>> fits = pipeline.fit(pipeline.read("data/demo", motor="G52-0601"))
+    >>> recordings = pipeline.read("data/demo", motor="G52-0601")
+    >>> fits = pipeline.fit(recordings.only(tests=("open_circuit",)))
     >>> row = fits.constants.row(by_predicate=pl.col("constant") == "pole_pairs", named=True)
     >>> row["value"], row["status"]
     (7.0, 'measured')

@@ -22,6 +22,7 @@ from pipeline.stages.steps import motor
 from tests.registered import NOON
 
 KT_NM_A = 0.748
+QUICK = ("report=false", "recordings=false", "residual_test=false")
 MAP = """about: log of a hall bench
 recognise:
   header: "^time;Iq;Torque;Speed;Ud;Uq;Id"
@@ -79,7 +80,7 @@ class Hall:
     def run(self, output: Path | None = None, *more: str) -> int:
         words = [f"input={self.input}", f"output={output or self.output}", "workers=1"]
         words.append(f"config_dir={self.conf}")
-        return main(["run", *words, "report=false", "recordings=false", *more])
+        return main(["run", *words, *QUICK, *more])
 
     def sheet(self, output: Path | None = None) -> tuple[bytes, dict[str, Any]]:
         (path,) = ((output or self.output) / "datasheets").iterdir()
@@ -233,8 +234,19 @@ ELSEWHERE = {
 }
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """The results of a run that states none of these settings."""
+    with pytest.MonkeyPatch.context() as patch:
+        hall = Hall(tmp_path_factory.mktemp("plain"), patch)
+        hall.run(None, "report=true")
+    return hall.results(hall.output)
+
+
 @pytest.mark.parametrize("name", sorted(ELSEWHERE))
-def test_what_no_key_holds_changes_no_byte(hall: Hall, tmp_path: Path, name: str) -> None:
+def test_what_no_key_holds_changes_no_byte(
+    hall: Hall, tmp_path: Path, plain: dict[str, bytes], name: str
+) -> None:
     """Each setting that is left out of the keys of motor and batch."""
     assert set(ELSEWHERE) | OF_DASK | OF_WATCH == keys.NOT_OF_A_BATCH
     assert {"input", "output", "key", "refused"} == keys.NOT_OF_A_MOTOR
@@ -242,7 +254,6 @@ def test_what_no_key_holds_changes_no_byte(hall: Hall, tmp_path: Path, name: str
     shutil.copytree(hall.conf, tmp_path / "in_another_place")
     output = tmp_path / ("another" if name == "output" else "out")
     words = ["report=true", ELSEWHERE[name].format(place=tmp_path)]
-    hall.run(tmp_path / "plain", "report=true")
     hall.run(None, *words)
-    assert hall.results(output) == hall.results(tmp_path / "plain")
-    assert "report/index.html" in hall.results(output)
+    assert hall.results(output) == plain
+    assert "report/index.html" in plain

@@ -17,13 +17,7 @@ from pipeline.records.model_verdict import number
 DEMO = Path(__file__).parents[2] / "data" / "demo"
 MOTOR = "G52-0603"
 """Its bearing is dry: 2.5 mN·m more below 8 rad/s."""
-NAMES = (
-    "cogging_cw.mcap",
-    "cogging_ccw.mcap",
-    "drive_0.mcap",
-    "torque_map_slow.mcap",
-    "spin_down_forward.mcap",
-)
+NAMES = ("cogging_cw.mcap", "cogging_ccw.mcap", "drive_0.mcap", "spin_down_forward.mcap")
 PROGRAM = "next: python -m pipeline "
 
 

@@ -132,7 +132,7 @@ def test_a_place_where_no_registry_can_be_is_said_before_any_work(bench: Bench) 
     assert not bench.output.exists()
 
 
-QUICK = ("report=false", "recordings=false", "diagnose=false")
+QUICK = ("report=false", "recordings=false", "residual_test=false")
 
 
 def test_the_readme_releases_and_exports_a_motor_of_the_demo(tmp_path: Path) -> None:

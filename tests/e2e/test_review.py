@@ -378,7 +378,7 @@ def test_the_web_viewer_shows_a_motor_in_chromium_and_speaks_to_this_machine_alo
     output: Path, tmp_path: Path
 ) -> None:
     browser_path()
-    with Served(output, tmp_path, f"motor={FAULTY}") as served, Browser((1600, 1000)) as browser:
+    with Served(output, tmp_path, f"motor={FAULTY}") as served, Browser((1000, 640)) as browser:
         session = browser.page(served.address)
         png = settled(browser, session)
         picture = pixels(png)

@@ -29,17 +29,16 @@ JUDGED = (*LIMITS, "b_visc_nm_s_rad", "temp_coeff_copper_1_k", "temp_coeff_magne
 
 
 @pytest.fixture(scope="module")
-def sheets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    """Datasheet of each rig motor, by folder; the model of the second is in a slow test."""
-    return {
-        "P0": sheet_of("P0", tmp_path_factory.mktemp("P0")),
-        "P1": sheet_of("P1", tmp_path_factory.mktemp("P1"), "residual_test=false"),
-    }
+def sheet(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Datasheet of the motor with nothing hidden; tests/unit/estimation/test_real_recordings.py
+    has constants of the others.
+    """
+    return sheet_of("P0", tmp_path_factory.mktemp("P0"))
 
 
-def sheet_of(folder: str, output: Path, *more: str) -> dict[str, Any]:
+def sheet_of(folder: str, output: Path) -> dict[str, Any]:
     words = [f"input={RIG / folder}", f"output={output}", "report=false", "recordings=false"]
-    assert main(["run", *words, *more]) in (0, 1)
+    assert main(["run", *words]) in (0, 1)
     (path,) = (output / "datasheets").iterdir()
     sheet: dict[str, Any] = json.loads(path.read_bytes())
     return sheet
@@ -51,44 +50,33 @@ def truth(folder: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_relative_error_on_the_motor_with_nothing_hidden(
-    sheets: dict[str, dict[str, Any]], name: str
-) -> None:
-    value = sheets["P0"]["constants"][name]["value"]
+def test_relative_error_on_the_motor_with_nothing_hidden(sheet: dict[str, Any], name: str) -> None:
+    value = sheet["constants"][name]["value"]
     assert value == pytest.approx(truth("P0")[name], rel=LIMITS[name])
 
 
 @pytest.mark.parametrize("name", JUDGED)
-def test_truth_lies_in_the_interval(sheets: dict[str, dict[str, Any]], name: str) -> None:
+def test_truth_lies_in_the_interval(sheet: dict[str, Any], name: str) -> None:
     """Every constant within its own 95 % interval (Student's t with its own dof)."""
-    stated = sheets["P0"]["constants"][name]
+    stated = sheet["constants"][name]
     reach = stdtrit(stated["dof"] or 1e9, 0.975) * stated["u"]
     assert abs(stated["value"] - truth("P0")[name]) <= reach
     assert math.isclose(stated["u"], math.hypot(stated["u_a"], stated["u_b"]), rel_tol=1e-9)
 
 
-def test_pole_pairs_are_exact(sheets: dict[str, dict[str, Any]]) -> None:
-    assert [sheets[m]["constants"]["pole_pairs"]["value"] for m in ("P0", "P1")] == [10, 10]
+def test_pole_pairs_are_exact(sheet: dict[str, Any]) -> None:
+    assert sheet["constants"]["pole_pairs"]["value"] == 10
 
 
-def test_no_cogging_is_said_where_there_is_none(sheets: dict[str, dict[str, Any]]) -> None:
-    order = sheets["P0"]["constants"]["cogging_order"]
+def test_no_cogging_is_said_where_there_is_none(sheet: dict[str, Any]) -> None:
+    order = sheet["constants"]["cogging_order"]
     assert (order["status"], order["value"]) == ("not_identifiable", None)
     assert order["note"]
 
 
-def test_cogging_is_found_where_it_is(sheets: dict[str, dict[str, Any]]) -> None:
-    found, known = sheets["P1"]["constants"], truth("P1")
-    assert found["cogging_order"]["value"] == known["cogging_order"]
-    amplitude = found["cogging_amplitude_nm"]
-    reach = stdtrit(amplitude["dof"] or 1e9, 0.975) * amplitude["u"]
-    assert abs(amplitude["value"] - known["cogging_amplitude_nm"]) <= reach
-    assert amplitude["value"] == pytest.approx(known["cogging_amplitude_nm"], rel=0.02)
-
-
-def test_every_check_of_a_sound_motor_holds(sheets: dict[str, dict[str, Any]]) -> None:
+def test_every_check_of_a_sound_motor_holds(sheet: dict[str, Any]) -> None:
     """Nothing but the cogging order, which is not there, and what nobody states stays unjudged."""
-    statuses = {check["name"]: check["status"] for check in sheets["P0"]["checks"]}
+    statuses = {check["name"]: check["status"] for check in sheet["checks"]}
     assert statuses.pop("cogging_order_vs_slots") == "not_evaluated"
     assert statuses.pop("stated_constants") == "not_evaluated"
     assert set(statuses.values()) == {"pass"}
@@ -96,9 +84,9 @@ def test_every_check_of_a_sound_motor_holds(sheets: dict[str, dict[str, Any]]) -
 
 
 def test_the_motor_with_nothing_hidden_leaves_nothing_over_the_noise(
-    sheets: dict[str, dict[str, Any]],
+    sheet: dict[str, Any],
 ) -> None:
-    model = sheets["P0"]["model"]
+    model = sheet["model"]
     assert (model["verdict"], model["missing"], model["worst"]) == ("adequate", [], None)
     assert 0.4 < model["held_out"] < 1.0
     assert model["residual"] < math.sqrt(2.0)

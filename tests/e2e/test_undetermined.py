@@ -30,6 +30,7 @@ DRY, VISCOUS = TRUE["torque_coulomb_nm"], TRUE["b_visc_nm_s_rad"]
 DRY_NAME = "coulomb_friction.torque_nm"
 DYNAMIC = ("j_kgm2", "b_nm_s_rad", "psi_wb", "r_ohm")
 REACH = 1.96
+QUICK = ("recordings=false", "report=false", "residual_test=false")
 
 
 def recorded(folder: Path, plan: Any, **effects: Any) -> Path:
@@ -84,7 +85,7 @@ def test_j_13000_times_too_small_from_coasts_alone(tmp_path, capsys):
 
 def test_j_from_coasts_alone_is_in_no_datasheet(tmp_path):
     """`run` on the same captures."""
-    sheet = made(recorded(tmp_path / "coasts", COASTS), "run", "recordings=false", "report=false")
+    sheet = made(recorded(tmp_path / "coasts", COASTS), "run", *QUICK)
     for name in ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad", "kt_peak_nm_a"):
         assert sheet["constants"][name]["status"] == "not_identifiable"
         assert sheet["constants"][name]["value"] is None
@@ -109,7 +110,7 @@ def test_psi_7000_times_too_large_from_a_current_map(tmp_path):
 
 def test_psi_from_a_current_map_is_in_no_datasheet(tmp_path):
     folder = recorded(tmp_path / "map", CURRENT_MAP)
-    sheet = made(folder, "run", "recordings=false", "report=false")
+    sheet = made(folder, "run", *QUICK)
     known = {name for name, one in sheet["constants"].items() if one["value"] is not None}
     assert not known & {"psi_pm_wb", "kt_peak_nm_a", "torque_coulomb_nm", "cogging_peak_nm"}
 

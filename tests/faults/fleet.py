@@ -14,6 +14,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from pipeline.__main__ import main
+
 ROOT = Path(__file__).parents[2]
 CAPTURES = ("resistance_ab.csv", "lcr.csv", "torque_map_backward.csv")
 
@@ -21,7 +23,7 @@ CAPTURES = ("resistance_ab.csv", "lcr.csv", "torque_map_backward.csv")
 def simulated(folder: Path) -> Path:
     """The captures of one motor."""
     words = ["simulate", f"output={folder}", "motor=gimbal-5208", "motor_id=fleet", "seed=3"]
-    subprocess.run(command(*words), cwd=ROOT, check=True, capture_output=True)
+    assert main(words) == 0
     return folder
 
 

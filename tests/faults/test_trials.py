@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.__main__ import main
 from tests.faults.bombs import BESIDE, BOMBS, write
 from tests.faults.damage import LAYOUTS, damage
 from tests.faults.fleet import CAPTURES, ROOT, cost, make_fleet, simulated
-from tests.faults.kills import begin, full_disk, kill_runs
+from tests.faults.kills import WORDS, full_disk, kill_runs
 
 FULL = pytest.mark.slow
 
@@ -73,7 +74,7 @@ def test_a_full_disk(one: Path, tmp_path: Path, share: float) -> None:
     The disk takes no file beyond a share of the largest one that a run writes, less a byte.
     """
     folder = make_fleet(one, tmp_path / "in", 1)
-    begin(folder, tmp_path / "whole", tmp_path / "home").communicate()
+    assert main(["run", f"input={folder}", f"output={tmp_path / 'whole'}", *WORDS]) in (0, 4)
     largest = max(p.stat().st_size for p in (tmp_path / "whole").rglob("*") if p.is_file())
     limit_bytes = int(share * largest) - 1
     found = full_disk(folder, tmp_path / "out", tmp_path / "home", limit_bytes)

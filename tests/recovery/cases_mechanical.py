@@ -239,10 +239,10 @@ def _unbounded() -> Mapping[str, float]:
 
 
 CASES = (
-    Case("torque_map", torque_map.ESTIMATOR, _map_trial, _map_bound, few=30),
-    Case("inductance_rated", inductance_rated.ESTIMATOR, _inductance_trial, _unbounded, few=30),
-    Case("cogging", cogging.ESTIMATOR, _cogging_trial, _cogging_bound, few=30),
+    Case("torque_map", torque_map.ESTIMATOR, _map_trial, _map_bound, few=24),
+    Case("inductance_rated", inductance_rated.ESTIMATOR, _inductance_trial, _unbounded, few=24),
+    Case("cogging", cogging.ESTIMATOR, _cogging_trial, _cogging_bound, few=24),
     Case("spin_down", spin_down.ESTIMATOR, _coast_trial, _coast_bound),
-    Case("inertia", inertia.ESTIMATOR, _drive_trial, _unbounded, few=30),
-    Case("drive_voltage", drive_voltage.ESTIMATOR, _voltage_trial, _unbounded, few=30),
+    Case("inertia", inertia.ESTIMATOR, _drive_trial, _unbounded, few=24),
+    Case("drive_voltage", drive_voltage.ESTIMATOR, _voltage_trial, _unbounded, few=24),
 )

@@ -57,7 +57,7 @@ class Case:
     simulate: Callable[[int], Trial]
     bound: Callable[[], Mapping[str, float]]
     options: Mapping[str, float] = field(default_factory=dict)
-    few: int = 60
+    few: int = 40
 
 
 @dataclass(frozen=True)

@@ -41,10 +41,15 @@ def judged(campaign: Campaign, spec: ModelSpec, *, search: bool = False) -> Mode
     return model_verdict(campaign, spec, Constants(), search=search)[0]
 
 
+@cache
+def unsearched() -> ModelVerdict:
+    return judged(only(*FEW), STANDARD)
+
+
 def test_released_with_what_diagnose_calls_missing() -> None:
     """Cogging of 250 noise floors: what it is in, where, and how many floors off."""
     campaign = only(*FEW)
-    found = judged(campaign, STANDARD)
+    found = unsearched()
     assert (found.verdict, found.passed) == ("missing", False)
     assert found.worst is not None
     assert (found.worst.signal, found.worst.order) == ("torque_shaft_nm", 84)
@@ -68,7 +73,7 @@ def test_what_is_missing_is_named_with_its_size() -> None:
     assert found.held_out == told.ladder[0].held_out
     assert found.held_out_with == told.ladder[-1].held_out
     assert found.held_out_with < 1.5 < found.held_out
-    quick = judged(campaign, STANDARD)
+    quick = unsearched()
     assert (quick.verdict, quick.worst, quick.residual) == ("missing", found.worst, found.residual)
     assert (quick.missing, quick.held_out_with) == ({}, None)
     assert "with it, the error falls from " in found.headline()

@@ -17,7 +17,7 @@ from tests.unit.criticism.machines import BASE, machine, operating
 PWM_S, VDC_V, LOSS_V, L_H = 6e-5, 40.0, 0.5, 2.5e-4
 AXES = np.exp(2j * np.pi * np.arange(3) / 3.0)
 TEXTBOOK_V = 4.0 / np.pi * LOSS_V
-STEPS, ROUNDS = 1600, 40
+STEPS, ROUNDS = 1600, 20
 
 
 def point(i_d, i_q, speed, angles=12, l_q=L_H):

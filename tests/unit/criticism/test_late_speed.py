@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import polars as pl
@@ -21,6 +22,7 @@ from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
+from pipeline.records.diagnosis import Diagnosis
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.design import EXACT, Bench
 from pipeline.simulator.truth import truth
@@ -64,10 +66,19 @@ def telemetry(capture: Capture, late: float, low_pass: float) -> Capture:
     return replace(capture, tables=(pl.DataFrame(slow),), meta=meta)
 
 
-def recorded(late: float, low_pass: float = 0.0, seed: int = 3) -> Campaign:
-    whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), seed, PLAN))
-    captures = tuple(telemetry(one, late, low_pass) for one in whole.captures)
-    return replace(whole, captures=captures)
+@cache
+def whole() -> Campaign:
+    return campaign_of(campaign(MOTOR, Bench(instruments=EXACT), 3, PLAN))
+
+
+def recorded(late: float, low_pass: float = 0.0) -> Campaign:
+    captures = tuple(telemetry(one, late, low_pass) for one in whole().captures)
+    return replace(whole(), captures=captures)
+
+
+@cache
+def diagnosed(late: float, low_pass: float) -> Diagnosis:
+    return diagnose(recorded(late, low_pass), ModelSpec(), Constants())
 
 
 def test_the_back_emf_follows_the_angle_where_a_drives_own_speed_is_late() -> None:
@@ -82,11 +93,11 @@ def test_the_back_emf_follows_the_angle_where_a_drives_own_speed_is_late() -> No
 
 @pytest.mark.parametrize("late", [0.0, 1.0])
 def test_a_speed_of_a_period_ago_is_no_missing_effect(late: float) -> None:
-    assert diagnose(recorded(late), ModelSpec(), Constants()).missing == ()
+    assert diagnosed(late, 0.0).missing == ()
 
 
 def test_a_speed_of_three_periods_ago_is_named_with_its_delay() -> None:
-    result = diagnose(recorded(3.0), ModelSpec(), Constants())
+    result = diagnosed(3.0, 0.0)
     assert result.missing == ("sample_delay",)
     found = result.ranking[0].parameters
     assert found["delay_s"][0] == pytest.approx(3.0 * PERIOD_S, rel=0.02)
@@ -96,7 +107,7 @@ def test_a_speed_of_three_periods_ago_is_named_with_its_delay() -> None:
 @pytest.mark.parametrize("low_pass", [0.0, 25.0])
 def test_no_fault_of_its_own_speed_is_the_motors_where_the_angle_counts(low_pass: float) -> None:
     """A delay is named and a long low-pass is not; neither decides what the motor lacks."""
-    result = diagnose(recorded(3.0, low_pass), ModelSpec(), Constants())
+    result = diagnosed(3.0, low_pass)
     assert result.verdict == "insufficient"
     assert result.ladder[0].held_out > 1.5
     assert set(result.missing) <= {"sample_delay"}
@@ -149,17 +160,17 @@ def test_a_jump_of_the_voltage_between_rows_is_an_error_of_its_windows_alone() -
     """A log says what a voltage was at its samples, not when within a period it changed."""
     found = recorded(0.0)
     machine = machine_of(found, Constants())
-    whole = next(one for one in segments(found, machine) if one.kind == "q")
-    system = fit_of([whole], model_of(ModelSpec("ideal"), machine)).system
+    log = next(one for one in segments(found, machine) if one.kind == "q")
+    system = fit_of([log], model_of(ModelSpec("ideal"), machine)).system
     model, values = system.fit.model, system.fit.values
-    place, weak = whole.size // 2, whole.weak
+    place, weak = log.size // 2, log.weak
     assert weak is not None
-    stepped = whole.recorded["vq_v"].copy()
+    stepped = log.recorded["vq_v"].copy()
     stepped[place:] += 5.0
-    jumping = replace(whole, recorded={**whole.recorded, "vq_v": stepped})
+    jumping = replace(log, recorded={**log.recorded, "vq_v": stepped})
     before, after = (
-        reading_error(one, model, values)[whole.channels.index("vq_v"), :, 0]
-        for one in (whole, jumping)
+        reading_error(one, model, values)[log.channels.index("vq_v"), :, 0]
+        for one in (log, jumping)
     )
     near = (weak.starts <= place) & (place < weak.starts + weak.length)
     grown = np.hypot(before, model.policy.noise_floors.reading * 5.0)

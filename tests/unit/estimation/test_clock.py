@@ -40,8 +40,12 @@ def fitted(whole: Campaign, factor: float) -> dict[tuple[str, str], Estimate]:
 
 
 @pytest.fixture(scope="module")
-def both() -> tuple[dict, dict]:
-    whole = campaign_of(campaign(design("gimbal-5208"), Bench(), 3))
+def whole() -> Campaign:
+    return campaign_of(campaign(design("gimbal-5208"), Bench(), 3))
+
+
+@pytest.fixture(scope="module")
+def both(whole: Campaign) -> tuple[dict, dict]:
     return fitted(whole, 1.0), fitted(whole, FAST)
 
 
@@ -76,8 +80,7 @@ def test_what_two_constants_share_of_a_clock_cancels(both):
     assert u < 0.5 * U_CLOCK
 
 
-def test_a_clock_that_states_nothing_counts_for_a_crystal():
-    whole = campaign_of(campaign(design("gimbal-5208"), Bench(), 3))
+def test_a_clock_that_states_nothing_counts_for_a_crystal(whole):
     bare = tuple(replace(c, meta=replace(c.meta, u_rel_clock=None)) for c in whole.captures)
     one = Estimate("j_rotor_kgm2", 2.0, "kg·m²", "measured", "x", captures=(bare[0].path,))
     (part,) = with_clock(one, 2, bare[:1]).budget

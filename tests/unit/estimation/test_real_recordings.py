@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -31,6 +32,11 @@ def constants(folder: str) -> Constants:
     return fit_all(Campaign(captures[0].meta.motor_id, captures), {})[0]
 
 
+def true_constants(motor: str) -> dict[str, Any]:
+    constants: dict[str, Any] = json.loads((DATA / "rig" / motor / "truth.json").read_bytes())
+    return constants["constants"]
+
+
 @needs_rig
 @pytest.mark.parametrize("motor", ["P1", "P2", "P3", "P4"])
 @pytest.mark.parametrize(
@@ -38,7 +44,7 @@ def constants(folder: str) -> Constants:
 )
 def test_truth_lies_in_the_interval_whatever_is_hidden(motor: str, name: str) -> None:
     """Dead time and cogging, saturation, Stribeck and an eccentric encoder, an unknown brake."""
-    truth = json.loads((DATA / "rig" / motor / "truth.json").read_bytes())["constants"][name]
+    truth = true_constants(motor)[name]
     found = constants(f"rig/{motor}").best(name)
     if motor == "P4" and name == "b_visc_nm_s_rad":
         assert found is None or found.interval()[0] <= truth <= found.interval()[1]
@@ -53,6 +59,18 @@ def test_truth_lies_in_the_interval_whatever_is_hidden(motor: str, name: str) ->
 @pytest.mark.parametrize("motor", ["P0", "P2", "P3", "P4"])
 def test_no_cogging_is_invented(motor: str) -> None:
     assert constants(f"rig/{motor}").best("cogging_order") is None
+
+
+@needs_rig
+def test_cogging_and_pole_pairs_are_found_where_they_are() -> None:
+    true, found = true_constants("P1"), constants("rig/P1").chosen()
+    assert found["pole_pairs"].value == 10
+    assert found["cogging_order"].value == true["cogging_order"]
+    low, high = found["cogging_amplitude_nm"].interval()
+    assert low <= true["cogging_amplitude_nm"] <= high
+    assert found["cogging_amplitude_nm"].number == pytest.approx(
+        true["cogging_amplitude_nm"], rel=0.02
+    )
 
 
 @needs_laas

@@ -116,7 +116,7 @@ def driven(motor: Motor, omega: float, id_a: np.ndarray, iq_a: np.ndarray) -> np
     """Shaft torque [N·m], phase voltage [V] and terminal power [W] on a grid of currents [a, b, 3]:
     a dynamometer holds the speed of a motor on a perfect bench.
     """
-    fast = replace(QUIET, pwm_hz=1e5)
+    fast = replace(QUIET, pwm_hz=4e4)
     rated = motor.current_rated_a
     settled_s = 16.0 * motor.lq_h / motor.r_phase_ohm
     dwell = max(0.03, settled_s, 4.0 * math.pi / (motor.pole_pairs * omega))
