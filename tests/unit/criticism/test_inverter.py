@@ -194,3 +194,29 @@ def test_where_a_drop_jumps_with_the_current_its_floor_is_that_jump():
     at_half = min(speeds, key=lambda w: abs(lost_by(point(0.0, 0.2, w)).imag.mean() - 0.6 * LOSS_V))
     assert jump(0.2, at_half) > 0.05 * LOSS_V
     assert jump(4.0, 10.0) < 0.01 * LOSS_V
+
+
+def test_what_a_period_takes_is_computed_once_a_state(monkeypatch):
+    """Along the voltage and along the drop of the switches it stays; with width, lag or inductance
+    it is another.
+    """
+    calls, effect = [], effects()["dead_time"]
+    monkeypatch.setattr(
+        "pipeline.criticism.effects.dead_time.swept_shares",
+        lambda *given: calls.append(given) or swept_shares(*given),
+    )
+    start = zero(effect, Model(machine(), (effect,)))
+    q = {name.partition(".")[2]: value for name, value in start.items()}
+    q |= {"loss_v": LOSS_V, "width_a": 0.1, "ripple": 2.0}
+    q = {**{p.name: 0.0 for p in effect.every(machine())}, **q}
+    x = point(1.0, 2.0, 50.0)
+    once = effect.drop(x, q)
+    assert effect.drop(x, {**q, "loss_v": 2.0 * LOSS_V}) == pytest.approx(2.0 * once)
+    effect.drop(x, {**q, "on_v": 0.1})
+    assert len(calls) == 1
+    other = replace(x, base={**x.base, "ld_h": 2.0 * L_H})
+    for state, moved in ((x, {"width_a": 0.2}), (x, {"lag_s": 1e-5}), (other, {})):
+        found = effect.drop(state, {**q, **moved})
+        assert found == pytest.approx(effect.drop(replace(state, cache={}), {**q, **moved}))
+        assert not np.allclose(found, once)
+    assert len(calls) == 7
