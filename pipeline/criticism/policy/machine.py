@@ -98,7 +98,7 @@ class Ripple:
         0.1, "cycles a row", "how slowly phases move on at which a wave is taken as a slow current",
         why="a control loop moves the current in some ten rows",
     )  # fmt: skip
-    sure: float = calibrated(
-        8.0, "1", "times what as many of anything would explain, from which on waves are there",
-        by="0, 4 and 8", on="sound motors: steps of a speed's reference pass for waves at 4",
+    predicted: float = derived(
+        0.5, "1", "share of what is not slow that waves predict in rows they were not fitted to",
+        source="with less, most of it is something else, such as steps of a speed's reference",
     )  # fmt: skip

@@ -22,6 +22,8 @@ from pipeline.criticism.policy.machine import Ripple
 
 ORDERS = (6, 12)
 """Waves a turn of the electrical angle; the winding's inductance leaves little of higher ones."""
+_PARTS = 4
+"""Of a block of rows, each held out once."""
 
 
 def on_points(signal: Complex, size: int) -> Complex:
@@ -112,7 +114,7 @@ class Waves:
         parts
             Where its points are behind each row [rows].
         policy
-            Rows a block, and how sure waves are to be.
+            Rows a block, and how much waves have to predict.
 
         Notes
         -----
@@ -133,7 +135,8 @@ class Waves:
         halves = np.arange(round(2.0 * policy.slow * width))
         slow, _ = np.linalg.qr(np.cos(np.pi / width * np.outer(np.arange(width) + 0.5, halves)))
         apart = waves - slow @ (slow.T @ waves)
-        fit = _fitted(apart, slow, current[rows], policy.sure)
+        fast = current[rows] - (current[rows] @ slow) @ slow.T
+        fit = _fitted(apart, fast, policy.predicted)
         row, part = np.divmod(np.arange(step * len(parts)), len(parts))
         own = np.minimum(firsts + row, ends - 1)
         at = np.clip(own + np.array(parts)[part], starts, ends - 1)
@@ -164,28 +167,37 @@ class Waves:
         return total
 
 
-def _fitted(apart: Array, slow: Array, current: Complex, sure: float) -> Array:
-    """Regression [b, k, w] of waves on the current of the rows of each block [b, w, A].
+def _fitted(apart: Array, fast: Complex, least: float) -> Array:
+    """Regression [b, k, w] of waves on the current of the rows of each block.
 
-    `apart` are the waves [b, w, k] less what the `slow` cosines [w, s] have of them. The ridge is
-    what the rows leave over the power of the waves. Without it, waves that come to nearly the same
-    phase in every row would be anything. Blocks whose waves explain less than `sure` times what as
-    many of anything would have none.
+    `apart` are the waves [b, w, k] less what is slow in them, `fast` the current [b, w, A] alike.
+    The ridge is what the rows leave over the power of the waves. Without it, waves that come to
+    nearly the same phase in every row would be anything. Blocks whose waves, fitted to three
+    quarters of the rows, predict less than a share `least` of the other one's power have none: a
+    step of the current makes waves as well, and other ones elsewhere.
     """
     width, waves = apart.shape[1:]
-    across, columns = np.swapaxes(apart, 1, 2), current[:, :, None]
-    gram, one = across @ apart, np.eye(waves)
-    of_waves = apart @ (np.linalg.pinv(apart) @ columns)
-    left = columns - of_waves
-    left = left - slow @ (slow.T @ left)
-    noise = (np.abs(left) ** 2).sum((1, 2)) / (width - waves - slow.shape[1])
-    explained = (np.abs(of_waves) ** 2).sum((1, 2))
-    there = explained > sure * waves * noise
-    power = explained[there] / np.trace(gram[there], axis1=1, axis2=2)
+    across, columns, one = np.swapaxes(apart, 1, 2), fast[:, :, None], np.eye(waves)
+    gram, moments = across @ apart, across @ columns
+    left = columns - apart @ (np.linalg.pinv(gram, hermitian=True) @ moments)
+    noise = _power(left) / (width - waves)
+    missed = np.zeros(len(apart))
+    for part in np.array_split(np.arange(width), _PARTS):
+        one_out, out = across[:, :, part], columns[:, part]
+        others = np.linalg.pinv(gram - one_out @ apart[:, part], hermitian=True)
+        missed += _power(out - apart[:, part] @ (others @ (moments - one_out @ out)))
+    there = missed < (1.0 - least) * _power(columns)
+    power = _power(columns - left)[there] / np.trace(gram[there], axis1=1, axis2=2)
     ridge = (noise[there] / power)[:, None, None] * one
     fit = np.zeros(across.shape)
     fit[there] = np.linalg.solve(gram[there] + ridge, across[there])
     return fit
+
+
+def _power(signal: Complex) -> Array:
+    """Sum of squares [b] of a signal [b, w, 1]."""
+    power: Array = (np.abs(signal) ** 2).sum((1, 2))
+    return power
 
 
 def _waves(eps_rad: Array) -> Array:
