@@ -22,8 +22,6 @@ from pipeline.criticism.policy.machine import Ripple
 
 ORDERS = (6, 12)
 """Waves a turn of the electrical angle; the winding's inductance leaves little of higher ones."""
-_PARTS = 4
-"""Of a block of rows, each held out once."""
 
 
 def on_points(signal: Complex, size: int) -> Complex:
@@ -182,7 +180,7 @@ def _fitted(apart: Array, fast: Complex, least: float) -> Array:
     left = columns - apart @ (np.linalg.pinv(gram, hermitian=True) @ moments)
     noise = _power(left) / (width - waves)
     missed = np.zeros(len(apart))
-    for part in np.array_split(np.arange(width), _PARTS):
+    for part in np.array_split(np.arange(width), 4):
         one_out, out = across[:, :, part], columns[:, part]
         others = np.linalg.pinv(gram - one_out @ apart[:, part], hermitian=True)
         missed += _power(out - apart[:, part] @ (others @ (moments - one_out @ out)))
