@@ -24,8 +24,9 @@ WORLDS: Mapping[str, str] = {
     "motulator": "motulator",
     "mujoco": "mujoco",
     "gym": "gym-electric-motor",
+    "maker": "",
 }
-"""Worlds, and the package that each needs."""
+"""Worlds, and the package that each needs; none where the plant is this project's simulator."""
 
 AT_ONCE = 40
 """Cases that are recorded together: a lane costs little beside a batch, and some memory."""
@@ -53,6 +54,8 @@ def world(name: str) -> ModuleType:
 def campaigns(cases: Sequence[WorldCase]) -> list[Campaign]:
     """The campaigns of cases of one world, in their order."""
     place = world(cases[0].world)
+    if not WORLDS[cases[0].world]:
+        return [place.campaign(case) for case in cases]
     plants = [_plant(place, case) for case in cases]
     people = [Campaigner(p, c.programme, c.seed) for p, c in zip(plants, cases, strict=True)]
     sessions = [one.sessions() for one in people]

@@ -25,11 +25,11 @@ def cases(name: str, draw: int = 1) -> list[WorldCase]:
         for k, effect in enumerate(effects):
             for size in (1.0, THIRD):
                 found.append(WorldCase(name, programme, seeds[k % MOTORS], {effect: size}))
-    lab = "laboratory"
+    first = next(iter(place.EFFECTS))
     for k, (one, other) in enumerate(place.PAIRS):
-        found.append(WorldCase(name, lab, seeds[k % MOTORS], {one: 1.0, other: 0.5}))
+        found.append(WorldCase(name, first, seeds[k % MOTORS], {one: 1.0, other: 0.5}))
     for effect in place.OUTSIDE:
-        found += [WorldCase(name, lab, seed, {effect: 1.0}, outside=True) for seed in seeds]
+        found += [WorldCase(name, first, seed, {effect: 1.0}, outside=True) for seed in seeds]
     return found
 
 

@@ -17,7 +17,8 @@ from tests.benchmark.worlds.lanes import Lane, run
 from tests.benchmark.worlds.programmes import PROGRAMMES, PWM_HZ, Campaigner, Hidden
 from tests.benchmark.worlds.rivals import _chosen
 from tests.benchmark.worlds.sindy import weak_sindy
-from tests.benchmark.worlds.table import beside, by_programme, table
+from tests.benchmark.worlds.table import beside, by_programme, cases, table
+from tests.benchmark.worlds.with_maker import _telemetry
 
 NULL = WorldCase("motulator", "laboratory", 1)
 COGGING = WorldCase("motulator", "laboratory", 1, {"cogging": 1.0})
@@ -91,6 +92,27 @@ def test_a_world_that_is_unknown_or_not_installed_is_a_wrong_usage(
     monkeypatch.delitem(sys.modules, "tests.benchmark.worlds.with_motulator", raising=False)
     with pytest.raises(UsageError, match="needs motulator"):
         main(options(["world=motulator", f"output={tmp_path}"]))
+
+
+@pytest.mark.parametrize(("timing", "held"), [("centred", 0.0), ("instant", 1.0)])
+def test_a_maker_logs_the_mean_about_a_row_or_the_vector_there(timing: str, held: float) -> None:
+    """A voltage that is there in every fortieth PWM period alone, from the first on."""
+    pulses = (np.arange(400) % 40 == 0).astype(float)
+    ramp = np.arange(400, dtype=float)
+    log = {"t_s": 5e-5 * ramp, "vd_v": pulses, "vq_v": ramp, "id_a": ramp, "torque_shaft_nm": ramp}
+    slow = _telemetry(log, timing)
+    assert sorted(slow) == ["id_a", "t_s", "vd_v", "vq_v"]
+    assert np.diff(slow["t_s"]) == pytest.approx(1e-3)
+    assert slow["id_a"].tolist() == list(range(0, 400, 20))
+    assert slow["vq_v"][1:-1] == pytest.approx(slow["id_a"][1:-1], abs=0.6)
+    assert slow["vd_v"][2:-2:2] == pytest.approx(held or 1.0 / 20.0)
+    assert slow["vd_v"][3:-2:2] == pytest.approx(0.0)
+
+
+def test_cases_of_a_maker_are_drawn_as_those_of_other_worlds() -> None:
+    drawn = cases("maker")
+    assert {case.programme for case in drawn} == {"maker"}
+    assert len({case.key for case in drawn}) == len(drawn) == 3 + 2 * 11 + 3 + 2 * 3
 
 
 @pytest.fixture(scope="module")
@@ -199,6 +221,7 @@ def test_current_follows_from_one_energy_when_iron_saturates(place: Any) -> None
 
 
 def test_a_programme_is_the_same_bytes_again_and_holds_the_contract(place: Any) -> None:
+
     from tests.benchmark.worlds.recording import campaigns
 
     case = WorldCase("motulator", "end of line", 2, {"windage": 1.0})
