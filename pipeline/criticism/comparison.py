@@ -31,7 +31,7 @@ from pipeline.criticism.selection.missing_data import (
     unused_captures,
 )
 from pipeline.criticism.selection.other_readings import by_best_readings
-from pipeline.criticism.selection.pruning import regained, trimmed
+from pipeline.criticism.selection.pruning import reshaped, trimmed
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.validation.error_maps import all_maps
 from pipeline.criticism.validation.held_out import Before, effective, run_errors, simulate, traces
@@ -83,7 +83,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     if not cut_segments:
         return _no_comparison(campaign, model, names, *unusable_captures(campaign, machine))
     base = fit_of(cut_segments, stated_model)
-    system = linear_system(regained(trimmed(by_best_readings(base.system), names)).fit)
+    system = linear_system(reshaped(trimmed(by_best_readings(base.system), names)).fit)
     held_out = leave_out(system)
     simulated = simulate(system, held_out)
     maps = all_maps(system, held_out.or_fit(system))

@@ -39,7 +39,7 @@ class Candidate:
 
 def candidates(library: Mapping[str, Effect], model: Model) -> tuple[Candidate, ...]:
     """Every effect that is not in the model, once for each combination of trial shapes; those of
-    an optional term are tried when the effect is in (`pruning.regained`).
+    an optional term are tried when the effect is in (`pruning.reshaped`).
 
     Parameters
     ----------

@@ -83,9 +83,9 @@ def with_all_terms(fit: Fit) -> Fit:
     return replace(fit, model=full, values=values)
 
 
-def regained(system: LinearSystem) -> LinearSystem:
-    """The fit with terms that were left out, from another trial value of their shape, where these
-    are worth their parameters.
+def reshaped(system: LinearSystem) -> LinearSystem:
+    """The fit with optional terms begun from the other trial values of their shapes, left out or
+    not, where that explains more.
 
     Parameters
     ----------
@@ -95,21 +95,22 @@ def regained(system: LinearSystem) -> LinearSystem:
     Returns
     -------
     LinearSystem
-        The same where nothing is over the floor. A term that would not be worth its parameters by
-        `policy.selection.choice_falls` times what it explains to first order is not fitted.
+        The same where nothing is over the floor. A term that was left out must be worth its
+        parameters, one that was not `policy.selection.tie`. What would not fall so far by
+        `policy.selection.choice_falls` times its fall to first order is not fitted.
 
     Notes
     -----
     What a compensation gives back over as little current as a dead time loses it is that dead time,
-    less of it; only over a wider one is it a term of its own. At zero no tangent leads there.
+    less of it; only over a wider one is it a term of its own, and no tangent leads there.
 
     """
-    penalty = math.log(max(system.size, 2))
+    penalty, policy = math.log(max(system.size, 2)), system.policy.selection
     for effect in system.fit.model.effects:
         for start, count in _other_shapes(system.fit, effect):
             if not significant_groups(system).any():
                 return system
-            limit = system.deviance - penalty * count
+            limit = system.deviance - max(penalty * count, policy.tie)
             if lowest_from(start, system) < limit:
                 tried = gauss_newton(start, before=system)
                 system = tried if tried.deviance < limit else system
@@ -117,20 +118,23 @@ def regained(system: LinearSystem) -> LinearSystem:
 
 
 def _other_shapes(fit: Fit, effect: Effect) -> Iterator[tuple[Fit, int]]:
-    """Where fits begin with a term that an effect was left without, at zero and at another than the
-    first trial value of a shape of it; and how many parameters each term has.
+    """Where fits begin with one of the optional terms of an effect at another trial value of a
+    shape, and how many parameters that adds; a term that was left out begins at zero.
     """
     machine, left_out = fit.machine, effect.left_out
-    for term in left_out:
+    whole = replace(effect, left_out=()).parameters_of(machine)
+    for term in sorted({p.optional for p in whole} - {0}):
         having = replace(effect, left_out=tuple(t for t in left_out if t != term))
-        parameters = [p for p in having.parameters_of(machine) if p.optional == term]
+        parameters = [p for p in whole if p.optional == term]
         others = (having if e.name == effect.name else e for e in fit.model.effects)
         model = replace(fit.model, effects=tuple(others))
         for shape in parameters:
-            for value in shape.scan[1:]:
-                values = zero(having, model, [(shape.name, value * machine.scale(shape))])
-                start = replace(fit, model=model, values={**values, **fit.values})
-                yield start, len(parameters)
+            for value in shape.scan if len(shape.scan) > 1 else ():
+                at = {f"{effect.name}.{shape.name}": value * machine.scale(shape)}
+                start = replace(
+                    fit, model=model, values={**zero(having, model), **fit.values, **at}
+                )
+                yield start, len(parameters) if term in left_out else 0
 
 
 def _unless_worth(

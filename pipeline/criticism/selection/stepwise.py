@@ -32,7 +32,7 @@ from pipeline.criticism.selection.improvement import clears
 from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.log_start import with_log_start
 from pipeline.criticism.selection.other_readings import other_reading
-from pipeline.criticism.selection.pruning import regained, trimmed, with_all_terms
+from pipeline.criticism.selection.pruning import reshaped, trimmed, with_all_terms
 from pipeline.criticism.selection.score_test import Score, score_all
 from pipeline.criticism.selection.sizes import material
 from pipeline.criticism.selection.unusual_nuisances import with_nuisances
@@ -149,7 +149,7 @@ def _steps_from(
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
         if chosen.fit.model.effects[-1].name in unsure:
             break
-        fit = _refloored(regained(reconsidered(_backward(chosen, base))), base)
+        fit = _refloored(reshaped(reconsidered(_backward(chosen, base))), base)
         if tuple(e.name for e in fit.model.effects[base:]) in {r.added for r in steps}:
             break
     return steps
@@ -227,7 +227,8 @@ def _chosen(
         batch = list(passing[first : first + policy.refits])
         while (best := _refit_best(wide, batch, added)) is not None:
             named = [effect.name for effect in best.fit.model.effects]
-            finished = trimmed(gauss_newton(with_all_terms(best.fit), before=best), named)
+            finished = gauss_newton(with_all_terms(best.fit), before=best)
+            finished = reshaped(trimmed(finished, named))
             cost = finished.deviance + math.log(wide.size) * finished.model_columns.size
             acts = acts_in(finished)
             if any(cost > least + policy.tie and np.any(acts & where) for least, where in doubtful):

@@ -67,6 +67,12 @@ def test_a_wave_that_every_row_has_at_nearly_the_same_phase_is_a_slow_current() 
     assert np.abs(waves.added(current, AT.size)).max() < 0.01
 
 
+def test_waves_that_rows_hardly_tell_apart_stay_small() -> None:
+    """At half a wave of order 6 a row its sine is next to nothing in any of them."""
+    straight, with_waves = missed(1.0005 * np.pi / 6.0)
+    assert with_waves < 1.1 * straight
+
+
 def test_a_step_of_the_current_is_no_wave() -> None:
     current = slow(AT)[::POINTS] + NOISE
     current[ROWS // 2 :] += 2.0

@@ -205,6 +205,17 @@ def test_a_column_of_a_slow_log_is_the_change_of_its_residual(name):
         assert column == pytest.approx(change, abs=0.02 * size + 1e-12)
 
 
+@pytest.mark.parametrize("name", ["bemf_harmonics", "inductance_harmonics", "dead_time"])
+def test_a_column_of_snapshots_is_the_change_of_its_residual(name):
+    segment = log()
+    instrument = replace(segment.instrument, timing="instant", frame=0.5, snapshots=True)
+    fixed = {**segment.fixed, "pwm_s": 1e-5, "vdc_v": 24.0}
+    shots = replace(segment, instrument=instrument, fixed=fixed)
+    for column, change in columns_and_changes(shots, LIBRARY[name], unit_floor(shots)):
+        size = np.abs(change).max()
+        assert column == pytest.approx(change, abs=0.02 * size + 1e-12)
+
+
 def test_the_frame_of_a_coarse_encoder_is_in_the_noise_floor():
     """A drive turns its currents and voltages by the angle that its encoder rounds: at 512 counts
     a turn of a machine of seven pole pairs, by up to 2.5 degrees.
