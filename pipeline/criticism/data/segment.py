@@ -84,6 +84,8 @@ class Instrument:
         Points a sample that a logged voltage is the mean of; 1 of a log as fast as its PWM.
     snapshots
         Whether a logged voltage is one vector, from one of which to the next the rotor turns far.
+    waves
+        Whether the current between its rows has waves of the angle, as far as the rows show some.
 
     """
 
@@ -95,6 +97,7 @@ class Instrument:
     stator: bool = False
     points: int = 1
     snapshots: bool = False
+    waves: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,9 @@ A control loop computes a voltage in the rotor frame of its sampled angle and tu
 Firmware logs the vector from before or behind that: in the frame of the sampling instant, from
 which on it is held, or of the middle of its hold. That is known only where each sample is stated
 to be the mean about the middle of one hold.
+
+A current that moves fast between slow rows may look as if it had waves of the angle. Where the
+captures are better explained by straight lines between rows, it has none.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.improvement import clears
+from pipeline.criticism.signals.true_current import ripples
 
 TORQUE = "torque_shaft_nm"
 _HALF_HOLD = 0.5
@@ -102,6 +106,8 @@ def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
         each = zip(system.segments, held, strict=True)
         turned = tuple(_in_other_frame(s) if its_own else s for s, its_own in each)
         yield gauss_newton(replace(system.fit, segments=turned))
+    if any(ripples(segment) for segment in system.segments):
+        yield gauss_newton(replace(system.fit, segments=tuple(map(_other_lines, system.segments))))
     significant = significant_groups(system)
     torques = significant & [channel == TORQUE for _, channel, _ in system.labels]
     if torques.any():
@@ -131,6 +137,11 @@ def _has_held_vectors(segment: Segment, slower_share: float) -> bool:
 def _in_other_frame(segment: Segment) -> Segment:
     instrument = segment.instrument
     return replace(segment, instrument=replace(instrument, frame=_HALF_HOLD - instrument.frame))
+
+
+def _other_lines(segment: Segment) -> Segment:
+    instrument = segment.instrument
+    return replace(segment, instrument=replace(instrument, waves=not instrument.waves))
 
 
 def _reads_torque(segment: Segment) -> bool:

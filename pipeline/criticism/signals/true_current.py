@@ -105,7 +105,20 @@ def between(segment: Segment, current: Complex, model: Model, parts: tuple[float
 
     waves = segment.once(theta, "waves", (parts, pairs, policy), made)
     lines = at_parts(current, parts)
-    return lines + waves.added(current, lines.size)
+    return lines + waves.added(current, lines.size) if segment.instrument.waves else lines
+
+
+def ripples(segment: Segment) -> bool:
+    """Whether the rows of a log show waves of its current, where it was looked at between them.
+
+    Parameters
+    ----------
+    segment
+        The log.
+
+    """
+    known = segment.cache.get("waves")
+    return known is not None and bool(known[2].fit.any())
 
 
 def table_current(

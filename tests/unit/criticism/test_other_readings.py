@@ -66,3 +66,18 @@ def test_a_place_that_leaves_most_of_the_torque_open_is_not_taken(monkeypatch, l
     here = missing(40.0)
     assert elsewhere.deviance < here.deviance - here.policy.selection.tie
     assert (other_reading(here) is elsewhere) == moves
+
+
+@pytest.mark.parametrize("rippling", [True, False])
+def test_straight_lines_between_rows_are_tried_where_rows_show_waves(monkeypatch, rippling):
+    """And taken, as here, where they explain more."""
+    system, tried = linear_system(fitted((log(noise=1.0), log(noise=1.0, seed=6)))), []
+
+    def better(fit, **_):
+        tried.append([segment.instrument.waves for segment in fit.segments])
+        return replace(system, residual=0.1 * system.residual)
+
+    monkeypatch.setattr(f"{other_reading.__module__}.gauss_newton", better)
+    monkeypatch.setattr(f"{other_reading.__module__}.ripples", lambda _: rippling)
+    assert (other_reading(system) is not None) == rippling
+    assert tried == ([[False, False]] if rippling else [])

@@ -14,6 +14,7 @@ from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import operate, residual
+from pipeline.criticism.signals.true_current import ripples
 from pipeline.criticism.signals.true_state import averaging
 from pipeline.criticism.signals.voltage import mean_voltage, rotor_voltage
 from tests.unit.criticism.machines import (
@@ -161,6 +162,10 @@ def test_the_state_between_rows_has_the_waves_of_the_current():
     x = operate(segment, recorded, PLAIN, BASE)
     inside = slice(segment.instrument.points, -2 * segment.instrument.points)
     assert x.i_a[inside] == pytest.approx(current[inside], abs=0.01)
+    assert ripples(segment)
+    lines = replace(segment, instrument=replace(segment.instrument, waves=False))
+    x = operate(lines, recorded, PLAIN, BASE)
+    assert np.abs(x.i_a[inside] - current[inside]).max() > 0.1
 
 
 @pytest.mark.parametrize(
