@@ -173,10 +173,11 @@ def averaging(segment: Segment, machine: Machine) -> Instrument:
     """
     motion, policy = motion_of(segment, segment.recorded, machine), machine.policy.cutting
     points = finer_of(segment, machine, policy.mean_points)
-    if points == 1 or hold_s(segment, motion.omega_rad_s, machine) == segment.ts_s:
+    held = hold_s(segment, motion.omega_rad_s, machine)
+    if points == 1 or held == segment.ts_s:
         return segment.instrument
     if segment.instrument.timing == "instant":
-        return replace(segment.instrument, snapshots=True)
+        return replace(segment.instrument, snapshots=held > 0.0)
     return replace(segment.instrument, points=2 * ((points + 1) // 2))
 
 

@@ -117,6 +117,17 @@ def test_a_dead_time_is_in_a_mean_as_its_mean():
     assert sampled.std() > 0.1 * loss, "an instant of the loss is not its mean"
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_a_snapshot_is_held_where_its_pwm_is_known(known):
+    """Of another log nobody knows for how long a vector is held: it stays an instant."""
+    segment = slow_log(2.3, "instant")
+    fixed = {**segment.fixed, **({} if known else {"pwm_s": None})}
+    fixed = {name: value for name, value in fixed.items() if value is not None}
+    segment = as_cut(replace(segment, fixed=fixed))
+    assert segment.instrument.snapshots == known
+    assert np.isfinite(residual(segment, PLAIN, BASE)).all()
+
+
 @pytest.mark.parametrize("frame", [0.0, 0.5])
 def test_a_snapshot_of_a_wave_is_its_mean_over_the_hold_of_one_vector(frame):
     """ψ = ψ_m + ψ_m a e^{j6ε} by the harmonics of a back-EMF, whose mean over a turn is a sinc."""
