@@ -43,32 +43,32 @@ def reconsidered(system: LinearSystem) -> LinearSystem:
         for other in _choices(effect, system.fit):
             fit = system.fit
             start = replace(fit, values={**fit.values, **other})
-            limit = system.deviance - fit.policy.selection.tie
-            if lowest_from(start, system) < limit:
-                tried = gauss_newton(start, before=system)
-                system = tried if tried.deviance < limit else system
+            system = better_of(system, start, fit.policy.selection.tie)
     return system
 
 
-def lowest_from(start: Fit, before: LinearSystem) -> float:
-    """The deviance that a fit may come down to, judged by the columns of another one.
+def better_of(system: LinearSystem, start: Fit, least: float) -> LinearSystem:
+    """A fit, or the one from another start where that is better.
 
     Parameters
     ----------
+    system
+        The fit.
     start
-        Where the fit begins.
-    before
-        The other one.
-
-    Returns
-    -------
-    float
-        The start's, less `policy.selection.choice_falls` times its fall to first order.
+        Where the other one begins. It is not fitted where `policy.selection.choice_falls` times its
+        fall to first order would not do.
+    least
+        By what the deviance has to fall.
 
     """
-    begun = linear_system(start, before=before, chord=True)
+    limit = system.deviance - least
+    begun = linear_system(start, before=system, chord=True)
     end = begun.normal_equations(begun.model_columns).best().deviance
-    return begun.deviance - start.policy.selection.choice_falls * (begun.deviance - end)
+    fall = start.policy.selection.choice_falls * (begun.deviance - end)
+    if begun.deviance - fall >= limit:
+        return system
+    tried = gauss_newton(start, before=system)
+    return tried if tried.deviance < limit else system
 
 
 def _choices(effect: Effect, fit: Fit) -> Iterator[Values]:

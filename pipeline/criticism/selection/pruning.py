@@ -18,7 +18,7 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import NormalEquations
-from pipeline.criticism.selection.choices import lowest_from
+from pipeline.criticism.selection.choices import better_of
 
 
 def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
@@ -96,8 +96,7 @@ def reshaped(system: LinearSystem) -> LinearSystem:
     -------
     LinearSystem
         The same where nothing is over the floor. A term that was left out must be worth its
-        parameters, one that was not `policy.selection.tie`. What would not fall so far by
-        `policy.selection.choice_falls` times its fall to first order is not fitted.
+        parameters, one that was not `policy.selection.tie`.
 
     Notes
     -----
@@ -105,15 +104,12 @@ def reshaped(system: LinearSystem) -> LinearSystem:
     less of it; only over a wider one is it a term of its own, and no tangent leads there.
 
     """
-    penalty, policy = math.log(max(system.size, 2)), system.policy.selection
+    penalty, tie = math.log(max(system.size, 2)), system.policy.selection.tie
     for effect in system.fit.model.effects:
         for start, count in _other_shapes(system.fit, effect):
             if not significant_groups(system).any():
                 return system
-            limit = system.deviance - max(penalty * count, policy.tie)
-            if lowest_from(start, system) < limit:
-                tried = gauss_newton(start, before=system)
-                system = tried if tried.deviance < limit else system
+            system = better_of(system, start, max(penalty * count, tie))
     return system
 
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import Model, values_of
-from pipeline.criticism.operating import Array, Complex, Recorded, Signals, Values
-from pipeline.criticism.operating import between as interpolated
+from pipeline.criticism.operating import Array, Complex, Recorded, Signals, Values, between
 from pipeline.criticism.signals.angle_sensor import both_axes
 from pipeline.criticism.signals.between_rows import Waves, at_parts, evenly
 
@@ -39,34 +38,14 @@ def drive_current(
         d + jq [A].
 
     """
-    current = row_current(segment, signals, model, values)
-    return (
-        current
-        if size == current.size
-        else between(segment, current, model, evenly(size // current.size))
-    )
+    current = _at_rows(segment, signals, model, values)
+    if size == current.size:
+        return current
+    return current_between(segment, current, model, evenly(size // current.size))
 
 
-def row_current(segment: Segment, signals: Signals, model: Model, values: Values) -> Complex:
-    """True current of a drive's log at its rows.
-
-    Parameters
-    ----------
-    segment
-        The log.
-    signals
-        Recorded columns [n].
-    model
-        Effects of the current sensors.
-    values
-        Parameters by full name.
-
-    Returns
-    -------
-    array [n], complex
-        d + jq [A].
-
-    """
+def _at_rows(segment: Segment, signals: Signals, model: Model, values: Values) -> Complex:
+    """True current [n, A] of a drive's log at its rows."""
     recorded = _recorded(segment, signals, model)
     zero = values["zero_alpha_a"] + 1j * values["zero_beta_a"]
     if zero and both_axes(segment):
@@ -76,7 +55,9 @@ def row_current(segment: Segment, signals: Signals, model: Model, values: Values
     return true_current(recorded, segment.instrument.ammeter, model, values)
 
 
-def between(segment: Segment, current: Complex, model: Model, parts: tuple[float, ...]) -> Complex:
+def current_between(
+    segment: Segment, current: Complex, model: Model, parts: tuple[float, ...]
+) -> Complex:
     """A log's current between its rows: straight lines, and waves of the angle on them.
 
     Parameters
@@ -215,7 +196,7 @@ def ahead_in(
     columns, now = segment.once(rows, "whole", None, whole)
 
     def ahead(delay_s: float) -> tuple[Complex, Array, Array]:
-        later = interpolated(columns, at + delay_s / segment.ts_s)
+        later = between(columns, at + delay_s / segment.ts_s)
         change = dict(zip(log, later - now, strict=True))
         zero = np.zeros(at.size)
         current = change.get("id_a", zero) + 1j * change.get("iq_a", zero)
