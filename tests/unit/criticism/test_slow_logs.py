@@ -226,7 +226,8 @@ def test_a_column_of_snapshots_is_the_change_of_its_residual(name):
     segment = log()
     instrument = replace(segment.instrument, timing="instant", frame=0.5, snapshots=True)
     fixed = {**segment.fixed, "pwm_s": 1e-5, "vdc_v": 24.0}
-    shots = replace(segment, instrument=instrument, fixed=fixed)
+    far = {**segment.recorded, "theta_mech_rad": 20.0 * segment.recorded["theta_mech_rad"]}
+    shots = replace(segment, instrument=instrument, fixed=fixed, recorded=far)
     for column, change in columns_and_changes(shots, LIBRARY[name], unit_floor(shots)):
         size = np.abs(change).max()
         assert column == pytest.approx(change, abs=0.02 * size + 1e-12)
