@@ -134,7 +134,7 @@ class Waves:
         slow, _ = np.linalg.qr(np.cos(np.pi / width * np.outer(np.arange(width) + 0.5, halves)))
         apart = waves - slow @ (slow.T @ waves)
         fast = current[rows] - (current[rows] @ slow) @ slow.T
-        fit = _fitted(apart, fast, current[rows].var(axis=1), policy.predicted)
+        fit = _fitted(apart, fast, policy.predicted)
         row, part = np.divmod(np.arange(step * len(parts)), len(parts))
         own = np.minimum(firsts + row, ends - 1)
         at = np.clip(own + np.array(parts)[part], starts, ends - 1)
@@ -165,15 +165,14 @@ class Waves:
         return total
 
 
-def _fitted(apart: Array, fast: Complex, most: Array, least: float) -> Array:
+def _fitted(apart: Array, fast: Complex, least: float) -> Array:
     """Regression [b, k, w] of waves on the current of the rows of each block.
 
     `apart` are the waves [b, w, k] less what is slow in them, `fast` the current [b, w, A] alike.
-    The ridge is what the rows leave over the power of the waves, `most` [b, A²] of the current's
-    variance. Without it, waves that come to nearly the same phase in every row would be anything.
-    Blocks whose waves, fitted to three quarters of the rows, predict less than a share `least` of
-    the other one's power have none: a step of the current makes waves as well, and other ones
-    elsewhere.
+    The ridge is what the rows leave over the power of the waves. Without it, waves that come to
+    nearly the same phase in every row would be anything. Blocks whose waves, fitted to three
+    quarters of the rows, predict less than a share `least` of the other one's power have none: a
+    step of the current makes waves as well, and other ones elsewhere.
     """
     width, waves = apart.shape[1:]
     across, columns, one = np.swapaxes(apart, 1, 2), fast[:, :, None], np.eye(waves)
@@ -187,7 +186,6 @@ def _fitted(apart: Array, fast: Complex, most: Array, least: float) -> Array:
         missed += _power(out - apart[:, part] @ (others @ (moments - one_out @ out)))
     there = missed < (1.0 - least) * _power(columns)
     power = _power(columns - left)[there] / np.trace(gram[there], axis1=1, axis2=2)
-    power = np.minimum(power, most[there])
     ridge = (noise[there] / power)[:, None, None] * one
     fit = np.zeros(across.shape)
     fit[there] = np.linalg.solve(gram[there] + ridge, across[there])
