@@ -219,9 +219,7 @@ class ModelVerdict(PlainRecord):
         headlines = [one.headline or name.replace("_", " ") for name, one in self.missing.items()]
         text = " and ".join(filter(None, (", ".join(headlines[:-1]), headlines[-1])))
         if self.held_out is not None and self.held_out_with is not None:
-            them = {1: "it", 2: "both"}.get(len(headlines), f"all {len(headlines)}")
-            text += f"; with {them}, the error falls from {number(self.held_out)} to "
-            text += f"{number(self.held_out_with)} noise floors"
+            text += f"; {error_with(len(headlines), self.held_out, self.held_out_with)}"
         if self.verdict == "unknown":
             text += "; what is left no known effect explains"
             text += f": {self.unknown}" if self.unknown else ""
@@ -309,3 +307,30 @@ def number(floors: float) -> str:
 
     """
     return f"{floors:.0f}" if floors >= 10.0 else f"{floors:.2g}"
+
+
+def error_with(count: int, without: float, after: float) -> str:
+    """What adding effects does to the error of captures held out, in words.
+
+    Parameters
+    ----------
+    count
+        Number of effects.
+    without, after
+        Error without and with them [noise floors].
+
+    Returns
+    -------
+    str
+        One clause. An error that is below the floor before shows an effect in means of many
+        samples alone; then no fall is claimed.
+
+    """
+    them = {1: "it", 2: "both"}.get(count, f"all {count}")
+    first, last = number(without), number(after)
+    if after < without and first != last:
+        return f"with {them}, the error falls from {first} to {last} noise floors"
+    went = f"stays at {last}" if first == last else f"goes from {first} to {last}"
+    shown = "it shows" if count == 1 else "they show"
+    where = f"; {shown} in means of many samples only" if max(without, after) < 1.0 else ""
+    return f"with {them}, the error {went} noise floors{where}"

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import MINUS, number_text, quantity, significant
 from pipeline.records.diagnosis import Diagnosis, RankedEffect, Signature, StepRecord
-from pipeline.records.model_verdict import effects_key, number
+from pipeline.records.model_verdict import effects_key, error_with, number
 from pipeline.views.constants import sentence
 from pipeline.views.names import in_words, quantity_words
 
 TONES = {"adequate": "pass", "missing": "marginal", "unknown": "fail"}
 SPEED, CURRENT = "omega_mech_rad_s", "iq_a"
-_WITH = {1: "With it", 2: "With both"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,10 +152,8 @@ def _listed(texts: Sequence[str]) -> str:
 
 
 def _fall(result: Diagnosis) -> str:
-    first, last = (number(result.ladder[n].held_out) for n in (0, -1))
-    count = len(result.missing)
-    all_of = _WITH.get(count, f"With all {count}")
-    return f"{all_of}, the error falls from {first} to {last} noise floors."
+    without, after = (result.ladder[n].held_out for n in (0, -1))
+    return f"{sentence(error_with(len(result.missing), without, after))}."
 
 
 def _doubt(ranked: RankedEffect) -> Doubt:

@@ -47,6 +47,20 @@ def test_the_headline_says_what_is_missing_with_sizes_and_what_adding_it_does() 
     assert headline(one).startswith("Extra friction below 7.0 rad/s. With it, the error falls")
 
 
+def test_no_fall_is_claimed_where_the_error_stays_or_grows() -> None:
+    first, *between, last = two().ladder
+
+    def said(without: float, after: float) -> str:
+        ladder = (replace(first, held_out=without), *between, replace(last, held_out=after))
+        return headline(replace(two(), ladder=ladder)).rpartition("With both, ")[2]
+
+    means = "they show in means of many samples only."
+    assert said(0.6874, 0.6856) == f"the error stays at 0.69 noise floors; {means}"
+    assert said(0.70, 0.71) == f"the error goes from 0.7 to 0.71 noise floors; {means}"
+    assert said(67.9, 69.4) == "the error goes from 68 to 69 noise floors."
+    assert said(0.71, 0.70) == "the error falls from 0.71 to 0.7 noise floors."
+
+
 def test_other_verdicts_in_words() -> None:
     base = make_diagnosis(unknown=True)
     known = "Voltage lost in the inverter, 179.90 ± 0.24 mV a phase. With it, the error falls from "
