@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -77,7 +78,7 @@ def contradiction(step: LadderStep) -> str:
     -------
     str
         Empty where they say nothing: an amplitude that they determine is less than half of the one
-        that it should reach (`Parameter.at_least`).
+        that it should reach (`Parameter.at_least`), or the effect leaves a friction that drives.
 
     """
     system, model = step.system, step.fit.model
@@ -85,6 +86,11 @@ def contradiction(step: LadderStep) -> str:
     for effect in model.effects:
         if effect.name not in step.added[-1:]:
             continue
+        if effect.torque is not None and (driving := _driving_friction(system)):
+            return (
+                f"{effect.name} would take much of what is left, but goes with a viscous friction "
+                f"of {driving:.2g} N·m·s/rad, which drives the shaft"
+            )
         values = values_of(effect, model.machine, step.fit.values)
         for p in effect.parameters_of(model.machine):
             known = np.any(system.matrix[:, system.place([f"{effect.name}.{p.name}"])])
@@ -95,6 +101,20 @@ def contradiction(step: LadderStep) -> str:
                     f"it: its {other} goes with a {p.name} of {values[p.name]:.2g}"
                 )
     return ""
+
+
+def _driving_friction(system: LinearSystem) -> float:
+    """The viscous friction [N·m·s/rad] of a fit, where it certainly drives the shaft; else zero.
+
+    A drag of a wrong form leaves its difference from the true one to the constants.
+    """
+    value, columns = system.fit.values["b_nm_s_rad"], system.model_columns.tolist()
+    if value >= 0.0:
+        return 0.0
+    names = [system.columns[place].name for place in columns]
+    place = names.index("b_nm_s_rad")
+    u = math.sqrt(float(system.covariance(system.model_columns)[place, place]))
+    return value if value < -system.policy.selection.least_u * u else 0.0
 
 
 def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:
@@ -170,10 +190,14 @@ def explained(
     no signal's part is large for the machine. An offset of the angle that removes all of the
     torque's error explains nothing of a shaft that coasts too short. Signals with a small part of
     the deviance do not count alone. Deviance is logarithmic: for an equation at a million floors,
-    half of it remains at a thousand.
+    half of it remains at a thousand. Effects with which a viscous friction comes to drive the
+    shaft, and that leave something, are of another form than what the captures show.
 
     """
     policy, over = steps[0].fit.policy.selection, steps[0].fit.policy.goodness.over
+    drives = [bool(_driving_friction(step.system)) for step in (steps[0], steps[-1])]
+    if remainders and drives == [False, True]:
+        return False
     first, last = (max(held_out[n].total ** 2 - 1.0, 0.0) for n in (0, len(steps) - 1))
     if last > policy.unexplained_share**2 * first:
         return not remainders and (len(steps) == 1 or last <= over)

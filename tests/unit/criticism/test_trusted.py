@@ -172,6 +172,29 @@ def test_a_name_that_leaves_most_of_the_error_explains_it_nowhere(total, said):
     assert explained((first,), held, ())
 
 
+@pytest.mark.parametrize(
+    ("friction", "left", "said"),
+    [(-1e-3, True, False), (-1e-6, True, True), (1e-3, True, True), (-1e-3, False, True)],
+)
+def test_a_drag_beside_a_friction_that_drives_explains_nothing(friction, left, said):
+    """Eddy currents for a drag that falls with speed leave the difference to the viscous friction,
+    here known to a hundredth of what it is: below zero, and by more than its uncertainty.
+    """
+    first, last = (missing_by(torque_shaft_nm=q) for q in (1e4, 4.0))
+    matrix = np.zeros_like(last.system.matrix)
+    matrix[:, [c.name == "b_nm_s_rad" for c in last.system.columns]] = 1e4
+    fit = replace(last.fit, values={**last.fit.values, "b_nm_s_rad": friction})
+    last = replace(last, system=replace(last.system, matrix=matrix, fit=fit))
+    held = [HeldOut(first.system.residual, one) for one in (100.0, 1.3)]
+    over = [Remainder("one", "torque_shaft_nm", 0, 4.0, 1.0)] if left else []
+    assert explained((first, last), held, over) is said
+    drag = effects()["windage"]
+    added = replace(last.fit.model.with_effects(drag))
+    fit = replace(fit, model=added, values={**fit.values, **zero(drag, added)})
+    named = replace(last, added=("windage",), system=replace(last.system, fit=fit))
+    assert ("which drives the shaft" in contradiction(named)) is (friction == -1e-3)
+
+
 @pytest.mark.parametrize(("doubt", "kept"), [(1.0, True), (0.3, False)])
 def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept):
     """χ²/n of 3 that forms which are a little wrong may have made: neither a signal below its floor
