@@ -24,8 +24,7 @@ def orders(machine: Machine) -> tuple[int, ...]:
     Multiples of p, 2p or the number of slots; LCM(slots, 2p) is always among them, but where it is
     out of all reason (`Machine.cogging_order`), and what no slow turn shows beside it.
     """
-    bases = [machine.pole_pairs] + ([machine.slots] if machine.slots else [])
-    multiples = {k for k in machine.torque_orders if any(k % base == 0 for base in bases)}
+    multiples = {k for k in machine.torque_orders if _is_multiple(k, machine)}
     if machine.cogging_order is not None:
         multiples.add(machine.cogging_order)
     every = tuple(sorted(multiples | _unverified_orders(machine))) or (6 * machine.pole_pairs,)
@@ -36,15 +35,21 @@ def orders(machine: Machine) -> tuple[int, ...]:
 def _unverified_orders(machine: Machine) -> set[int]:
     """Orders of which no torque spectrum says whether they are there.
 
-    The second harmonic of LCM(slots, 2p). Where the slots are not known, that itself: one of the
-    multiples of 2p that windows observe.
+    p and 2p, which magnets or teeth that differ make; the slots, and LCM(slots, 2p) with its
+    second harmonic, or where the slots are not known 6p and 12p; and their multiples that logs
+    under load show.
     """
     if machine.torque_orders:
         return set()
-    if machine.cogging_order is not None:
-        return {2 * machine.cogging_order}
-    poles = 2 * machine.pole_pairs
-    return {int(k) for k in machine.electrical_orders if k % poles == 0}
+    p, slots, both = machine.pole_pairs, machine.slots, machine.cogging_order
+    usual = {6 * p, 12 * p} if slots is None else {slots}
+    usual |= {p, 2 * p} if both is None else {p, 2 * p, both, 2 * both}
+    return usual | {int(k) for k in machine.load_orders if _is_multiple(k, machine)}
+
+
+def _is_multiple(order: float, machine: Machine) -> bool:
+    """Whether an order [1/turn] is a multiple of the pole pairs or the slots."""
+    return any(base and order % base == 0 for base in (machine.pole_pairs, machine.slots))
 
 
 def _expand(machine: Machine) -> tuple[Parameter, ...]:

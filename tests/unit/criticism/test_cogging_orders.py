@@ -1,0 +1,60 @@
+"""Orders of cogging in logs without a slow turn, of slots that are stated or not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pipeline
+from pipeline.criticism.effects import cogging
+from pipeline.simulator.bench import campaign
+from pipeline.simulator.design import EXACT, Bench, Extra
+from tests.simulated import campaign_of, design
+from tests.unit.criticism.machines import machine
+
+MOTOR = design("gimbal-5208")
+PLAN = (
+    ("drive_0", "drive", {}),
+    ("drive_1", "drive", {"temp_winding_degc": 55.0, "temp_magnet_degc": 42.0}),
+    ("spin_down", "spin_down", {}),
+)
+
+
+@pytest.mark.parametrize(("effects", "missing"), [(MOTOR.effects, ("cogging",)), ({}, ())])
+def test_cogging_is_named_without_the_number_of_slots(effects, missing):
+    """12 slots and 14 poles cog 84 times a turn, twelve times a pole pair: order 6p is empty."""
+    motor = replace(MOTOR, effects=effects)
+    one = campaign_of(campaign(motor, Bench(instruments=EXACT), 1, PLAN))
+    captures = tuple(replace(c, meta=replace(c.meta, slots=None)) for c in one.captures)
+    recordings = pipeline.Recordings({one.motor_id: replace(one, captures=captures)})
+    assert pipeline.diagnose(recordings)[one.motor_id].missing == missing
+
+
+def test_cogging_of_the_slots_alone_is_named():
+    """One magnet that is weaker than the others cogs once a slot, and not LCM(slots, 2p) times."""
+    turn_rad = np.linspace(0.0, 2.0 * math.pi, 10 * MOTOR.slots + 1)
+    size_nm = 0.02 * MOTOR.torque_rated_nm
+    wave = Extra("torque", "theta_mech_rad", tuple(turn_rad), tuple(size_nm * np.sin(12 * turn_rad)))
+    motor = replace(MOTOR, effects={}, extras=(wave,))
+    one = campaign_of(campaign(motor, Bench(instruments=EXACT), 1, PLAN[2:]))
+    diagnosis = pipeline.diagnose(pipeline.Recordings({one.motor_id: one}))[one.motor_id]
+    assert (diagnosis.verdict, diagnosis.missing) == ("missing", ("cogging",))
+    assert diagnosis.ladder[-1].held_out < 1.3
+
+
+def test_orders_are_those_that_magnets_and_slots_make():
+    """A slow turn decides; without one, p, 2p, the slots, their LCM and its double may be there,
+    and what logs show where it is a multiple of them.
+    """
+    known, unknown = machine(7, 12), machine(7, None)
+    assert cogging.orders(replace(known, torque_orders=())) == (7, 12, 14, 84, 168)
+    assert cogging.orders(replace(unknown, torque_orders=())) == (7, 14, 42, 84)
+    logs = {"torque_orders": (), "load_orders": (8.5, 10, 36, 126)}
+    assert cogging.orders(replace(known, **logs)) == (7, 12, 14, 36, 84, 126, 168)
+    assert cogging.orders(replace(unknown, **logs)) == (7, 14, 42, 84, 126)
+    assert cogging.orders(replace(unknown, torque_orders=(28,), load_orders=(126,))) == (28,)
+    optional = {p.optional for p in cogging.EFFECT.parameters_of(replace(known, torque_orders=()))}
+    assert optional == {1, 2, 3, 4, 5}
