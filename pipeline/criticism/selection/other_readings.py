@@ -40,30 +40,6 @@ _SAMPLED = (
 )
 
 
-def other_reading(system: LinearSystem) -> LinearSystem | None:
-    """The fit by the other reading of a column, of the column where that explains most.
-
-    Parameters
-    ----------
-    system
-        A fit by either reading of each column.
-
-    Returns
-    -------
-    LinearSystem or None
-        None where no other reading lowers the deviance by `policy.selection.tie`.
-
-    Notes
-    -----
-    In a search it competes with the effects: an encoder off its centre looks like a torque without
-    the inertia, and a dead time like another frame, until they are in the model.
-
-    """
-    limit = system.deviance - system.policy.selection.tie
-    better = (other for other in _refits(system) if other.deviance < limit)
-    return min(better, key=lambda other: other.deviance, default=None)
-
-
 def by_best_readings(system: LinearSystem) -> LinearSystem:
     """The fit by the readings that explain the captures best.
 
@@ -72,10 +48,26 @@ def by_best_readings(system: LinearSystem) -> LinearSystem:
     system
         A fit by either reading of each column.
 
+    Returns
+    -------
+    LinearSystem
+        `system` itself where no other reading lowers the deviance by `policy.selection.tie`.
+
+    Notes
+    -----
+    In a search they compete with the effects: an encoder off its centre looks like a torque without
+    the inertia, and a dead time like another frame, until they are in the model. They compete
+    together: half a PWM period of delay explains more than the frame alone, and less than the frame
+    with straight lines.
+
     """
-    while (other := other_reading(system)) is not None:
-        system = other
-    return system
+    while True:
+        limit = system.deviance - system.policy.selection.tie
+        better = (other for other in _refits(system) if other.deviance < limit)
+        best = min(better, key=lambda other: other.deviance, default=None)
+        if best is None:
+            return system
+        system = best
 
 
 def reading_notes(segments: Sequence[Segment]) -> tuple[str, ...]:

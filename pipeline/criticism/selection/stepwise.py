@@ -31,7 +31,7 @@ from pipeline.criticism.selection.far_starts import with_starts
 from pipeline.criticism.selection.improvement import clears
 from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.log_start import with_log_start
-from pipeline.criticism.selection.other_readings import other_reading
+from pipeline.criticism.selection.other_readings import by_best_readings
 from pipeline.criticism.selection.pruning import reshaped, trimmed, with_all_terms
 from pipeline.criticism.selection.score_test import Score, score_all
 from pipeline.criticism.selection.sizes import material
@@ -131,8 +131,9 @@ def _steps_from(
         couplings = bool(significant.any())
         passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
         chosen = _chosen(wide, passing, fit.model.effects[base:], unsure)
-        unnamed = filter(None, (with_free_shares(wide), other_reading(wide)))
-        alternative = min(unnamed, key=lambda system: system.deviance, default=None)
+        reread = by_best_readings(wide)
+        unnamed = [with_free_shares(wide), None if reread is wide else reread]
+        alternative = min(filter(None, unnamed), key=lambda end: end.deviance, default=None)
         changing = with_changing_friction(wide)
         least = math.inf if chosen is None else _with_full_logs(chosen)
         if alternative is not None and alternative.deviance >= least + policy.tie:

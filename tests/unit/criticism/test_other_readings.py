@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.criticism.selection.other_readings import TORQUE, other_reading
+from pipeline.criticism.selection.other_readings import TORQUE, by_best_readings
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
@@ -62,10 +62,10 @@ def test_a_place_that_leaves_most_of_the_torque_open_is_not_taken(monkeypatch, l
         return replace(system, residual=np.where(torque, times, 1.0) * system.residual)
 
     elsewhere = missing(40.0 * left**0.5)
-    monkeypatch.setattr(f"{other_reading.__module__}.gauss_newton", lambda *_, **__: elsewhere)
+    monkeypatch.setattr(f"{by_best_readings.__module__}.gauss_newton", lambda *_, **__: elsewhere)
     here = missing(40.0)
     assert elsewhere.deviance < here.deviance - here.policy.selection.tie
-    assert (other_reading(here) is elsewhere) == moves
+    assert (by_best_readings(here) is elsewhere) == moves
 
 
 @pytest.mark.parametrize("rippling", [True, False])
@@ -77,7 +77,19 @@ def test_straight_lines_between_rows_are_tried_where_rows_show_waves(monkeypatch
         tried.append([segment.instrument.waves for segment in fit.segments])
         return replace(system, residual=0.1 * system.residual)
 
-    monkeypatch.setattr(f"{other_reading.__module__}.gauss_newton", better)
-    monkeypatch.setattr(f"{other_reading.__module__}.ripples", lambda _: rippling)
-    assert (other_reading(system) is not None) == rippling
-    assert tried == ([[False, False]] if rippling else [])
+    monkeypatch.setattr(f"{by_best_readings.__module__}.gauss_newton", better)
+    monkeypatch.setattr(f"{by_best_readings.__module__}.ripples", lambda _: rippling)
+    assert (by_best_readings(system) is not system) == rippling
+    assert tried[:1] == ([[False, False]] if rippling else [])
+
+
+def test_readings_compete_with_effects_together(monkeypatch):
+    """Half a PWM period of delay beats the frame alone, and not the frame with straight lines."""
+    system = linear_system(fitted((log(noise=1.0), log(noise=1.0, seed=6))))
+    usual, turned, both = (
+        replace(system, residual=times * system.residual) for times in (40.0, 20.0, 10.0)
+    )
+    others = {id(usual): (turned,), id(turned): (usual, both), id(both): (usual, turned)}
+    monkeypatch.setattr(f"{by_best_readings.__module__}._refits", lambda one: others[id(one)])
+    assert by_best_readings(usual) is both
+    assert by_best_readings(both) is both
