@@ -37,7 +37,9 @@ def test_cogging_of_the_slots_alone_is_named():
     """One magnet that is weaker than the others cogs once a slot, and not LCM(slots, 2p) times."""
     turn_rad = np.linspace(0.0, 2.0 * math.pi, 10 * MOTOR.slots + 1)
     size_nm = 0.02 * MOTOR.torque_rated_nm
-    wave = Extra("torque", "theta_mech_rad", tuple(turn_rad), tuple(size_nm * np.sin(12 * turn_rad)))
+    wave = Extra(
+        "torque", "theta_mech_rad", tuple(turn_rad), tuple(size_nm * np.sin(12 * turn_rad))
+    )
     motor = replace(MOTOR, effects={}, extras=(wave,))
     one = campaign_of(campaign(motor, Bench(instruments=EXACT), 1, PLAN[2:]))
     diagnosis = pipeline.diagnose(pipeline.Recordings({one.motor_id: one}))[one.motor_id]
