@@ -101,6 +101,12 @@ def _needs(capture: Capture) -> str:
         return f"no equation takes a {test}"
     missing = [[n for n in equation.columns if not capture.has(n)] for equation in takers]
     fewest = min(map(len, missing))
+    by_angle = any(capture.has(name) for name in ("theta_mech_rad", "theta_elec_rad"))
+    if not fewest and capture.has("omega_mech_rad_s") and not by_angle:
+        return (
+            f"the {test} shows its motion by a drive's own speed alone, which filters make late: "
+            "log the angle (theta_mech_rad), or the voltages (vd_v, vq_v) as well"
+        )
     if not fewest:
         return (
             f"the {test} has the columns of an equation, but too few even samples, or no motion "

@@ -57,6 +57,16 @@ def unnamed(campaign: Campaign) -> Campaign:
     return replace(campaign, captures=tuple(bare(c) for c in campaign.captures))
 
 
+def test_a_motion_by_a_drives_own_speed_alone_asks_for_the_angle():
+    """Nothing is wrong with its samples: a filtered speed says too little of the acceleration."""
+    few = without({"drive": (*ANGLES, "vd_v", "vq_v", "torque_shaft_nm")}, only("drive"))
+    found = diagnose(few, STANDARD, start_constants(few))
+    assert found.verdict == "insufficient"
+    (note,) = (note for note in found.notes if "speed alone" in note)
+    assert "log the angle (theta_mech_rad), or the voltages (vd_v, vq_v)" in note
+    assert "too few even samples" not in note
+
+
 def test_the_second_harmonic_of_cogging_is_no_back_emf():
     """Nothing but a holding current shows it, and no spectrum of a torque says that it is there."""
     few = only("holding_current", "flux_map", "current_step", "resistance")
