@@ -322,8 +322,8 @@ def error_with(count: int, without: float, after: float) -> str:
     Returns
     -------
     str
-        One clause. An error that is below the floor before shows an effect in means of many
-        samples alone; then no fall is claimed.
+        One clause, which claims a fall only where there is one. Below the floor an effect shows in
+        means of many samples alone.
 
     """
     them = {1: "it", 2: "both"}.get(count, f"all {count}")

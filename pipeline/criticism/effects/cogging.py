@@ -44,12 +44,13 @@ def _unverified_orders(machine: Machine) -> set[int]:
     p, slots, both = machine.pole_pairs, machine.slots, machine.cogging_order
     usual = {6 * p, 12 * p} if slots is None else {slots}
     usual |= {p, 2 * p} if both is None else {p, 2 * p, both, 2 * both}
-    return usual | {int(k) for k in machine.load_orders if _is_multiple(k, machine)}
+    return {int(k) for k in {*usual, *machine.load_orders} if _is_multiple(k, machine)}
 
 
 def _is_multiple(order: float, machine: Machine) -> bool:
-    """Whether an order [1/turn] is a multiple of the pole pairs or the slots."""
-    return any(base and order % base == 0 for base in (machine.pole_pairs, machine.slots))
+    """Whether an order [1/turn] is a multiple of the pole pairs or the slots; once is unbalance."""
+    bases = machine.pole_pairs, machine.slots
+    return order > 1 and any(base and order % base == 0 for base in bases)
 
 
 def _expand(machine: Machine) -> tuple[Parameter, ...]:

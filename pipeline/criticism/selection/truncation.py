@@ -86,7 +86,7 @@ def contradiction(step: LadderStep) -> str:
     for effect in model.effects:
         if effect.name not in step.added[-1:]:
             continue
-        if effect.torque is not None and (driving := _driving_friction(system)):
+        if effect.hook == "torque" and (driving := _driving_friction(step)):
             return (
                 f"{effect.name} would take much of what is left, but goes with a viscous friction "
                 f"of {driving:.2g} N·m·s/rad, which drives the shaft"
@@ -103,15 +103,15 @@ def contradiction(step: LadderStep) -> str:
     return ""
 
 
-def _driving_friction(system: LinearSystem) -> float:
-    """The viscous friction [N·m·s/rad] of a fit, where it certainly drives the shaft; else zero.
-
-    A drag of a wrong form leaves its difference from the true one to the constants.
+def _driving_friction(step: LadderStep) -> float:
+    """The viscous friction [N·m·s/rad] beside a drag that was found, where it certainly drives the
+    shaft; else zero. A drag of a wrong form leaves its difference from the true one to it.
     """
-    value, columns = system.fit.values["b_nm_s_rad"], system.model_columns.tolist()
-    if value >= 0.0:
+    system, value = step.system, step.fit.values["b_nm_s_rad"]
+    drags = [e for e in step.fit.model.effects if e.hook == "torque" and e.name in step.added]
+    if value >= 0.0 or not drags:
         return 0.0
-    names = [system.columns[place].name for place in columns]
+    names = [system.columns[place].name for place in system.model_columns.tolist()]
     place = names.index("b_nm_s_rad")
     u = math.sqrt(float(system.covariance(system.model_columns)[place, place]))
     return value if value < -system.policy.selection.least_u * u else 0.0
@@ -190,13 +190,12 @@ def explained(
     no signal's part is large for the machine. An offset of the angle that removes all of the
     torque's error explains nothing of a shaft that coasts too short. Signals with a small part of
     the deviance do not count alone. Deviance is logarithmic: for an equation at a million floors,
-    half of it remains at a thousand. Effects with which a viscous friction comes to drive the
-    shaft, and that leave something, are of another form than what the captures show.
+    half of it remains at a thousand. A drag beside a viscous friction that drives the shaft is of
+    another form than what the captures show, where anything is left.
 
     """
     policy, over = steps[0].fit.policy.selection, steps[0].fit.policy.goodness.over
-    drives = [bool(_driving_friction(step.system)) for step in (steps[0], steps[-1])]
-    if remainders and drives == [False, True]:
+    if remainders and _driving_friction(steps[-1]):
         return False
     first, last = (max(held_out[n].total ** 2 - 1.0, 0.0) for n in (0, len(steps) - 1))
     if last > policy.unexplained_share**2 * first:

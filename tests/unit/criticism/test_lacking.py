@@ -67,6 +67,15 @@ def test_a_motion_by_a_drives_own_speed_alone_asks_for_the_angle():
     assert "too few even samples" not in note
 
 
+def test_a_short_coast_by_its_speed_has_too_few_samples():
+    coasts = without({"spin_down": ANGLES}, only("spin_down"))
+    short = [replace(c, tables=tuple(t.head(20) for t in c.tables)) for c in coasts.captures]
+    few = replace(coasts, captures=tuple(short))
+    notes = diagnose(few, STANDARD, start_constants(few)).notes
+    assert any("too few even samples" in note for note in notes)
+    assert not any("speed alone" in note for note in notes)
+
+
 def test_the_second_harmonic_of_cogging_is_no_back_emf():
     """Nothing but a holding current shows it, and no spectrum of a torque says that it is there."""
     few = only("holding_current", "flux_map", "current_step", "resistance")
