@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -24,6 +25,8 @@ ORDERS = (6, 12, 18, 24)
 SIGNED = np.concatenate([ORDERS, np.negative(ORDERS)])
 RIPPLE = "assumed:ripple_torque"
 """Doubt of a torque of ripple, in its standard uncertainties."""
+_ROWS_AT_ONCE = 100_000
+"""Rows that are solved at a time; ten complex columns of them take 16 MB."""
 Complex = NDArray[np.complexfloating]
 
 
@@ -125,11 +128,13 @@ def ripple_of(
     """
     if winding is None:
         return 0.0, 0.0
-    ripple = _ripple(capture, data, rows, winding)
-    if ripple is None:
-        return 0.0, 0.0
-    (there,) = _beyond_noise([ripple])
     rows_data = {name: column[rows] for name, column in data.items()}
+    if not all(name in rows_data and np.all(np.isfinite(rows_data[name])) for name in NEEDED):
+        return 0.0, 0.0
+    ripples = _ripples(capture, rows_data, [slice(0, rows_data["t_s"].size)], winding)
+    if not ripples:
+        return 0.0, 0.0
+    (there,) = _beyond_noise(ripples)
     return _torque(there, winding, _winding_temperature(rows_data), _drop_v(capture, rows_data))
 
 
@@ -160,9 +165,7 @@ def ripple_by_speed(capture: Capture, winding: Winding | None) -> tuple[Array, A
     extra = [WARMTH] if capture.has(WARMTH) else []
     columns = capture.finite(*NEEDED, *extra, needed=NEEDED)
     windows = _windows(winding.pole_pairs * columns["theta_mech_rad"])
-    each = [
-        r for r in (_ripple(capture, columns, rows, winding) for rows in windows) if r is not None
-    ]
+    each = _ripples(capture, columns, windows, winding) if windows else []
     each.sort(key=lambda ripple: ripple.omega_mech_rad_s)
     back = [ripple for ripple in each if ripple.omega_mech_rad_s < 0.0]
     middles = _beyond_noise(_middles(back) + _middles(each[len(back) :]))
@@ -268,52 +271,87 @@ def _torque(
     return 0.0, float(np.copysign(np.hypot(torque, u), omega))
 
 
-def _ripple(
-    capture: Capture, data: Mapping[str, Array], rows: slice, winding: Winding
-) -> _Ripple | None:
-    """The harmonics of rows; None where they do not resolve the lowest order."""
-    if any(name not in data for name in NEEDED):
-        return None
-    columns = {name: data[name][rows] for name in NEEDED}
-    if not all(np.all(np.isfinite(column)) for column in columns.values()):
-        return None
-    t, turned = columns["t_s"], winding.pole_pairs * columns["theta_mech_rad"]
-    span_s, travel = float(t[-1] - t[0]), float(turned[-1] - turned[0])
+def _ripples(
+    capture: Capture, data: Mapping[str, Array], windows: Sequence[slice], winding: Winding
+) -> list[_Ripple]:
+    """The harmonics of windows of rows, without the windows that do not resolve the lowest order.
+
+    Windows that resolve the same orders are solved at once.
+    """
+    first, end = (np.array([getattr(w, side) for w in windows]) for side in ("start", "stop"))
+    t, turned, sizes = data["t_s"], winding.pole_pairs * data["theta_mech_rad"], end - first
+    period_s = (t[end - 1] - t[first]) / (sizes - 1)
+    travel = turned[end - 1] - turned[first]
+    omega = travel / (t[end - 1] - t[first])
     apart = policy().ripple_torque.apart_cycles * 2.0 * np.pi
-    seen = np.abs(SIGNED) * abs(travel) + 0.5 * apart < np.pi * (t.size - 1)
-    if not np.any(seen) or ORDERS[0] * abs(travel) < apart:
-        return None
-    signed = SIGNED[seen]
-    signals = [columns["vd_v"] + 1j * columns["vq_v"], columns["id_a"] + 1j * columns["iq_a"]]
-    (voltage, current), noise = _amplitudes(np.column_stack(signals), turned, t, signed)
-    omega, period_s = travel / span_s, span_s / (t.size - 1)
-    hold, timing = hold_s(capture.meta, period_s, omega), capture.meta.voltage_timing
-    if timing == "held":
-        voltage = voltage * np.exp(-0.5j * (signed + 1) * omega * hold)
-    if timing == "centred" and hold < period_s:
-        damping = np.sinc(0.5 * signed * omega * period_s / np.pi)
-        voltage, current, noise = voltage / damping, current / damping, noise / damping**2
-    amplitudes = np.zeros((2, SIGNED.size), dtype=np.complex128)
-    amplitudes[:, seen] = voltage, current
-    noise_a2 = np.zeros(SIGNED.size)
-    noise_a2[seen] = noise
+    seen = np.outer(np.abs(travel), np.abs(SIGNED)) + 0.5 * apart < np.pi * (sizes[:, None] - 1)
+    seen[ORDERS[0] * np.abs(travel) < apart] = False
+    signals = np.column_stack([data["vd_v"] + 1j * data["vq_v"], data["id_a"] + 1j * data["iq_a"]])
+    ripples: dict[int, _Ripple] = {}
+    for there in np.unique(seen[seen.any(axis=1)], axis=0):
+        alike = np.flatnonzero((seen == there).all(axis=1))
+        for some in np.array_split(alike, 1 + sizes[alike].sum() // _ROWS_AT_ONCE):
+            rows = np.concatenate([np.arange(first[n], end[n]) for n in some])
+            parts, noise_a2 = _amplitudes(
+                signals[rows], turned[rows], t[rows], SIGNED[there], sizes[some]
+            )
+            for n, part, noise in zip(some.tolist(), parts, noise_a2, strict=True):
+                amplitudes = np.zeros((2, SIGNED.size), dtype=np.complex128)
+                amplitudes[:, there] = part
+                ripples[n] = _at_terminals(
+                    capture, amplitudes, noise * there, float(omega[n]), float(period_s[n]), winding
+                )
+    return [ripples[n] for n in sorted(ripples)]
+
+
+def _at_terminals(
+    capture: Capture,
+    amplitudes: Complex,
+    noise_a2: Array,
+    omega_rad_s: float,
+    period_s: float,
+    winding: Winding,
+) -> _Ripple:
+    """Harmonics of voltage and current [2, k] without what sampling did to them, at an electrical
+    speed; `noise_a2` [k] is the variance of each current.
+    """
     voltage, current = amplitudes
-    return _Ripple(voltage, current, noise_a2, hold, omega / winding.pole_pairs)
+    hold, timing = hold_s(capture.meta, period_s, omega_rad_s), capture.meta.voltage_timing
+    if timing == "held":
+        voltage = voltage * np.exp(-0.5j * (SIGNED + 1) * omega_rad_s * hold)
+    if timing == "centred" and hold < period_s:
+        # an order that is resolved turns by less than half a cycle in a row
+        damping = np.maximum(np.sinc(0.5 * SIGNED * omega_rad_s * period_s / np.pi), 2.0 / np.pi)
+        voltage, current, noise_a2 = voltage / damping, current / damping, noise_a2 / damping**2
+    return _Ripple(voltage, current, noise_a2, hold, omega_rad_s / winding.pole_pairs)
 
 
 def _amplitudes(
-    signals: Complex, turned_rad: Array, t_s: Array, orders: NDArray[np.int64]
+    signals: Complex,
+    turned_rad: Array,
+    t_s: Array,
+    orders: NDArray[np.int64],
+    sizes: NDArray[np.intp],
 ) -> tuple[Complex, Array]:
-    """Amplitudes [2, k] of two signals [n, 2] at orders of an angle, beside a straight line; and
-    the variance of those of the second [k].
+    """Amplitudes [w, 2, k] of two signals [n, 2] at orders of an angle, beside a straight line, in
+    each of the windows of these `sizes` [w]; and the variance of those of the second [w].
     """
-    line = np.column_stack([np.ones(t_s.size), (t_s - t_s.mean()) / (t_s[-1] - t_s[0])])
-    design = np.hstack([line, np.exp(1j * np.outer(turned_rad, orders))])
-    to_rows = design.conj().T
-    parts: Complex = np.linalg.lstsq(to_rows @ design, to_rows @ signals, rcond=None)[0]
-    remainder = (signals - design @ parts)[:, 1]
-    variance = float(np.vdot(remainder, remainder).real) / (t_s.size - design.shape[1])
-    return parts[2:].T, np.full(orders.size, variance / t_s.size)
+    begins = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+
+    def sums(rows: Array | Complex) -> Any:
+        return np.add.reduceat(rows, begins, axis=0)
+
+    span_s = t_s[begins + sizes - 1] - t_s[begins]
+    line = (t_s - np.repeat(sums(t_s) / sizes, sizes)) / np.repeat(span_s, sizes)
+    turns = np.exp(1j * np.outer(turned_rad, orders))
+    design = np.column_stack([np.ones(t_s.size), line, turns])
+    normal = np.stack([sums(one.conj()[:, np.newaxis] * design) for one in design.T], axis=1)
+    right = np.stack([sums(one.conj()[:, np.newaxis] * signals) for one in design.T], axis=1)
+    least = np.finfo(float).eps * design.shape[1]
+    parts = np.linalg.pinv(normal, rcond=least, hermitian=True) @ right
+    predicted = np.einsum("nk,nk->n", design, np.repeat(parts[:, :, 1], sizes, axis=0))
+    variance = sums(np.abs(signals[:, 1] - predicted) ** 2) / (sizes - design.shape[1])
+    return parts[:, 2:].transpose(0, 2, 1), variance / sizes
 
 
 def _winding_temperature(data: Mapping[str, Array]) -> tuple[float, float]:
