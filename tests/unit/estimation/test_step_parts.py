@@ -441,24 +441,55 @@ def test_the_share_covered_after_a_time() -> None:
     assert found == pytest.approx([0.0, 1.0 - math.exp(-1.0), 1.0 - math.e, 1.0 - math.exp(30.0)])
 
 
-def test_steps_are_fine_for_eight_time_constants() -> None:
-    """16 steps a time constant for eight of them, then seven more to the edge."""
+@pytest.mark.parametrize("constants", [10.0, 1000.0])
+def test_steps_are_fine_after_an_edge_and_grow(constants: float) -> None:
+    """A 24th of a time constant at first, e times that after three."""
     record = read_step(step(noise=1e-4))
     assert record is not None
-    record = replace(record, l_start_h=1e-4, r_start_ohm=1.0,
+    length = float(np.diff(record.wave.edges_s)[1])
+    tau = length / constants
+    record = replace(record, l_start_h=tau * 2.0, r_start_ohm=1.0,
                      wave=replace(record.wave, source_ohm=1.0))  # fmt: skip
     segment, begin, end = _steps(record)
-    tau = 1e-4 / 2.0
     second = segment == 1
-    length = float(np.diff(record.wave.edges_s)[1])
-    fine = 8 * 16
-    assert np.count_nonzero(second) == fine + 7
-    widths = (end - begin)[second] * length
-    assert widths[:fine] == pytest.approx(tau / 16.0, rel=1e-9)
+    starts, widths = begin[second] * length, (end - begin)[second] * length
+    fine = starts < 8.0 * tau
+    middle = starts[fine] + 0.5 * widths[fine]
+    assert widths[fine] == pytest.approx(tau / 24.0 * np.exp(middle / (3.0 * tau)), rel=0.02)
+    assert np.count_nonzero(second) <= 3 * 24
     assert (begin[second][0], end[second][-1]) == (0.0, 1.0)
     assert begin[second][1:] == pytest.approx(end[second][:-1])
-    slow = replace(record, l_start_h=1.0)
+    slow = replace(record, l_start_h=1000.0 * length)
     assert np.count_nonzero(_steps(slow)[0] == 1) == 4
+
+
+def split(grid, parts):
+    """The same steps, each in so many equal parts."""
+    segment, begin, end = grid
+    edges = np.linspace(begin, end, parts + 1)
+    return np.repeat(segment, parts), edges[:-1].T.ravel(), edges[1:].T.ravel()
+
+
+@pytest.mark.parametrize("guess", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("powers", [(), (1,), (2,)])
+def test_a_current_under_which_l_halves_is_exact_to_a_part_in_five_thousand(
+    guess: float, powers: tuple[int, ...]
+) -> None:
+    """Against a hundred steps for each; a guess three times off costs a part in a thousand."""
+    record = read_step(step(noise=1e-4))
+    assert record is not None
+    record = replace(record, axis_rad=0.0)
+    model = StepModel([replace(record, l_start_h=guess * L)], inductances)
+    values = start_of([record], model.layout)
+    values[: len(SHARED)] = 0.0
+    values[[LD, LQ]] = L
+    for power in powers:
+        values[LD + power] = (L * record.largest_a) ** -power
+    finer = StepModel(model.records, inductances)
+    finer._grids = [split(grid, 100) for grid in finer._grids]
+    finer._count = max(grid[0].size for grid in finer._grids)
+    (current,), (exact,) = (one.predict([values[np.newaxis, :]]) for one in (model, finer))
+    assert np.max(np.abs(current - exact)) < (2e-4 if guess == 1.0 else 1e-3) * record.largest_a
 
 
 def test_a_drives_settled_current_is_its_first_level_over_the_loop() -> None:
