@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.estimation.electrical.step_fit import AXES, Solution
-from pipeline.estimation.electrical.step_model import StepModel
 from pipeline.estimation.electrical.step_parameters import LD, LQ, Array
 from pipeline.estimation.electrical.step_record import StepRecord, rotor_angle_rad
 from pipeline.estimation.uncertainty.instruments import (
@@ -44,12 +44,12 @@ def gains(name: str, solution: Solution) -> list[Contribution]:
     """
     records = solution.model.records
     days = sorted({_day(record) for record in records})
-    lever = _lever(name, solution)
+    lever, currents = _lever(name, solution), _driven_currents(solution)
     parts = []
     for source, u in instrument_uncertainties(
         [r.capture for r in records], ("voltage", "current")
     ).items():
-        change = _under_gain(source, solution)
+        change = _under_gain(source, solution, currents)
         acting = [float(lever @ (change * _rows_of(day, solution))) for day in days]
         if len(days) == 1:
             parts.append(Contribution(source, u * acting[0], "B"))
@@ -61,11 +61,11 @@ def gains(name: str, solution: Solution) -> list[Contribution]:
     return parts
 
 
-def _under_gain(source: str, solution: Solution) -> Array:
-    """Change of the weighted residuals [n] by a relative gain of one source."""
+def _under_gain(source: str, solution: Solution, currents: Sequence[Array]) -> Array:
+    """Change of the weighted residuals [n] by a gain of one source of the driven currents."""
     change = []
     for record, weight, current in zip(
-        solution.model.records, solution.weights, _driven_currents(solution), strict=True
+        solution.model.records, solution.weights, currents, strict=True
     ):
         amps, volts = np.zeros(record.i_a.size), np.zeros(record.i_a.size)
         if voltage_source(record.capture.meta) == source and record.wave.has_supply:
@@ -110,19 +110,17 @@ def rotor_angles(name: str, solution: Solution, u_theta_rad: float) -> list[Cont
         [H], one an angle and station.
 
     """
-    lever, now = _lever(name, solution), _weighted(solution, solution.model)
-    records = solution.model.records
-    places = sorted({_place(r) for r in records})
+    places = [_place(record) for record in solution.model.records]
+    turned = [
+        (n, replace(record, axis_rad=record.axis_rad + side * u_theta_rad))
+        for side in (-1.0, 1.0)
+        for n, record in enumerate(solution.model.records)
+    ]
+    ends = _moves(name, solution, turned).reshape(2, len(places))
     parts = []
-    for place in places:
-        ends = []
-        for side in (-1.0, 1.0):
-            turned = [
-                replace(r, axis_rad=r.axis_rad + side * u_theta_rad) if _place(r) == place else r
-                for r in records
-            ]
-            ends.append(float(lever @ (_weighted(solution, solution.model.of(turned)) - now)))
-        odd, even = 0.5 * (ends[1] - ends[0]), 0.5 * (ends[1] + ends[0])
+    for place in sorted(set(places)):
+        before, after = ends[:, [one == place for one in places]].sum(axis=1).tolist()
+        odd, even = 0.5 * (after - before), 0.5 * (after + before)
         u = math.copysign(math.hypot(odd, math.sqrt(3.0) * even), odd)
         parts.append(Contribution(f"theta_elec:{place[1]:g}@{place[0]}", u, "B"))
     return parts
@@ -149,10 +147,8 @@ def rounded_levels(name: str, solution: Solution) -> float:
     in squares.
 
     """
-    model = solution.model
-    lever, now = _lever(name, solution), _weighted(solution, model)
-    total = 0.0
-    for k, record in enumerate(model.records):
+    rounded = []
+    for n, record in enumerate(solution.model.records):
         wave, rounding = record.wave, record.voltage_noise.rounding
         if wave.has_supply or rounding < 1e-9 * float(np.max(np.abs(wave.levels_v))):
             continue
@@ -160,11 +156,8 @@ def rounded_levels(name: str, solution: Solution) -> float:
         for cells in np.split(np.arange(wave.levels_v.size), edges):
             levels = wave.levels_v.copy()
             levels[cells] += rounding
-            records = list(model.records)
-            records[k] = replace(record, wave=replace(wave, levels_v=levels))
-            moved = _weighted(solution, model.of(records)) - now
-            total += float(lever @ moved) ** 2
-    return math.sqrt(total)
+            rounded.append((n, replace(record, wave=replace(wave, levels_v=levels))))
+    return float(np.linalg.norm(_moves(name, solution, rounded)))
 
 
 def unexplained(solution: Solution) -> dict[str, float]:
@@ -249,11 +242,23 @@ def _place(record: StepRecord) -> tuple[str, float]:
     return station(record.capture.meta), round(math.degrees(angle), 3)
 
 
-def _weighted(solution: Solution, model: StepModel) -> Array:
-    """Weighted readings [n] that a model predicts at the solution's parameters."""
-    rows = [solution.parameters[None, :]] * len(model.records)
-    both = zip(model.predict_both(rows), solution.weights, strict=True)
-    return np.concatenate([x[:, 0] * w for read, ws in both for x, w in zip(read, ws, strict=True)])
+def _moves(name: str, solution: Solution, altered: Sequence[tuple[int, StepRecord]]) -> Array:
+    """Change [k, H] of an inductance by each record that is in the place of a capture."""
+    model = solution.model
+    places = [*range(len(model.records)), *(n for n, _ in altered)]
+    instead = model.of([*model.records, *(record for _, record in altered)], places)
+    readings = [
+        (np.vstack([current[:, 0], volts[:, 0]]) * solution.weights[n]).ravel()
+        for n, (current, volts) in zip(
+            places, instead.predict_both([solution.parameters[None, :]] * len(places)), strict=True
+        )
+    ]
+    edges = np.cumsum([2 * record.i_a.size for record in model.records])[:-1]
+    levers = np.split(_lever(name, solution), edges)
+    moved = readings[len(model.records) :]
+    return np.array(
+        [levers[n] @ (one - readings[n]) for (n, _), one in zip(altered, moved, strict=True)]
+    )
 
 
 def _driven_currents(solution: Solution) -> list[Array]:

@@ -22,6 +22,7 @@ from pipeline.estimation.electrical.step_parameters import (
     SPACE,
     Array,
     Drive,
+    Layout,
     difference_widths,
     drive_of,
     layout_of,
@@ -80,26 +81,37 @@ class StepModel:
     inductances
         Incremental L_d and L_q [m, H] from the shared parameters [m, 10] and the fluxes of the
         currents along d and q [m, Wb].
+    layout
+        Where the parameters of each capture sit; one after the other where not given.
 
     """
 
-    def __init__(self, records: Sequence[StepRecord], inductances: Inductances) -> None:
+    def __init__(
+        self,
+        records: Sequence[StepRecord],
+        inductances: Inductances,
+        layout: Layout | None = None,
+    ) -> None:
         self.records = tuple(records)
         self.inductances = inductances
-        self.layout = layout_of(records)
+        self.layout = layout_of(records) if layout is None else layout
         self._grids = [_steps(record) for record in records]
         self._count = max(grid[0].size for grid in self._grids)
 
-    def of(self, records: Sequence[StepRecord]) -> StepModel:
+    def of(self, records: Sequence[StepRecord], places: Sequence[int]) -> StepModel:
         """The same equation for other records.
 
         Parameters
         ----------
         records
-            In the same number and order, so that the parameters keep their places.
+            With as many parameters of its own as the one in whose place each stands.
+        places
+            Of the records of this model; each gives its own parameters.
 
         """
-        return StepModel(records, self.inductances)
+        starts = tuple(self.layout.starts[n] for n in places)
+        slots = tuple(self.layout.slots[n] for n in places)
+        return StepModel(records, self.inductances, Layout(starts, slots))
 
     def predict(self, variants: Sequence[Array]) -> list[Array]:
         """Currents of every capture for every variant of the parameters, in one sweep.
