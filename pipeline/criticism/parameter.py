@@ -53,6 +53,9 @@ class Parameter:
         to it.
     order
         Waves a turn of which it is an amplitude.
+    rare_below
+        Value [scales] below which benches seldom have it: of two effects that tie the other one is
+        named.
 
     """
 
@@ -72,6 +75,7 @@ class Parameter:
     usual: tuple[float, float] | None = None
     starts: tuple[float, ...] = ()
     order: float = 0.0
+    rare_below: float = -math.inf
 
     @property
     def amplitude(self) -> bool:

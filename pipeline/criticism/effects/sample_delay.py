@@ -43,7 +43,8 @@ EFFECT = Effect(
     headline="voltages or speed of the drive's log off in time by {delay_s}",
     reference="Bae & Sul, IEEE Trans. Ind. Appl. 39 (2003), time delay of digital control",
     parameters=(
-        Parameter("delay_s", "s", 0.5, 0.02, "period_s", low=-5.0, high=5.0),
+        # a command is logged before it acts, a speed after it was measured
+        Parameter("delay_s", "s", 0.5, 0.02, "period_s", low=-5.0, high=5.0, rare_below=0.0),
         choice(
             "of_speed",
             (0.0, 1.0),

@@ -95,3 +95,20 @@ def size_of(fit: Fit, effect: Effect, parameters: Iterable[Parameter]) -> float:
         if p.amplitude and p.negligible > 0.0
     ]
     return max(sizes, default=0.0)
+
+
+def is_rare(effect: Effect, fit: Fit) -> bool:
+    """Whether benches seldom have an effect, or one of such a sign.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    fit
+        A fit with it.
+
+    """
+    return effect.rare or any(
+        fit.values[f"{effect.name}.{p.name}"] < p.rare_below * fit.machine.scale(p)
+        for p in effect.parameters_of(fit.machine)
+    )

@@ -34,7 +34,7 @@ from pipeline.criticism.selection.log_start import with_log_start
 from pipeline.criticism.selection.other_readings import by_best_readings
 from pipeline.criticism.selection.pruning import reshaped, trimmed, with_all_terms
 from pipeline.criticism.selection.score_test import Score, score_all
-from pipeline.criticism.selection.sizes import material
+from pipeline.criticism.selection.sizes import is_rare, material
 from pipeline.criticism.selection.unusual_nuisances import with_nuisances
 
 
@@ -115,22 +115,12 @@ def _steps_from(
     """
     steps, policy = list(before), fit.policy.selection
     for _ in range(policy.most_steps):
-        offered = candidates(library, fit.model)
-        wide = widened(fit, offered, steps[-1].system if steps else None)
-        significant = significant_groups(wide)
-        scores = score_all(wide, offered, significant)
-        scores = with_nuisances(wide, offered, scores)
-        scores = with_starts(wide, offered, scores, significant)
-        scores = with_linear_start(wide, offered, scores, significant)
-        scores = with_log_start(wide, offered, scores, significant)
+        wide, scores = _scored(fit, library, steps[-1].system if steps else None)
         added = tuple(e.name for e in fit.model.effects[base:])
         steps.append(LadderStep(added, wide, scores))
         if len(steps) == policy.most_steps:
             break
-        inside = {e.discriminator for e in fit.model.effects} - {None}
-        couplings = bool(significant.any())
-        passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
-        chosen = _chosen(wide, passing, fit.model.effects[base:], unsure)
+        chosen = _best(wide, scores, base, unsure)
         reread = by_best_readings(wide)
         unnamed = [with_free_shares(wide), None if reread is wide else reread]
         alternative = min(filter(None, unnamed), key=lambda end: end.deviance, default=None)
@@ -141,6 +131,8 @@ def _steps_from(
         if changing is not None and changing.deviance < least - policy.tie:
             better = alternative is None or changing.deviance < alternative.deviance - policy.tie
             alternative = changing if better else alternative
+        if alternative is None and _is_reading(chosen, wide, reread, library, base, unsure):
+            alternative = reread
         if alternative is not None:
             fit = alternative.fit
             del steps[-1]
@@ -154,6 +146,76 @@ def _steps_from(
         if tuple(e.name for e in fit.model.effects[base:]) in {r.added for r in steps}:
             break
     return steps
+
+
+def _scored(
+    fit: Fit, library: Mapping[str, Effect], before: LinearSystem | None
+) -> tuple[LinearSystem, tuple[Score, ...]]:
+    """A fit with the columns of all candidates, those of `before` where they may serve, and every
+    candidate's score on it.
+    """
+    offered = candidates(library, fit.model)
+    wide = widened(fit, offered, before)
+    significant = significant_groups(wide)
+    scores = score_all(wide, offered, significant)
+    scores = with_nuisances(wide, offered, scores)
+    scores = with_starts(wide, offered, scores, significant)
+    scores = with_linear_start(wide, offered, scores, significant)
+    return wide, with_log_start(wide, offered, scores, significant)
+
+
+def _best(
+    wide: LinearSystem, scores: Sequence[Score], base: int, unsure: Set[str]
+) -> LinearSystem | None:
+    """The fit with the candidate that is best by its score and may join; None without one."""
+    effects, couplings = wide.fit.model.effects, bool(significant_groups(wide).any())
+    inside = {e.discriminator for e in effects} - {None}
+    passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
+    return _chosen(wide, passing, effects[base:], unsure)
+
+
+def _is_reading(
+    chosen: LinearSystem | None,
+    wide: LinearSystem,
+    reread: LinearSystem,
+    library: Mapping[str, Effect],
+    base: int,
+    unsure: Set[str],
+) -> bool:
+    """Whether an effect is `chosen` for what another reading of a column is, as far as captures
+    tell; a reading costs no parameter, and leaves an effect less to explain.
+
+    The effect takes most of what the reading takes. And by that reading one effect explains as
+    much, or one that captures do not show well enough to name it, or none. Of two that tie, a rare
+    one is not taken instead.
+    """
+    if chosen is None or reread is wide:
+        return False
+    both = gauss_newton(replace(chosen.fit, segments=reread.segments))
+    beside, alone = chosen.deviance - both.deviance, wide.deviance - reread.deviance
+    if beside >= wide.policy.selection.unexplained_share * alone:
+        return False
+    rest, scores = _scored(reread.fit, library, wide)
+    limit, tie = _cost(chosen), wide.policy.selection.tie
+    other = _best(rest, scores, base, unsure)
+    if other is None:
+        least = rest.deviance + math.log(rest.size) * rest.model_columns.size
+        small = (s.penalty - s.fall for s in scores if _may_be_there(rest, s))
+        return least + min(0.0, *small) < limit + tie
+    rare, was_rare = (is_rare(s.fit.model.effects[-1], s.fit) for s in (other, chosen))
+    return _cost(other) < limit + (-tie if rare and not was_rare else tie)
+
+
+def _may_be_there(wide: LinearSystem, score: Score) -> bool:
+    """Whether an effect that is not named may well be there: it is too small, or is not rare."""
+    effect = score.candidate.effect
+    usual = not is_rare(effect, begin_from(wide.fit, score))
+    return effect.discriminator is None and (usual or not score.matters)
+
+
+def _cost(system: LinearSystem) -> float:
+    """The deviance of a fit with the penalty of its parameters."""
+    return _with_full_logs(system) + math.log(system.size) * system.model_columns.size
 
 
 def _refloored(system: LinearSystem, base: int) -> Fit:
@@ -270,7 +332,7 @@ def _refit_best(
         baseline = usual if begun is wide else Baseline.of(gauss_newton(begun.fit, begun), added)
         base = baseline.wide
         # of two that tie, the one that benches have and that some capture here was made to show
-        far = effect.rare or set(effect.tests).isdisjoint(tests)
+        far = is_rare(effect, tried.fit) or set(effect.tests).isdisjoint(tests)
         unsought = policy.tie if far else 0.0
         cost = tried.deviance - base.deviance + score.penalty + unsought
         if (

@@ -143,6 +143,19 @@ def in_frame_of(theta_rad: np.ndarray, recorded: dict[str, np.ndarray]) -> dict[
     return {**recorded, **turned}
 
 
+def held(before_middle: float, plain: Segment) -> Segment:
+    """A log of vectors that are held from sample to sample, in the rotor frame of an instant
+    `before_middle` of their hold [holds]; `plain` has those of instants.
+    """
+    recorded = dict(plain.recorded)
+    instant = recorded["vd_v"] + 1j * recorded["vq_v"]
+    middle = np.append(0.5 * (instant[:-1] + instant[1:]), instant[-1])
+    turn = np.append(np.diff(7 * recorded["theta_mech_rad"]), 0.0)
+    vector = middle * np.exp(1j * before_middle * turn)
+    recorded |= {"vd_v": vector.real, "vq_v": vector.imag}
+    return replace(plain, recorded=recorded, instrument=replace(plain.instrument, timing="held"))
+
+
 def unit_floor(segment: Segment) -> np.ndarray:
     """A noise floor of one for each of a segment's weak samples."""
     return np.ones(int(row_index(segment)[2].sum()))

@@ -52,6 +52,15 @@ def test_of_two_that_tie_the_one_that_benches_have_is_named(rare, named):
     assert search(fitted(segments), library)[-1].added == (named,)
 
 
+@pytest.mark.parametrize(("rare", "named"), [("windage", "brake"), ("brake", "windage")])
+def test_of_two_that_tie_the_one_of_a_usual_size_is_named(rare, named):
+    library = {name: replace(effects()["windage"], name=name) for name in ("windage", "brake")}
+    (size,) = library[rare].parameters
+    library[rare] = replace(library[rare], parameters=(replace(size, rare_below=1.0),))
+    segments = (with_drag(curved(0.1)), with_drag(curved(0.1), 6))
+    assert search(fitted(segments), library)[-1].added == (named,)
+
+
 def test_a_rival_is_told_whatever_size_it_comes_out_at():
     """That it would be too small to matter does not part it from what it is confused with."""
     twin = replace(asking_for(0.1)["windage"], name="brake")

@@ -15,7 +15,7 @@ from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.other_readings import by_best_readings, reading_notes
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.stepwise import search
-from tests.unit.criticism.machines import BASE, LIBRARY, fitted, log, machine
+from tests.unit.criticism.machines import BASE, LIBRARY, fitted, held, log, machine
 
 EVERY = 60
 PAIRS = 7
@@ -82,23 +82,9 @@ def test_what_is_left_of_a_mean_has_one_form_through_zero(turn: float) -> None:
     assert _shortened(lost) == pytest.approx([math.sin(half) / half, 1.0, math.sinh(half) / half])
 
 
-def held(before_middle: float, noise: float) -> Segment:
-    """A log of vectors that are held from sample to sample, in the rotor frame of an instant
-    `before_middle` of their hold [holds]; its shaft turns through both senses.
-    """
-    plain = log(noise=noise)
-    recorded = dict(plain.recorded)
-    instant = recorded["vd_v"] + 1j * recorded["vq_v"]
-    middle = np.append(0.5 * (instant[:-1] + instant[1:]), instant[-1])
-    turn = np.append(np.diff(PAIRS * recorded["theta_mech_rad"]), 0.0)
-    vector = middle * np.exp(1j * before_middle * turn)
-    recorded |= {"vd_v": vector.real, "vq_v": vector.imag}
-    return replace(plain, recorded=recorded, instrument=replace(plain.instrument, timing="held"))
-
-
 @pytest.mark.parametrize("frame", [0.0, 0.5])
 def test_the_frame_of_held_voltages_is_the_one_that_explains_them(frame: float) -> None:
-    system = by_best_readings(fit_of([held(frame, 1.0)], Model(machine(), ())).system)
+    system = by_best_readings(fit_of([held(frame, log(noise=1.0))], Model(machine(), ())).system)
     (segment,) = system.segments
     assert segment.instrument.frame == frame
     assert bool(reading_notes(system.segments)) == bool(frame)
@@ -142,7 +128,8 @@ def test_the_frame_is_asked_again_when_an_effect_joins() -> None:
         torque = segment.recorded["torque_shaft_nm"] - 0.3 * omega * np.abs(omega) / 250.0**2
         return replace(segment, recorded={**segment.recorded, "torque_shaft_nm": torque})
 
-    fit = fitted([dragged(held(0.5, 1.0)), replace(dragged(held(0.5, 1.0)), capture="again")])
+    one = dragged(held(0.5, log(noise=1.0)))
+    fit = fitted([one, replace(one, capture="again")])
     assert {segment.instrument.frame for segment in fit.segments} == {0.0}
     last = search(fit, {"windage": LIBRARY["windage"]})[-1]
     assert last.added == ("windage",)
