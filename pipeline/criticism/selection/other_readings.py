@@ -36,7 +36,8 @@ _STATOR = (
 )
 _SAMPLED = (
     "voltages of {} captures are taken in the rotor frame of the sampling instant, which explains "
-    "them better than that of the middle of their PWM period"
+    "them better than that of the middle of their PWM period; a sample_delay of half a period "
+    "would look the same"
 )
 
 

@@ -16,7 +16,7 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.criticism.selection.other_readings import by_best_readings
+from pipeline.criticism.selection.other_readings import by_best_readings, reading_notes
 from pipeline.criticism.selection.sizes import is_rare
 from pipeline.criticism.selection.stepwise import _is_reading, search
 from tests.unit.criticism.machines import BASE, fitted, held, log
@@ -72,6 +72,8 @@ def test_a_frame_beside_an_iron_loss_below_the_floor_is_no_delay() -> None:
     last, frame = searched([held(0.5, with_iron(0.02, seed)) for seed in (5, 6)])
     assert last.added == ()
     assert frame == 0.5
+    (note,) = reading_notes(last.fit.segments)
+    assert "a sample_delay of half a period would look the same" in note
 
 
 def test_an_effect_that_leaves_a_reading_its_share_is_not_in_its_place() -> None:
