@@ -31,6 +31,7 @@ from pipeline.criticism.regression.linear_system import LinearSystem, linear_sys
 from pipeline.criticism.selection.candidates import Candidate, first_of_each, searched
 from pipeline.criticism.selection.improvement import FitQuality, clears, fall_below_floor, share_of
 from pipeline.criticism.selection.score_test import Score, paid_for, ranked
+from pipeline.criticism.selection.sizes import size_of
 
 
 def with_linear_start(
@@ -134,24 +135,45 @@ def scored(wide: LinearSystem, candidate: Candidate, begun: Fit) -> Score:
     """
     refitted = gauss_newton(replace(begun, sigma=floors(begun.segments, begun.model, begun.values)))
     end = _reweighted(refitted.fit, refitted.fit)
-    base = _reweighted(wide.fit, end.fit)
+    return score_between(_reweighted(wide.fit, end.fit), end, candidate)
+
+
+def score_between(base: LinearSystem, end: LinearSystem, candidate: Candidate) -> Score:
+    """The score of an effect by fits without it and with it.
+
+    Parameters
+    ----------
+    base, end
+        The fits, by the same noise floors; the last effect of the second one is the candidate's.
+    candidate
+        The effect.
+
+    Returns
+    -------
+    Score
+        Without what the search over candidates costs.
+
+    """
     before, after = _quality(base), _quality(end)
-    effect = begun.model.effects[-1]
-    prefix, first = f"{effect.name}.", effect.parameters_of(wide.fit.machine)[0]
-    values = {name: value for name, value in end.fit.values.items() if name.startswith(prefix)}
+    effect, machine = end.fit.model.effects[-1], base.fit.machine
+    parameters = effect.parameters_of(machine)
+    values = {
+        f"{effect.name}.{p.name}": end.fit.values[f"{effect.name}.{p.name}"] for p in parameters
+    }
+    amplitudes = [f"{effect.name}.{p.name}" for p in parameters if p.amplitude]
     score = Score(
         replace(candidate, effect=effect, values=values),
         before.deviance - after.deviance,
         0.0,
-        {f"{prefix}{first.name}": values[f"{prefix}{first.name}"]},
-        {n: end.fit.values[n] - v for n, v in wide.fit.values.items()},
+        {name: values[name] for name in amplitudes},
+        {n: end.fit.values[n] - v for n, v in base.fit.values.items()},
         share_of(base, effect, before, after),
-        values[f"{prefix}{first.name}"] / first.negligible,
+        size_of(end.fit, effect, parameters),
         fall_below_floor(base, before.reduced_chi2, after.reduced_chi2),
-        policy=wide.policy.selection,
+        policy=base.policy.selection,
     )
-    dof = paid_for(effect, wide.fit.machine, score)
-    return replace(score, penalty=dof * math.log(wide.size))
+    dof = paid_for(effect, machine, score)
+    return replace(score, penalty=dof * math.log(base.size))
 
 
 def _reweighted(fit: Fit, other: Fit) -> LinearSystem:

@@ -33,6 +33,7 @@ from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.log_start import with_log_start
 from pipeline.criticism.selection.other_readings import by_best_readings
 from pipeline.criticism.selection.pruning import reshaped, trimmed, with_all_terms
+from pipeline.criticism.selection.round_rotor_start import with_round_rotor_start
 from pipeline.criticism.selection.score_test import Score, score_all
 from pipeline.criticism.selection.sizes import is_rare, material
 from pipeline.criticism.selection.unusual_nuisances import with_nuisances
@@ -161,6 +162,7 @@ def _scored(
     scores = with_nuisances(wide, offered, scores)
     scores = with_starts(wide, offered, scores, significant)
     scores = with_linear_start(wide, offered, scores, significant)
+    scores = with_round_rotor_start(wide, offered, scores, significant)
     return wide, with_log_start(wide, offered, scores, significant)
 
 

@@ -1,0 +1,89 @@
+"""An error of the angle tried from a rotor that is round, where the inductances fit that error.
+
+A current loop answers the wave of voltage that an encoder off its centre makes. In that closed loop
+the rate of the answer looks like an inductance of many times the true one, and a frame that turns
+by such an inductance times the current leads nowhere: the tangent at that fit does not show the
+error. The electrical equation of a round rotor, L_d = L_q, has no part that depends on its frame,
+so from there the error is fitted whatever the base fit made of both.
+
+Reference: Forssell & Ljung, Automatica 35 (1999), 1215, identification in a closed loop,
+doi:10.1016/S0005-1098(99)00022-9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import compress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.machine.model import zero
+from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.residuals.observability import observes
+from pipeline.criticism.selection.candidates import Candidate, first_of_each
+from pipeline.criticism.selection.linear_start import score_between, with_better
+from pipeline.criticism.selection.score_test import Score
+
+_INDUCTANCES = ("ld_h", "lq_h")
+
+
+def with_round_rotor_start(
+    wide: LinearSystem,
+    offered: Sequence[Candidate],
+    scores: Sequence[Score],
+    significant: NDArray[np.bool_],
+) -> tuple[Score, ...]:
+    """Scores, those of errors of the angle from a round rotor where that beats the tangent.
+
+    Parameters
+    ----------
+    wide
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+    scores
+        Scores by the tangent.
+    significant
+        Groups [G] over their floor. Without any, and where captures at a standstill tell most of
+        both inductances, tangents are believed; so is one that passes.
+
+    Returns
+    -------
+    tuple of Score
+        The largest fall first.
+
+    """
+    so_far = list(scores)
+    passing = {score.candidate.effect.name for score in scores if score.passes}
+    for name, candidate in first_of_each(offered).items():
+        effect = candidate.effect
+        if effect.angle is None or name in passing or not _rests_on(wide, effect, significant):
+            continue
+        end = gauss_newton(_round_rotor(wide.fit, candidate))
+        so_far = with_better(so_far, score_between(wide, end, candidate), offered)
+    return tuple(so_far)
+
+
+def _rests_on(wide: LinearSystem, effect: Effect, significant: NDArray[np.bool_]) -> bool:
+    """Whether most of what is known of an inductance comes from captures in which an effect acts,
+    some of whose groups [G] are not explained.
+    """
+    acts = np.array([observes(segment, effect) for segment in wide.segments])
+    if not any(acts[number] for number, _, _ in compress(wide.labels, significant)):
+        return False
+    known = wide.matrix[:, wide.place(_INDUCTANCES)] ** 2
+    there, whole = known[acts[wide.segment]].sum(axis=0), known.sum(axis=0)
+    return bool(np.any(there > wide.policy.selection.unexplained_share * whole))
+
+
+def _round_rotor(fit: Fit, candidate: Candidate) -> Fit:
+    """Where a fit with an error of the angle begins: at none, with the smaller inductance twice."""
+    model = fit.model.with_effects(candidate.effect)
+    nothing = {**zero(candidate.effect, model), **candidate.values}
+    smaller = min(fit.values[name] for name in _INDUCTANCES)
+    return replace(fit, model=model).at({**nothing, **dict.fromkeys(_INDUCTANCES, smaller)})
