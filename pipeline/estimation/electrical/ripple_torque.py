@@ -25,8 +25,6 @@ ORDERS = (6, 12, 18, 24)
 SIGNED = np.concatenate([ORDERS, np.negative(ORDERS)])
 RIPPLE = "assumed:ripple_torque"
 """Doubt of a torque of ripple, in its standard uncertainties."""
-_ROWS_AT_ONCE = 100_000
-"""Rows that are solved at a time; ten complex columns of them take 16 MB."""
 Complex = NDArray[np.complexfloating]
 
 
@@ -290,7 +288,9 @@ def _ripples(
     ripples: dict[int, _Ripple] = {}
     for there in np.unique(seen[seen.any(axis=1)], axis=0):
         alike = np.flatnonzero((seen == there).all(axis=1))
-        for some in np.array_split(alike, 1 + sizes[alike].sum() // _ROWS_AT_ONCE):
+        for some in np.array_split(
+            alike, 1 + sizes[alike].sum() // policy().ripple_torque.rows_at_once
+        ):
             rows = np.concatenate([np.arange(first[n], end[n]) for n in some])
             parts, noise_a2 = _amplitudes(
                 signals[rows], turned[rows], t[rows], SIGNED[there], sizes[some]

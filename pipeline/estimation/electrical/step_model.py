@@ -34,13 +34,6 @@ from pipeline.estimation.policy import policy
 Inductances = Callable[[Array, Array, Array], tuple[Array, Array]]
 """Incremental Ld and Lq [m, H] of shared parameters [m, 10] and the currents' fluxes [m, Wb]."""
 
-_FINE, _SLOWER_IN = 24.0, 3.0
-"""Steps in the first time constant after an edge, and time constants in which they become e times
-as long. Beside 16 in each of eight, and seven after these, the current of an L that halves is off
-by half as much, and there are half as many."""
-_LATEST = 30.0
-"""Where the last step begins at the latest, in the time in which they become e times as long."""
-
 
 def _covered(time: Array) -> Array:
     """Share of the way to its goal [m] after a time [m, in time constants].
@@ -59,10 +52,10 @@ def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
         if sampled:
             nodes = np.array([0.0, 1.0])
         else:
-            slower = _SLOWER_IN * tau
-            # a step that is this late has nothing left to settle
-            share = -math.expm1(-min(length / slower, _LATEST))
-            count = max(math.ceil(_SLOWER_IN * _FINE * share), 4)
+            slower = policy().steps.slower_in * tau
+            # the last step begins after 30 of these at the latest: nothing is left to settle there
+            share = -math.expm1(-min(length / slower, 30.0))
+            count = max(math.ceil(policy().steps.slower_in * policy().steps.fine * share), 4)
             nodes = -slower / length * np.log1p(-share * np.linspace(0.0, 1.0, count + 1))
             nodes[-1] = 1.0
         segments += [index] * (nodes.size - 1)

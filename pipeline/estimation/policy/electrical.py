@@ -65,6 +65,14 @@ class Steps:
         0.1, "1", "of a channel's scatter, below which its rounding is left out",
         why="a tenth in quadrature is half a per cent of the scatter",
     )  # fmt: skip
+    fine: float = chosen(
+        24.0, "1", "steps of the integration in the first time constant after an edge",
+        why="of an L that halves, the current is off by a part in ten thousand",
+    )  # fmt: skip
+    slower_in: float = chosen(
+        3.0, "time constants", "time in which steps of the integration become e times as long",
+        why="half as many steps as 16 in each of eight, and half their error of the current",
+    )  # fmt: skip
     drop_knee_share: float = chosen(
         0.02, "1", "of the largest current, below which an inverter's drop fades",
         why="a corner would break the integration; the drop is known no better there",

@@ -229,6 +229,10 @@ class RippleTorque:
         3.0, "1", "cycles of the lowest order in a window of a drive",
         why="one more than they need, and short, as a drive's speed changes",
     )  # fmt: skip
+    rows_at_once: int = chosen(
+        100000, "1", "rows of windows that are solved together",
+        why="ten complex columns of them take 16 MB",
+    )  # fmt: skip
     half_share: float = derived(
         0.4, "1", "of the travel of a window, that either half of its time has to have",
         source="the power of a ripple goes with the square of speed: its mean is then off by 5 %",
