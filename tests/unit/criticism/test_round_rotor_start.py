@@ -10,8 +10,9 @@ import pytest
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import significant_groups
+from pipeline.criticism.selection import round_rotor_start
 from pipeline.criticism.selection.candidates import candidates, widened
-from pipeline.criticism.selection.round_rotor_start import with_round_rotor_start
+from pipeline.criticism.selection.round_rotor_start import _round_rotor, with_round_rotor_start
 from pipeline.criticism.selection.score_test import Score, score_all
 from tests.unit.criticism.machines import BASE, fitted, in_frame_of, log
 
@@ -56,13 +57,23 @@ def test_an_error_of_the_angle_is_found_from_a_round_rotor(size_rad):
     assert started.fall > tangent.fall + 100.0
 
 
+def test_a_start_has_no_error_and_the_smaller_inductance_twice():
+    fit = bent(0.004)
+    offered = candidates(LIBRARY, fit.model)
+    begun = _round_rotor(fit, next(c for c in offered if c.effect.name == NAME))
+    assert begun.values["ld_h"] == begun.values["lq_h"] == fit.values["lq_h"]
+    assert begun.model.effects[-1].name == NAME
+    assert all(v == 0.0 for name, v in begun.values.items() if name.startswith(NAME))
+
+
 def test_a_tangent_that_passes_is_believed():
     tangent, started = scores_at(fitted([eccentric(0.004, seed) for seed in (5, 6)]))
     assert tangent.passes
     assert started is tangent
 
 
-def test_nothing_is_tried_where_all_is_explained():
+def test_nothing_is_tried_where_all_is_explained(monkeypatch):
+    monkeypatch.setattr(round_rotor_start, "gauss_newton", None)
     tangent, started = scores_at(fitted([eccentric(0.0, seed) for seed in (5, 6)]))
     assert not tangent.passes
     assert started is tangent
