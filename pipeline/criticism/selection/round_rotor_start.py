@@ -49,8 +49,8 @@ def with_round_rotor_start(
     scores
         Scores by the tangent.
     significant
-        Groups [G] over their floor. Without any, and where captures at a standstill tell most of
-        both inductances, tangents are believed; so is one that passes.
+        Groups [G] over their floor. Without any, and where captures at a standstill tell both
+        inductances, tangents are believed; so is one that passes.
 
     Returns
     -------
@@ -62,23 +62,25 @@ def with_round_rotor_start(
     passing = {score.candidate.effect.name for score in scores if score.passes}
     for name, candidate in first_of_each(offered).items():
         effect = candidate.effect
-        if effect.angle is None or name in passing or not _rests_on(wide, effect, significant):
+        if effect.angle is None or name in passing or not _may_bend(wide, effect, significant):
             continue
         end = gauss_newton(_round_rotor(wide.fit, candidate))
         so_far = with_better(so_far, score_between(wide, end, candidate), offered)
     return tuple(so_far)
 
 
-def _rests_on(wide: LinearSystem, effect: Effect, significant: NDArray[np.bool_]) -> bool:
-    """Whether most of what is known of an inductance comes from captures in which an effect acts,
-    some of whose groups [G] are not explained.
+def _may_bend(wide: LinearSystem, effect: Effect, significant: NDArray[np.bool_]) -> bool:
+    """Whether captures in which an effect acts have groups [G] that are not explained, and no other
+    captures tell the inductances.
     """
     acts = np.array([observes(segment, effect) for segment in wide.segments])
     if not any(acts[number] for number, _, _ in compress(wide.labels, significant)):
         return False
-    known = wide.matrix[:, wide.place(_INDUCTANCES)] ** 2
-    there, whole = known[acts[wide.segment]].sum(axis=0), known.sum(axis=0)
-    return bool(np.any(there > wide.policy.selection.unexplained_share * whole))
+    elsewhere = wide.matrix[~acts[wide.segment]][:, wide.place(_INDUCTANCES)]
+    values = np.array([wide.fit.values[name] for name in _INDUCTANCES])
+    # value over its standard uncertainty by the other captures
+    sure = values * np.sqrt((elsewhere**2).sum(axis=0))
+    return bool(np.any(sure < wide.policy.selection.least_u))
 
 
 def _round_rotor(fit: Fit, candidate: Candidate) -> Fit:

@@ -77,3 +77,12 @@ def test_nothing_is_tried_where_all_is_explained(monkeypatch):
     tangent, started = scores_at(fitted([eccentric(0.0, seed) for seed in (5, 6)]))
     assert not tangent.passes
     assert started is tangent
+
+
+def test_nothing_is_tried_where_another_capture_tells_the_inductances(monkeypatch):
+    fit = bent(0.004)
+    other = fit.segments[1]
+    monkeypatch.setattr(round_rotor_start, "observes", lambda segment, _: segment is not other)
+    monkeypatch.setattr(round_rotor_start, "gauss_newton", None)
+    tangent, started = scores_at(fit)
+    assert started is tangent
