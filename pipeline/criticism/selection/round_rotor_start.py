@@ -1,13 +1,9 @@
 """An error of the angle tried from a rotor that is round, where the inductances fit that error.
 
-A current loop answers the wave of voltage that an encoder off its centre makes. In that closed loop
-the rate of the answer looks like an inductance of many times the true one, and a frame that turns
-by such an inductance times the current leads nowhere: the tangent at that fit does not show the
-error. The electrical equation of a round rotor, L_d = L_q, has no part that depends on its frame,
-so from there the error is fitted whatever the base fit made of both.
-
-Reference: Forssell & Ljung, Automatica 35 (1999), 1215, identification in a closed loop,
-doi:10.1016/S0005-1098(99)00022-9.
+In slow logs that hardly move i_d, an encoder off its centre leaves an L_d of many times the true
+one. An error of the angle turns the current as well, and at such an L_d what that does to the
+voltage hides it: the tangent does not show the error. The flux of a round rotor, L_d = L_q, turns
+with its current, so from there the error is fitted whatever the base fit made of both.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ class Steps:
     )  # fmt: skip
     slower_in: float = chosen(
         3.0, "time constants", "time in which steps of the integration become e times as long",
-        why="half as many steps as 16 in each of eight, and half their error of the current",
+        why="two thirds of the steps of 16 in each of eight, and half their error of the current",
     )  # fmt: skip
     drop_knee_share: float = chosen(
         0.02, "1", "of the largest current, below which an inverter's drop fades",
