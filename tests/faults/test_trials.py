@@ -60,7 +60,7 @@ def test_bombs_are_refused_in_little_time_and_memory(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kills", [1, pytest.param(100, marks=FULL)])
 def test_a_killed_run_is_finished_by_the_next(one: Path, tmp_path: Path, kills: int) -> None:
     """No torn file, no version lost that the registry had, the bytes of a clean run, no orphan."""
-    folder = make_fleet(one, tmp_path / "in", 2 if kills < 10 else 6)
+    folder = make_fleet(one, tmp_path / "in", 1 if kills < 10 else 6)
     found = kill_runs(folder, tmp_path, kills)
     assert found.kills == kills
     assert (found.torn, found.lost, found.different, found.left_over) == ((), 0, (), ())
@@ -100,6 +100,7 @@ def test_a_fleet(one: Path, tmp_path: Path) -> None:
     assert len(CAPTURES) == 3
 
 
+@FULL
 def test_ninety_nine_of_a_hundred(tmp_path: Path, one: Path) -> None:
     """One capture of a hundred is a bomb: 99 are used, one line, exit 3."""
     folder = make_fleet(one, tmp_path / "in", 33)

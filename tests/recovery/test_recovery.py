@@ -1,4 +1,6 @@
-"""Each case over a small sample here, over 1,000 seeds with `make recovery`."""
+"""Each case over a small sample here, twice as large a one with the slow tests, and over 1,000
+seeds with `make recovery`.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +12,11 @@ from tests.recovery.table import cases
 MANY = 1000
 
 
+@pytest.mark.parametrize("share", [0.5, pytest.param(1.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
-def test_few_seeds(case):
+def test_few_seeds(case, share):
     """Nothing is broken beyond what so few seeds can tell."""
-    verdicts = run(case, range(case.few))
+    verdicts = run(case, range(max(5, round(share * case.few))))
     assert verdicts
     assert {v.constant: v.faults for v in verdicts if v.faults} == {}
 

@@ -31,6 +31,12 @@ def trees() -> dict[Path, ast.Module]:
     return {path: ast.parse(path.read_text()) for path in FILES}
 
 
+@cache
+def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
+    """Every node of a syntax tree; walking those of all files takes a second."""
+    return tuple(ast.walk(tree))
+
+
 def named(text: str) -> list[str]:
     """The names that a Parameters section describes, in order."""
     heads = [line.partition(" :")[0] for line in text.splitlines() if line[:1].strip()]
@@ -39,7 +45,7 @@ def named(text: str) -> list[str]:
 
 def wrong(tree: ast.Module) -> Iterator[str]:
     """Functions whose Parameters section leaves one out, invents one or changes their order."""
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         if not isinstance(node, ast.FunctionDef):
             continue
         section = PARAMETERS.search(ast.get_docstring(node) or "")
@@ -53,7 +59,7 @@ def wrong(tree: ast.Module) -> Iterator[str]:
 def words_of(tree: ast.Module) -> set[str]:
     """Every name of the code: of functions, arguments, attributes, and in short texts."""
     found: set[str] = set()
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         kinds = (ast.FunctionDef, ast.ClassDef, ast.Name, ast.Attribute, ast.arg, ast.keyword)
         if isinstance(node, kinds):
             found |= {str(getattr(node, key, "")) for key in ("name", "id", "attr", "arg")}
@@ -66,7 +72,7 @@ def words_of(tree: ast.Module) -> set[str]:
 
 def quoted(tree: ast.Module) -> Iterator[str]:
     """Names in backticks in docstrings; those with capitals in them are patterns, as `u_NAME`."""
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         if isinstance(node, (ast.FunctionDef, ast.ClassDef, ast.Module)):
             text = ast.get_docstring(node) or ""
             for name in re.findall(r"`([A-Za-z_][\w.]*_[\w.]*)`", text):
@@ -107,7 +113,7 @@ def test_a_docstring_names_what_its_function_raises() -> None:
         f"{path}: {node.name}: {error}"
         for path in FILES
         if "stages" not in path.parts
-        for node in ast.walk(trees()[path])
+        for node in nodes(trees()[path])
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
         if not ("gates" in path.parts and node.name == "check")
         for error in raised(node.body)
@@ -142,7 +148,7 @@ def test_only_classes_have_attributes() -> None:
     found = [
         f"{path}: {node.name}"
         for path in FILES
-        for node in ast.walk(trees()[path])
+        for node in nodes(trees()[path])
         if isinstance(node, ast.FunctionDef)
         and re.search(r"^Attributes\n-+$", ast.get_docstring(node) or "", re.MULTILINE)
     ]
@@ -154,7 +160,7 @@ def test_every_entry_of_a_section_of_attributes_is_a_name() -> None:
     found = [
         f"{path}: {node.name}: {line}"
         for path in FILES
-        for node in ast.walk(trees()[path])
+        for node in nodes(trees()[path])
         if isinstance(node, ast.ClassDef)
         for text in re.split(r"^Attributes\n-+\n", ast.get_docstring(node) or "", flags=re.M)[1:]
         for line in re.split(r"^\w+\n-+$", text, flags=re.M)[0].splitlines()

@@ -41,7 +41,9 @@ def sizes(note):
     return [float(size) * (1.0 if sense == "higher" else -1.0) for size, sense in found]
 
 
-@pytest.mark.parametrize(("dry", "viscous"), [(1.02, 1.02), (0.98, 0.985)])
+@pytest.mark.parametrize(
+    ("dry", "viscous"), [(1.02, 1.02), pytest.param(0.98, 0.985, marks=pytest.mark.slow)]
+)
 def test_friction_that_repeats_to_some_percent_is_no_change(dry, viscous):
     """With shares of no size it is `unknown`, as if something had changed between the tests."""
     found = recorded("spin_down", torque_coulomb_nm=dry, b_visc_nm_s_rad=viscous)

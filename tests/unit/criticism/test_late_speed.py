@@ -91,7 +91,7 @@ def test_the_back_emf_follows_the_angle_where_a_drives_own_speed_is_late() -> No
     assert values["psi_wb"] == pytest.approx(TRUE["psi_pm_wb"], rel=0.02)
 
 
-@pytest.mark.parametrize("late", [0.0, 1.0])
+@pytest.mark.parametrize("late", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])
 def test_a_speed_of_a_period_ago_is_no_missing_effect(late: float) -> None:
     assert diagnosed(late, 0.0).missing == ()
 
@@ -104,7 +104,7 @@ def test_a_speed_of_three_periods_ago_is_named_with_its_delay() -> None:
     assert found["of_speed"][0] == 1.0
 
 
-@pytest.mark.parametrize("low_pass", [0.0, 25.0])
+@pytest.mark.parametrize("low_pass", [0.0, pytest.param(25.0, marks=pytest.mark.slow)])
 def test_no_fault_of_its_own_speed_is_the_motors_where_the_angle_counts(low_pass: float) -> None:
     """A delay is named and a long low-pass is not; neither decides what the motor lacks."""
     result = diagnosed(3.0, low_pass)

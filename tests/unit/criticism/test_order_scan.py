@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -95,7 +96,7 @@ def test_what_nobody_would_act_on_is_no_order():
     assert left(*[spinning(seed, ((16, 1.2 * size),)) for seed in (1, 2)]) == (16,)
 
 
-@pytest.mark.parametrize("first", range(0, 12, 4))
+@pytest.mark.parametrize("first", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (4, 8))])
 def test_noise_has_no_orders(first):
     assert left(*[spinning(seed) for seed in range(first, first + 4)]) == ()
 
@@ -129,8 +130,18 @@ def test_a_part_is_rid_of_a_wave_of_one_size_or_as_the_current_or_its_size_goes(
     assert np.abs(part.residual - other).max() > 0.9
 
 
-@pytest.mark.parametrize("grows", ["never", "with the current", "with its size"])
-@pytest.mark.parametrize("order", [1.27, 2.37, 3.14, 7.62])
+GROWS = ("never", "with the current", "with its size")
+ORDERS = (1.27, 2.37, 3.14, 7.62)
+QUICK = ((1.27, GROWS[0]), (2.37, GROWS[1]), (7.62, GROWS[2]))
+
+
+@pytest.mark.parametrize(
+    ("order", "grows"),
+    [
+        pytest.param(*one, marks=() if one in QUICK else pytest.mark.slow)
+        for one in product(ORDERS, GROWS)
+    ],
+)
 def test_a_clear_line_is_found_wherever_it_is_and_however_it_grows(order, grows):
     """Few turns spread a line over its neighbours: these are no noise beside it."""
     waved = []

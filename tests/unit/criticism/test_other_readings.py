@@ -25,7 +25,7 @@ PLACES = {
 
 
 @pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("hidden", [(), ("stribeck",)])
+@pytest.mark.parametrize("hidden", [(), pytest.param(("stribeck",), marks=pytest.mark.slow)])
 def test_the_place_of_a_transducer_is_told_and_is_no_effect(place, hidden):
     """Expected: the same name and the floor at either place, and a note at the stator alone."""
     motor = replace(design("gimbal-5208"), effects={}).having(**dict.fromkeys(hidden))

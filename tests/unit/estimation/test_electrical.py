@@ -53,7 +53,9 @@ def test_derived_constants_and_cancelling_gains():
 
 
 @pytest.mark.skipif(not RIG.is_dir(), reason="../shared/data/rig is not here")
-@pytest.mark.parametrize("motor", ["P0", "P1", "P2", "P3", "P4"])
+@pytest.mark.parametrize(
+    "motor", ["P1", *(pytest.param(f"P{n}", marks=pytest.mark.slow) for n in (0, 2, 3, 4))]
+)
 def test_hidden_effects_do_not_spoil_the_electrical_constants(motor):
     from pipeline.io.ingest.capture_reader import read_capture, survey
 

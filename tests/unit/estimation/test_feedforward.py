@@ -85,16 +85,19 @@ def test_a_step_from_one_row_to_the_next_was_anywhere_between_them(held: bool) -
     assert found.u == pytest.approx(2e-3 / np.sqrt(12.0), rel=0.05)
 
 
-def test_intervals_hold_over_seeds() -> None:
-    """Of 4 x 24 intervals at 95 % more than nine misses come by chance once in 40 trials."""
+@pytest.mark.parametrize(("seeds", "most"), [(7, 4), pytest.param(24, 9, marks=pytest.mark.slow)])
+def test_intervals_hold_over_seeds(seeds: int, most: int) -> None:
+    """Of 4 x 24 intervals at 95 % more than nine misses come by chance once in 40 trials, of 4 x 7
+    more than four once in 80.
+    """
     truth = dict(zip(GIVES, (KS_V, KV_V_S_RAD, KA_V_S2_RAD, DELAY_S), strict=True))
     missed = 0
-    for seed in range(24):
+    for seed in range(seeds):
         found = estimates(ESTIMATOR, log(seed, 5.0))
         for name, value in truth.items():
             low, high = found[name].interval()
             missed += not low < value < high
-    assert missed <= 9
+    assert missed <= most
 
 
 @pytest.mark.parametrize("delay_s", [0.004, 0.1])

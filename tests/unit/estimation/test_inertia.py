@@ -45,8 +45,12 @@ def test_coast_down_ratios_with_more_than_coulomb_and_viscous(effect: str) -> No
     assert coulomb == pytest.approx(motor.torque_coulomb_nm / motor.j_rotor_kgm2, rel=0.02)
 
 
+OTHERS = ("windage", "unbalance", "bemf_harmonics", "torque_lag")
+
+
 @pytest.mark.parametrize(
-    "effect", ["", "cogging", "windage", "stribeck", "unbalance", "bemf_harmonics", "torque_lag"]
+    "effect",
+    ["", "cogging", "stribeck", *(pytest.param(one, marks=pytest.mark.slow) for one in OTHERS)],
 )
 def test_inertia_and_friction(effect: str) -> None:
     motor = design("gimbal-5208")
@@ -139,7 +143,9 @@ def test_a_drive_of_a_few_windows_is_refused_with_the_experiment(start_s: float)
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("length_s", [0.06, 0.1, 0.15, 0.3])
+@pytest.mark.parametrize(
+    "length_s", [0.06, 0.15, *(pytest.param(s, marks=pytest.mark.slow) for s in (0.1, 0.3))]
+)
 def test_inertia_of_a_short_drive_is_right_or_refused(length_s: float) -> None:
     motor = design("gimbal-5208")
     known = chain(recorded(), SPIN_DOWN, TORQUE_MAP, COGGING)

@@ -37,8 +37,12 @@ def true_constants(motor: str) -> dict[str, Any]:
     return constants["constants"]
 
 
+# Every estimate of one of these motors takes ten seconds and more; tests/e2e/test_rig.py has P0.
+MOTORS = ("P1", *(pytest.param(name, marks=pytest.mark.slow) for name in ("P2", "P3", "P4")))
+
+
 @needs_rig
-@pytest.mark.parametrize("motor", ["P1", "P2", "P3", "P4"])
+@pytest.mark.parametrize("motor", MOTORS)
 @pytest.mark.parametrize(
     "name", ["kt_peak_nm_a", "j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad"]
 )
@@ -56,6 +60,7 @@ def test_truth_lies_in_the_interval_whatever_is_hidden(motor: str, name: str) ->
 
 
 @needs_rig
+@pytest.mark.slow
 @pytest.mark.parametrize("motor", ["P0", "P2", "P3", "P4"])
 def test_no_cogging_is_invented(motor: str) -> None:
     assert constants(f"rig/{motor}").best("cogging_order") is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import cache
 
 import numpy as np
 import polars as pl
@@ -25,12 +26,18 @@ OPERATION = Operation(24.0, 30.0, 25.0, 25.0, 25.0, 105.0)
 LIMIT_V = 24.0 / math.sqrt(3.0)
 
 
+@cache
+def plain() -> Performance:
+    """Of the motor as it is; tests that ask different things of it share it."""
+    return told()
+
+
 def told(**other: object) -> Performance:
     return performance_of(sheet_of(salient(**other)), OPERATION)  # type: ignore[arg-type]
 
 
 def test_no_load_is_where_the_voltage_ends() -> None:
-    found = told()
+    found = plain()
     speed, current = found.number("omega_no_load_rad_s"), found.number("current_no_load_a")
     assert speed is not None
     assert current is not None
@@ -45,7 +52,7 @@ def test_no_load_is_where_the_voltage_ends() -> None:
 
 def test_continuous_stall_torque_is_that_of_the_heat_balance() -> None:
     """(105 - 25) K over 1.5 K/W in 1.5 R I² at 105 degC; the magnet between 25 and 105 degC."""
-    found = told().number("torque_continuous_stall_nm")
+    found = plain().number("torque_continuous_stall_nm")
     assert found is not None
     r = 0.05 * (1.0 + 0.0039 * 80.0)
     current = math.sqrt(80.0 / 1.5 / (1.5 * r))
@@ -83,11 +90,11 @@ def test_what_cannot_be_known_is_blank_and_names_its_test(name: str, blank: str,
 
 
 def test_losses_that_no_capture_parts_are_blank() -> None:
-    names = {one.name for one in told().blanks}
+    names = {one.name for one in plain().blanks}
     assert names == {
         "iron_loss_w", "additional_load_loss_w", "inverter_w", "inverter_switching_w"
     }  # fmt: skip
-    assert all(cell.inverter_w is None for cell in told().cells)
+    assert all(cell.inverter_w is None for cell in plain().cells)
     stated = Operation(24.0, 30.0, 25.0, 25.0, 25.0, 105.0, drop_v=0.7)
     found = performance_of(sheet_of(salient()), stated)
     assert "inverter_w" not in {one.name for one in found.blanks}
@@ -109,7 +116,7 @@ def test_a_coefficient_that_was_not_measured_is_assumed_and_said() -> None:
 
 def test_saturation_lowers_the_peak_torque() -> None:
     rated = estimate("lq_rated_h", 1.6e-4, "H", {"iq_a": 30.0, "id_a": 0.0})
-    bent, straight = told(lq_rated_h=rated), told()
+    bent, straight = told(lq_rated_h=rated), plain()
     for name in ("torque_peak_nm", "omega_corner_rad_s"):
         one, other = bent.number(name), straight.number(name)
         assert one is not None
@@ -126,9 +133,9 @@ def test_the_model_that_lacks_something_is_told() -> None:
 
 
 def test_the_document_is_as_published_and_the_same_again() -> None:
-    document = json.loads(canonical_json(told().document()))
+    document = json.loads(canonical_json(plain().document()))
     assert complaints("motor-performance", document) == []
-    assert canonical_json(told().document()) == canonical_json(told().document())
+    assert canonical_json(told().document()) == canonical_json(plain().document())
     bare = performance_of(sheet_of({}), None)
     assert complaints("motor-performance", json.loads(canonical_json(bare.document()))) == []
     assert [one.name for one in bare.blanks] == ["operation"]

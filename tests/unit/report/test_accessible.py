@@ -54,8 +54,23 @@ def violations(browser: Browser, path: Path, *, dark: bool) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-@pytest.mark.parametrize("name", PAGES)
+DARK = ("sheet", "fleet", "comparison")
+"""Pages that the default run sees in the dark as well."""
+
+
+@pytest.mark.parametrize(
+    ("name", "dark"),
+    [
+        pytest.param(
+            name,
+            dark,
+            id=f"{name}-{'dark' if dark else 'light'}",
+            marks=pytest.mark.slow if dark and name not in DARK else (),
+        )
+        for name in PAGES
+        for dark in (False, True)
+    ],
+)
 def test_a_page_breaks_no_rule(tmp_path: Path, browser: Browser, name: str, dark: bool) -> None:
     page = tmp_path / "page.html"
     page.write_text(PAGES[name](), "utf-8")

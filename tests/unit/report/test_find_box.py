@@ -20,7 +20,7 @@ TYPED = """(() => {
 })()"""
 
 
-@pytest.mark.parametrize("width", [1400, 420])
+@pytest.mark.parametrize("width", [1400, pytest.param(420, marks=pytest.mark.slow)])
 def test_the_box_leaves_the_motor_that_is_typed(tmp_path: Path, width: int) -> None:
     page = tmp_path / "page.html"
     page.write_text(render_fleet([motor(f"m{n}", 252.0) for n in range(6)], ()), "utf-8")

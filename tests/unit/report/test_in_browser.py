@@ -173,7 +173,7 @@ def test_what_is_too_wide_or_cut_off_is_seen(measured: dict[str, Any]) -> None:
     assert told["cut"] == ["text  off the drawing"]
 
 
-@pytest.mark.parametrize("size", ["A4", "Letter"])
+@pytest.mark.parametrize("size", ["A4", pytest.param("Letter", marks=pytest.mark.slow)])
 def test_the_sheet_prints_on_one_page(tmp_path: Path, size: str) -> None:
     """As many constants, numbers and notes as there are; the page of the printer's size."""
     page = PAGES["sheet"]()

@@ -14,6 +14,10 @@ from pipeline.simulator.plant import plant_of
 from tests.simulated import QUIET, campaign_of, design
 
 DESIGNS = ("gimbal-5208", "servo-ipm", "drone-2306", "servo-15kw", "joint-11p")
+CAMPAIGNS = [
+    pytest.param(name, marks=pytest.mark.slow if name == "drone-2306" else ()) for name in DESIGNS
+]
+"""That of a fast motor alone takes as long as those of the others together."""
 HOLDS = {
     "resistance": {"temp_winding_degc"},
     "current_step": set(),
@@ -32,7 +36,7 @@ HOLDS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", DESIGNS)
+@pytest.mark.parametrize("name", CAMPAIGNS)
 def test_a_campaign_keeps_the_contract_on_every_size_of_motor(name):
     """All tests of a campaign, columns and metadata by the glossary, finite, clocks increasing."""
     recordings = campaign(design(name), Bench(), 4)
@@ -55,7 +59,7 @@ def test_a_campaign_keeps_the_contract_on_every_size_of_motor(name):
     assert len(campaign_of(recordings).captures) == len(CAMPAIGN)
 
 
-@pytest.mark.parametrize("name", DESIGNS)
+@pytest.mark.parametrize("name", CAMPAIGNS)
 def test_a_campaign_visits_what_its_tests_are_for(name):
     """Both senses of rotation, rated current in the map, reversals, a warm winding."""
     motor = design(name)

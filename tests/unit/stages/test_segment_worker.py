@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import replace
 from multiprocessing import parent_process
 
@@ -19,6 +20,7 @@ from pipeline.criticism.regression.parallel import by_threads, in_order, on_each
 from pipeline.criticism.residuals.segments import segments
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.segment_worker import (
+    SegmentWorker,
     open_own,
     segment_worker,
     shared_or_in_order,
@@ -47,6 +49,21 @@ def found():
     return segments(Campaign("m", tuple(slow_turn(n) for n in range(4))), machine())
 
 
+@pytest.fixture(scope="module")
+def process(_on_one_core) -> Iterator[SegmentWorker]:
+    """A worker process that several tests share, since starting one takes seconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pipeline.execution.workers.pools.local_pool", _on_one_core)
+        with segment_worker(None) as made:
+            yield made
+
+
+@pytest.fixture
+def second(process) -> SegmentWorker:
+    """A test's own state before the shared process."""
+    return SegmentWorker(process._executor)
+
+
 def whose(segment, _) -> bool:
     """Whether a worker did it."""
     return parent_process() is not None
@@ -64,22 +81,22 @@ def broken(segment, _) -> float:
 
 
 @workers
-def test_floors_are_the_same_bits_and_in_order(found) -> None:
+def test_floors_are_the_same_bits_and_in_order(found, second) -> None:
     cogging = effects()["cogging"]
     model = Model(machine(), (cogging,))
     arguments = [(model, {**BASE, **zero(cogging, model)}, seed) for seed in range(len(found))]
     alone = by_threads(noise_floor, found, arguments)
     for one, two in zip(alone, in_order(noise_floor, found, arguments), strict=True):
         np.testing.assert_array_equal(one, two)
-    with segment_worker(None) as second, second.campaign():
+    with second.campaign():
         for _ in range(2):  # the second time the worker has the segments already
             for one, two in zip(alone, on_each(noise_floor, found, arguments), strict=True):
                 np.testing.assert_array_equal(one, two)
 
 
 @workers
-def test_half_of_the_samples_are_the_workers(found) -> None:
-    with segment_worker(None) as second, second.campaign():
+def test_half_of_the_samples_are_the_workers(found, second) -> None:
+    with second.campaign():
         theirs = on_each(whose, found, [(0,)] * len(found))
     sizes = np.array([one.size for one in found])
     assert 0.4 < sizes[np.array(theirs)].sum() / sizes.sum() < 0.6
@@ -87,9 +104,9 @@ def test_half_of_the_samples_are_the_workers(found) -> None:
 
 
 @workers
-def test_a_segment_stays_with_its_process(found) -> None:
+def test_a_segment_stays_with_its_process(found, second) -> None:
     """Whatever joins or leaves: a process keeps what it computed, and last bits depend on it."""
-    with segment_worker(None) as second, second.campaign():
+    with second.campaign():
         alone = [on_each(whose, [one, found[0]], [(0,)] * 2)[0] for one in found[1:]]
         _, *together = on_each(whose, found, [(0,)] * len(found))
     assert together == alone
@@ -106,24 +123,25 @@ def test_a_user_s_effect_from_a_folder_goes_along(found, tmp_path) -> None:
         "EFFECT = replace(KNOWN, name='tenth', torque=torque)\n"
     )
     tenth = effects(str(tmp_path))["tenth"]
-    assert _tolerances_shared(found, tenth, str(tmp_path))
+    with segment_worker(str(tmp_path)) as own:
+        assert _tolerances_shared(found, tenth, own)
 
 
 @workers
-def test_an_effect_that_cannot_travel_is_worked_on_here(found) -> None:
+def test_an_effect_that_cannot_travel_is_worked_on_here(found, second) -> None:
     lambdas = replace(
         effects()["coulomb_friction"], torque=lambda x, q: q["torque_nm"] * x.omega_rad_s
     )
-    assert not _tolerances_shared(found, lambdas, None)
+    assert not _tolerances_shared(found, lambdas, second)
 
 
-def _tolerances_shared(found, effect: Effect, path: str | None) -> bool:
+def _tolerances_shared(found, effect: Effect, second: SegmentWorker) -> bool:
     """Whether the worker is in use after work on an effect, which must come out right."""
     model = Model(machine(), (effect,))
     values = {**BASE, **zero(effect, model), f"{effect.name}.torque_nm": 0.02}
     arguments = [(model, values, (effect,))] * len(found)
     alone = by_threads(form_tolerance, found, arguments)
-    with segment_worker(path) as second, second.campaign():
+    with second.campaign():
         for one, two in zip(alone, on_each(form_tolerance, found, arguments), strict=True):
             np.testing.assert_array_equal(one, two)
             assert one.max() > 0
