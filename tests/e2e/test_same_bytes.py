@@ -47,9 +47,14 @@ STILL = ("resistance", "current", "lcr")
 """Tests of a locked rotor by the first word of their files: no model of motion is searched."""
 
 
-def part_of(bench: Path, folder: Path) -> Path:
-    """A folder with the first capture of each test of one motor, and the first and the last of the
-    still ones of another.
+SHORT = ("cogging", "spin", "open", "hand", "heat")
+"""Further ones in which a model is searched in seconds."""
+ALL = (*SHORT, "drive", "flux", "holding", "torque")
+
+
+def part_of(bench: Path, folder: Path, moving: tuple[str, ...]) -> Path:
+    """A folder with the first capture of each test of one motor that is still or among the `moving`
+    ones, and the first and the last of the still ones of another.
     """
     for motor in ("one", "two"):
         by_test: dict[str, list[Path]] = {}
@@ -58,14 +63,18 @@ def part_of(bench: Path, folder: Path) -> Path:
         (folder / motor).mkdir(parents=True)
         for test, found in by_test.items():
             both = {found[0], found[-1]} if test in STILL else set()
-            for path in both if motor == "two" else found[:1]:
+            one = found[:1] if test in (*STILL, *moving) else []
+            for path in both if motor == "two" else one:
                 shutil.copyfile(path, folder / motor / path.name)
     return folder
 
 
-def test_nothing_but_the_work_changes_the_bytes(bench: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("moving", [SHORT, pytest.param(ALL, marks=pytest.mark.slow)])
+def test_nothing_but_the_work_changes_the_bytes(
+    bench: Path, tmp_path: Path, moving: tuple[str, ...]
+) -> None:
     """A rerun; then a copy made in reverse order, 2 workers, elsewhere, elsewhen; then less."""
-    bench = part_of(bench, tmp_path / "in")
+    bench = part_of(bench, tmp_path / "in", moving)
     first = results(bench, tmp_path / "a", 1, TZ="UTC", LC_ALL="C", PYTHONHASHSEED="1")
     assert len([name for name in first if name.startswith("datasheets/")]) == 2
     assert len([name for name in first if name.startswith("registry/_versions/")]) == 2

@@ -33,7 +33,10 @@ def codes(design: str, effects: str, seed: int) -> list[str]:
     return [finding.line() for finding in findings]
 
 
-@pytest.mark.parametrize("design", DESIGNS)
+@pytest.mark.parametrize(
+    "design",
+    [pytest.param(n, marks=pytest.mark.slow if n == "drone-2306" else ()) for n in DESIGNS],
+)
 def test_designs(design: str) -> None:
     assert codes(design, "", 11) == []
 

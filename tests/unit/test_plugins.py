@@ -65,15 +65,16 @@ print(json.dumps([made[0].kind, fitted.values["psi_wb"], float(np.std(left))]))
 """
 
 
-def package(folder: Path, group: str, source: str, mark: str) -> None:
+def package(
+    folder: Path, group: str, source: str, mark: str, name: str = "outside_plug_in"
+) -> None:
     """An installed package of one module that offers one plug-in."""
-    (folder / "outside_plug_in.py").write_text(source)
-    info = folder / "outside_plug_in-1.0.dist-info"
+    (folder / f"{name}.py").write_text(source)
+    info = folder / f"{name}-1.0.dist-info"
     info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: outside-plug-in\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(
-        f"[motor_datasheets.{group}]\nours = outside_plug_in:{mark}\n"
-    )
+    told = f"Metadata-Version: 2.1\nName: {name.replace('_', '-')}\nVersion: 1.0\n"
+    (info / "METADATA").write_text(told)
+    (info / "entry_points.txt").write_text(f"[motor_datasheets.{group}]\nours = {name}:{mark}\n")
 
 
 def python(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
@@ -96,21 +97,34 @@ def example(mark: str) -> str:
     return source
 
 
-@pytest.mark.parametrize("group", GROUPS)
-def test_one_file_of_another_package_is_found(group: str, tmp_path: Path) -> None:
-    """The documented examples, each in a package outside; nothing of this one is edited."""
-    mark = MARKS.get(group, "READER")
-    package(tmp_path, group, READER if group == "readers" else example(mark), mark)
-    module, function = GROUPS[group]
-    code = (
-        f"import json, outside_plug_in as o\n"
-        f"from {module} import {function} as found\n"
-        f"names = [getattr(one, 'name', one) for one in found()]\n"
-        f"print(json.dumps([o.{mark}.name in names, len(names)]))"
-    )
-    done = python(tmp_path, "-c", code)
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[bool, int]]:
+    """Of each group, whether its plug-in of another package is found, and how many there are: one
+    process sees a package for each.
+    """
+    folder = tmp_path_factory.mktemp("outside")
+    code = ["import json, importlib", "told = {}"]
+    for group, (module, function) in GROUPS.items():
+        mark, name = MARKS.get(group, "READER"), f"outside_{group}"
+        package(folder, group, READER if group == "readers" else example(mark), mark, name)
+        code += [
+            f"own = importlib.import_module({name!r}).{mark}.name",
+            f"found = importlib.import_module({module!r}).{function}()",
+            "names = [getattr(one, 'name', one) for one in found]",
+            f"told[{group!r}] = own in names, len(names)",
+        ]
+    done = python(folder, "-c", "\n".join([*code, "print(json.dumps(told))"]))
     assert done.returncode == 0, done.stderr
-    there, count = json.loads(done.stdout)
+    found: dict[str, tuple[bool, int]] = json.loads(done.stdout)
+    return found
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_one_file_of_another_package_is_found(
+    group: str, told: dict[str, tuple[bool, int]]
+) -> None:
+    """The documented examples, each in a package outside; nothing of this one is edited."""
+    there, count = told[group]
     assert there
     assert count > 1
 

@@ -53,18 +53,6 @@ def test_an_unknown_name_is_an_attribute_error():
         pipeline.datasheet  # noqa: B018
 
 
-def test_functions_stay_functions_whatever_is_imported():
-    """A package of the same name would replace one as soon as it is imported."""
-    code = (
-        "import pipeline, pkgutil, importlib\n"
-        "for m in pkgutil.walk_packages(pipeline.__path__, 'pipeline.'):\n"
-        "    if not m.name.endswith('__main__'): importlib.import_module(m.name)\n"
-        "assert all(callable(getattr(pipeline, n)) for n in pipeline.__all__)\n"
-    )
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=environment, check=True)
-
-
 @pytest.mark.parametrize(
     ("module", "slow"),
     [

@@ -51,7 +51,7 @@ def all_starts(p, **how):
     return [found(p, 2.0 * math.pi * k / STARTS, seed=k, **how) for k in range(STARTS)]
 
 
-@pytest.mark.parametrize("noise_v", [1e-4, 3e-3])
+@pytest.mark.parametrize("noise_v", [pytest.param(1e-4, marks=pytest.mark.slow), 3e-3])
 @pytest.mark.parametrize("p", [1, 2, 7, 14])
 def test_pole_pairs_from_every_start_angle(p, noise_v):
     """Also where an extreme of the flux is passed just after the start or before the end."""

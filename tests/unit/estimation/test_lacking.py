@@ -35,7 +35,15 @@ def columns_of(made: Campaign) -> list[str]:
     return sorted({n for c in made.captures for t in c.tables for n in t.columns})
 
 
-CASES = [(name, column) for name in PLANS for column in columns_of(campaign(name))]
+LONG = {"current_step": {"vab_v"}, "inertia": {"id_a"}, "torque_map": {"iq_a"}}
+"""Of estimators that take longest, the column that the default run takes away."""
+CASES = [
+    pytest.param(
+        name, column, marks=pytest.mark.slow if column not in LONG.get(name, {column}) else ()
+    )
+    for name in PLANS
+    for column in columns_of(campaign(name))
+]
 
 
 def agree(plain: Fit, other: Fit, *, keeps: bool) -> None:

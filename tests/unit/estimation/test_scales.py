@@ -305,7 +305,7 @@ def test_no_result_depends_on_when_a_clock_began(name: str) -> None:
 TABLES = {"flux_map", "lcr", "torque_table", "holding_current"}
 
 
-@pytest.mark.parametrize("end", ["first", "last"])
+@pytest.mark.parametrize("end", ["first", pytest.param("last", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", sorted(set(PLANS) - TABLES))
 def test_a_capture_that_cannot_be_used_keeps_no_other_from_it(name: str, end: str) -> None:
     """Three of its rows, before or after the others."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import struct
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -89,9 +90,16 @@ def swapped(write: Any, count: int) -> list[Message]:
     return found
 
 
+@cache
 def size_of(write: Any, n: int, payload: bytes) -> int:
     """How many items a message was written with."""
     return next(items for items in (2, 3, 5) if write(n, items) == payload)
+
+
+@cache
+def arranged(arrangement: Any, write: Any, count: int) -> tuple[Message, ...]:
+    """The messages of an arrangement, which are cut into chunks of several sizes."""
+    return tuple(arrangement(write, count))
 
 
 @pytest.mark.parametrize("arrangement", [alone, between, growing, swapped])
@@ -101,7 +109,7 @@ def test_every_arrangement_gives_the_samples_that_were_written(
     encoding: str, arrangement: Any, chunk_size: int
 ) -> None:
     write, schema, base = WRITERS[encoding]
-    messages = arrangement(write, 12_000 if chunk_size >= LARGE else N)
+    messages = arranged(arrangement, write, 12_000 if chunk_size >= LARGE else N)
     packing = CompressionType.NONE if chunk_size > 3000 else CompressionType.ZSTD
     data = mcap_file(messages, schema, encoding, chunk_size=chunk_size, compression=packing)
     tables = {t.name: t for t in read_tables(scan(data), lambda _topic, _name: True)}
@@ -152,7 +160,8 @@ def test_a_refused_message_is_named_with_its_number_and_time(
     """Expected: the first one at fault of its topic, however many chunks and topics there are."""
     write, schema, _ = WRITERS[encoding]
     messages = [
-        (topic, START_NS + n * 1000, one) for n, (topic, _, one) in enumerate(arrangement(write, N))
+        (topic, START_NS + n * 1000, one)
+        for n, (topic, _, one) in enumerate(arranged(arrangement, write, N))
     ]
     of_topic = [n for n, (topic, _, _) in enumerate(messages) if topic == "/a"]
     for at in {number, N - 1}:
