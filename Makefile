@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 help:
 	@echo "make demo      the whole way on data/demo: datasheets, checks, report, recordings"
 	@echo "make test      the default tests"
-	@echo "make test-slow the long sweeps as well"
+	@echo "make test-slow all tests, the long sweeps as well"
 	@echo "make lint      style, types, import direction"
 	@echo "make docs      the documentation site in reports/site; any warning or broken link is an error"
 	@echo "make demo-data simulate data/demo anew"

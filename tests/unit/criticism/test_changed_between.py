@@ -59,6 +59,7 @@ def test_a_bearing_that_was_cold_in_the_coasts_is_told_with_both_sizes():
     assert (dry, viscous) == (pytest.approx(20.0, abs=1.5), pytest.approx(40.0, abs=3.0))
 
 
+@pytest.mark.slow
 def test_a_magnet_that_lost_flux_after_the_open_circuit_tests_is_no_clock():
     """It was told as a clock of the open-circuit tests that runs 5 % fast."""
     found = recorded("open_circuit", psi_pm_wb=1.05)

@@ -78,7 +78,9 @@ def test_a_rigid_shaft_has_none_and_is_at_its_floor():
     assert system.fit.values["j_kgm2"] == pytest.approx(MOTOR.j_rotor_kgm2, rel=2e-3)
 
 
-@pytest.mark.parametrize(("coupled", "name"), [(True, "compliance"), (False, None)])
+@pytest.mark.parametrize(
+    ("coupled", "name"), [(True, "compliance"), pytest.param(False, None, marks=pytest.mark.slow)]
+)
 def test_whole_logs_without_a_transducer_say_whether_the_shaft_twists(coupled, name):
     fit, effect = base(coupled).fit, effects()["compliance"]
     twist = parameters("compliance", MOTOR, SOFT)["size"] * fit.machine.scales["torque_nm"]

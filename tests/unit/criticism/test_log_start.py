@@ -36,7 +36,7 @@ PLAY = {"backlash": 0.006}
     [
         pytest.param("servo-ipm", SPRING, 0.7, marks=pytest.mark.slow),
         pytest.param("gimbal-5208", SPRING, 0.7, marks=pytest.mark.slow),
-        ("gimbal-5208", PLAY, 0.5),
+        pytest.param("gimbal-5208", PLAY, 0.5, marks=pytest.mark.slow),
         pytest.param("servo-ipm", PLAY, 0.5, marks=pytest.mark.slow),
     ],
 )

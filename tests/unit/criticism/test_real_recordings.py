@@ -59,7 +59,7 @@ def test_l_d_falls_with_positive_d_current_once_levels_have_their_offsets():
     assert apparent == pytest.approx(5.68e-5, rel=0.06)
 
 
-@pytest.mark.parametrize("motor", ["mj5208", "be8108"])
+@pytest.mark.parametrize("motor", ["mj5208", pytest.param("be8108", marks=pytest.mark.slow)])
 def test_saturation_is_what_the_sweep_lacks(motor: str):
     """Forty rows are enough where they miss their floor fourfold in variance."""
     result = found("moteus", motor)
