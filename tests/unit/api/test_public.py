@@ -23,9 +23,11 @@ from pipeline.records.errors import UsageError
 ROOT = Path(__file__).parents[3]
 DEMO = ROOT / "data" / "demo"
 MOTOR = "G52-0601"
-TESTS = ("cogging", "current_step", "lcr", "open_circuit", "resistance", "spin_down")
-"""Tests of the motor that tell most of its constants, and an effect that the model lacks."""
+TESTS = ("cogging", "current_step", "lcr", "resistance", "spin_down")
+"""Tests of the motor that tell many of its constants, and an effect that the model lacks."""
 MODULES = ("recordings", "fits", "datasheets", "models", "simulated")
+LONG = "pipeline.api.models.diagnose"
+"""The function whose example searches a model."""
 
 
 @pytest.fixture(scope="module")
@@ -73,12 +75,18 @@ def test_importing_a_module_imports_no_slow_library(module, slow):
     assert done.stdout.strip() == b"[]"
 
 
+@pytest.mark.parametrize("long", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", MODULES)
-def test_the_examples_in_docstrings_run(name, monkeypatch):
+def test_the_examples_in_docstrings_run(name, long, monkeypatch):
     monkeypatch.chdir(ROOT)
     module = importlib.import_module(f"pipeline.api.{name}")
-    result = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
-    assert result.failed == 0
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    every = [one for one in doctest.DocTestFinder().find(module) if one.examples]
+    for one in every:
+        if (one.name == LONG) == long:
+            runner.run(one)
+    assert every
+    assert runner.summarize().failed == 0
 
 
 def test_a_run_and_the_functions_give_the_same_datasheet(sheets, tmp_path):
