@@ -49,7 +49,7 @@ class Case:
     """One estimator on one bench; `bound()` gives the Cramér-Rao deviation of each constant.
 
     Constants without an entry in `bound()` are judged on bias and coverage alone. `few` is the
-    number of seeds of the default run, smaller where a seed takes long.
+    number of seeds of the slow tests, smaller where a seed takes long; the default run takes half.
     """
 
     name: str

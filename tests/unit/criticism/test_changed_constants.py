@@ -43,8 +43,8 @@ def change(segments):
     ("name", "share", "changed"),
     [
         ("psi_wb", -0.04, (3, 4)),
-        ("psi_wb", 0.02, (1,)),
-        ("r_ohm", 0.07, (0, 2)),
+        pytest.param("psi_wb", 0.02, (1,), marks=pytest.mark.slow),
+        pytest.param("r_ohm", 0.07, (0, 2), marks=pytest.mark.slow),
         ("b_nm_s_rad", 4.0, (2,)),
     ],
 )

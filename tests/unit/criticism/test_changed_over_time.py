@@ -25,7 +25,7 @@ def freed(found) -> LinearSystem | None:
     [
         (relaxing(1.8, 1.0), COASTS, 0.8, 1.0),
         (relaxing(1.3, 0.5), DRIVES, 0.3, 0.5),
-        (relaxing(1.0, 0.5, last=1.25), COASTS, -0.2, 0.5),
+        pytest.param(relaxing(1.0, 0.5, last=1.25), COASTS, -0.2, 0.5, marks=pytest.mark.slow),
     ],
 )
 def test_both_shares_and_the_time_constant_are_found(course, stems, share, tau_s):
@@ -38,7 +38,12 @@ def test_both_shares_and_the_time_constant_are_found(course, stems, share, tau_s
 
 @pytest.mark.parametrize(
     ("effects", "stems"),
-    [("", DRIVES), ("windage", COASTS), ("windage,stribeck", COASTS), ("iron_eddy", COASTS)],
+    [
+        ("", DRIVES),
+        pytest.param("windage", COASTS, marks=pytest.mark.slow),
+        ("windage,stribeck", COASTS),
+        ("iron_eddy", COASTS),
+    ],
 )
 def test_friction_of_any_form_over_speed_is_no_change(effects, stems):
     motor = plain("gimbal-5208")
