@@ -17,7 +17,8 @@ from pipeline.simulator.design import Bench
 from tests.simulated import campaign_of, design
 from tests.unit.criticism.machines import fitted, log
 
-TESTS = ("resistance_ab", "torque_map_slow", "drive_0", "spin_down_forward")
+DRIVEN = ("torque_map_slow", "drive_0")
+TESTS = ("resistance_ab", *DRIVEN, "spin_down_forward")
 PLACES = {
     "in the shaft": Bench(dyno_hz=12.0, encoder_bits=14),
     "at the stator": Bench(dyno_hz=12.0, encoder_bits=14, torque_at_stator=True),
@@ -25,11 +26,18 @@ PLACES = {
 
 
 @pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("hidden", [(), pytest.param(("stribeck",), marks=pytest.mark.slow)])
-def test_the_place_of_a_transducer_is_told_and_is_no_effect(place, hidden):
+@pytest.mark.parametrize(
+    ("hidden", "tests"),
+    [
+        ((), DRIVEN),
+        pytest.param((), TESTS, marks=pytest.mark.slow),
+        pytest.param(("stribeck",), TESTS, marks=pytest.mark.slow),
+    ],
+)
+def test_the_place_of_a_transducer_is_told_and_is_no_effect(place, hidden, tests):
     """Expected: the same name and the floor at either place, and a note at the stator alone."""
     motor = replace(design("gimbal-5208"), effects={}).having(**dict.fromkeys(hidden))
-    plan = tuple(step for step in CAMPAIGN if step[0] in TESTS)
+    plan = tuple(step for step in CAMPAIGN if step[0] in tests)
     recorded = campaign_of(campaign(motor, PLACES[place], 5, plan))
     result = diagnose(recorded, ModelSpec(), Constants())
     assert result.missing == hidden
