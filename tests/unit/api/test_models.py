@@ -8,16 +8,20 @@ import pytest
 import pipeline
 
 STEPS = ("spin_down", "drive", "open_circuit", "torque_map")
+FEW = ("spin_down", "cogging")
 
 
 @pytest.fixture(scope="module")
 def recordings():
     """A motor with cogging, as its design has it, and a bump of friction at low speed."""
-    return pipeline.simulate("gimbal-5208", ["stribeck"], seed=3, exact=True).only(tests=STEPS)
+    return pipeline.simulate("gimbal-5208", ["stribeck"], seed=3, exact=True).only(
+        tests=STEPS + FEW
+    )
 
 
-@pytest.mark.slow  # the second notebook goes the same way in the default run
-def test_a_hidden_effect_is_found_added_and_gone(recordings):
+@pytest.mark.parametrize("tests", [FEW, pytest.param(STEPS, marks=pytest.mark.slow)])
+def test_a_hidden_effect_is_found_added_and_gone(recordings, tests):
+    recordings = recordings.only(tests=tests)
     diagnoses = pipeline.diagnose(recordings, effects=["cogging"])
     motor = recordings.motors[0]
     assert diagnoses[motor].missing == ("stribeck",)

@@ -13,8 +13,8 @@ FIRST, *OTHERS = notebooks()
 
 @pytest.mark.parametrize(
     "path",
-    # what the first does, test_public.py does on fewer captures
-    [pytest.param(FIRST, marks=pytest.mark.slow), *OTHERS],
+    # what the second does, test_models.py does on fewer captures
+    [FIRST, *(pytest.param(path, marks=pytest.mark.slow) for path in OTHERS)],
     ids=lambda path: path.stem,
 )
 def test_a_notebook_runs_and_its_texts_are_up_to_date(path):

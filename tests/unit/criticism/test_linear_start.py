@@ -46,7 +46,7 @@ def softness(name, resonance_hz, share):
 
 @pytest.mark.parametrize(
     ("name", "resonance_hz", "share", "dyno_hz"),
-    [MOTORS[0], *(pytest.param(*one, marks=pytest.mark.slow) for one in MOTORS[1:])],
+    [pytest.param(*one, marks=pytest.mark.slow) for one in MOTORS],
 )
 def test_most_inertia_behind_a_soft_shaft_is_found_with_its_size(
     name, resonance_hz, share, dyno_hz

@@ -47,6 +47,7 @@ def test_the_place_of_a_transducer_is_told_and_is_no_effect(place, hidden, tests
     assert [note[: len(told[0])] for note in notes] == told
 
 
+@pytest.mark.slow
 def test_an_encoder_off_its_centre_is_not_taken_for_torque_read_at_the_stator():
     """J θ″ of 0.1 mrad of run-out misses by more than a torque without any inertia does."""
     light = design("servo-ipm")
