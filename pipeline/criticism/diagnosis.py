@@ -19,6 +19,7 @@ from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import BEND_SPEED
 from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
@@ -65,6 +66,10 @@ from pipeline.records.policy import policy_digest
 TOO_LITTLE = (
     "the captures cannot fit the base model: record a coast or an open-circuit spin, or better a "
     "torque map or drive log with dq voltages, currents and angle"
+)
+UNSTATED = (
+    "current and motion alone show inertia and drags over the flux linkage: state the torque "
+    "constant (kt_peak_nm_a), or record an open-circuit spin or a drive log with voltages as well"
 )
 _STATELESS = (
     "no state of the machine predicts what is left in captures it was not fitted to: see the "
@@ -131,11 +136,9 @@ def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> BaseFit 
     cut_segments = segments(campaign, machine)
     if _enough(cut_segments, machine):
         return fit_of(cut_segments, model_of(model, machine))
-    return (
-        TOO_LITTLE
-        if cut_segments
-        else "; ".join((TOO_LITTLE, *unusable_captures(campaign, machine)))
-    )
+    if not cut_segments:
+        return "; ".join((TOO_LITTLE, *unusable_captures(campaign, machine)))
+    return UNSTATED if _moved_by_current(cut_segments) else TOO_LITTLE
 
 
 def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagnosis, BaseFit]:
@@ -193,6 +196,7 @@ def _notes(
     """What a reader of the diagnosis has to know as well: data, frame, hum, combinations."""
     ladder, last = end.ladder, end.ladder.steps[-1].system
     stateless = verdict == "unknown" and not (end.sketch or end.change or end.freed)
+    unexplained = verdict == "unknown" or not ladder.explains(end.remainders)
     return (
         *unused_captures(campaign, last.segments),
         *loaded_drives(campaign, machine),
@@ -207,7 +211,7 @@ def _notes(
         *(note for note in ladder.cut.values() if note),
         *_one_capture_notes(ladder),
         *((_STATELESS,) if stateless else ()),
-        *(unrecorded_signals(campaign, last.segments) if verdict == "unknown" else ()),
+        *(unrecorded_signals(campaign, last.segments) if unexplained else ()),
         *ladder.held_out[0].notes,
     )
 
@@ -266,9 +270,15 @@ def _enough(cut_segments: Sequence[Segment], machine: Machine) -> bool:
     """Whether some test turns the machine: coasts alone show drags over an inertia, and free motion
     under a current over the flux linkage as well, where nothing states that.
     """
-    of_segments = [equation_of(segment) for segment in cut_segments]
-    moved = any({"psi_wb", "j_kgm2"} <= {*one.observes.constants} for one in of_segments)
-    return (moved and "psi_wb" in machine.stated) or any(one.use.turns for one in of_segments)
+    if "psi_wb" in machine.stated and _moved_by_current(cut_segments):
+        return True
+    return any(equation_of(segment).use.turns for segment in cut_segments)
+
+
+def _moved_by_current(cut_segments: Sequence[Segment]) -> bool:
+    """Whether some test shows what a current makes of the motion."""
+    observed = (equation_of(segment).observes.constants for segment in cut_segments)
+    return any({"psi_wb", "j_kgm2"} <= {*constants} for constants in observed)
 
 
 def _insufficient(
@@ -322,11 +332,22 @@ def _temperature_note(end: SearchResult) -> tuple[str, ...]:
 def _verdict_of(end: SearchResult, not_excited: Sequence[Unexcited]) -> Verdict:
     """The verdict at the end of the ladder; `not_excited` are effects that nothing shows."""
     if end.freed or not end.ladder.explains(end.remainders):
-        return "unknown"
+        return "insufficient" if _may_be_an_observer_s(end) else "unknown"
     last = end.ladder.steps[-1]
     if any(of_motor(last.system, name) for name in last.added):
         return "missing"
     return "insufficient" if not_excited else "adequate"
+
+
+def _may_be_an_observer_s(end: SearchResult) -> bool:
+    """Whether all that is left is of motions that a drive's own speed alone shows, and no state of
+    the machine predicts it: the noise of an observer is not white, and may be all of it.
+    """
+    if end.freed or end.sketch is not None or end.change is not None:
+        return False
+    last = end.ladder.steps[-1].system
+    by_observer = {s.capture for s in last.segments if BEND_SPEED in s.fixed}
+    return all(left_over.capture in by_observer for left_over in end.remainders)
 
 
 def _ranking(

@@ -76,10 +76,10 @@ def drive_log(capture: Capture, machine: Machine) -> DriveLog | None:
     period, columns, keep = even_clock(capture, (*electrical, *moving), machine.policy.cutting)
     keep &= _on_time(capture, period, keep.size)
     speed = columns.get("omega_mech_rad_s")
-    speed_noise = shaft_angle(columns, period, machine)
+    sensor = shaft_angle(columns, period, machine)
     if speed is not None:
         columns["omega_mech_rad_s"] = speed
-    sensors = prepared(columns, period, machine.policy, speed_noise)
+    sensors = prepared(columns, period, machine.policy, sensor)
     angle = any("theta" in name for name in moving)
     return DriveLog(period, columns, keep, sensors, speed is not None, angle)
 

@@ -23,6 +23,23 @@ UNSMOOTHED = "theta_recorded_rad"
 
 
 @dataclass(frozen=True, slots=True)
+class SpeedSensor:
+    """What a recording shows of the sensor of its speed.
+
+    Attributes
+    ----------
+    noise_rad_s
+        Standard deviation of its noise, rounding included.
+    step_rad_s
+        Its resolution where that is too coarse for the noise to dither; else 0.
+
+    """
+
+    noise_rad_s: float
+    step_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Sensors:
     """What a recording shows of its sensors.
 
@@ -43,9 +60,8 @@ class Sensors:
         Rounded readings that each sample of such an angle is the mean of.
     parabola
         Samples of the parabola that the angle was smoothed by; 1 for none.
-    speed_noise_rad_s
-        Standard deviation of the noise of a speed whose integral is the angle; None of a recorded
-        angle.
+    speed
+        That of a speed whose integral is the angle; None of a recorded angle.
     held_speed
         Whether only windows of such a speed are used in which it does not change, so that no
         inertia is in the torque.
@@ -58,8 +74,13 @@ class Sensors:
     angle_step_rad: float | None = None
     readings: int = 1
     parabola: int = 1
-    speed_noise_rad_s: float | None = None
+    speed: SpeedSensor | None = None
     held_speed: bool = False
+
+    @property
+    def rounded(self) -> bool:
+        """Whether the angle is in steps, or the speed that it is the integral of."""
+        return bool(self.angle_step_rad or (self.speed is not None and self.speed.step_rad_s))
 
 
 @dataclass(frozen=True, slots=True)

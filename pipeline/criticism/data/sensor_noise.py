@@ -197,6 +197,29 @@ def smoothed(signal: Array, step: float, policy: SensorNoise) -> Array:
     return best
 
 
+def scatter(signal: Array, step: float, policy: SensorNoise) -> float:
+    """Standard deviation of a rounded signal about what it was, rounding included.
+
+    Parameters
+    ----------
+    signal
+        As recorded [n, any unit].
+    step
+        Of the rounding [same unit].
+    policy
+        Lengths of the local parabola that smooths it, and of blocks.
+
+    Returns
+    -------
+    float
+        [same unit]. Between steps noise is hidden, and third differences miss that part of it.
+
+    """
+    off = signal - smoothed(unrounded(signal, step), step, policy)
+    count = max(off.size // policy.block, 1)
+    return math.sqrt(float(np.median([(part**2).mean() for part in np.array_split(off, count)])))
+
+
 def rounding_error(even: Array, step: float, shift: Array | float) -> Array:
     """What rounding does to a signal.
 
@@ -352,8 +375,8 @@ def is_rounded(signal: Array, step: float, policy: SensorNoise) -> bool:
 def _rounding(third: Array) -> float:
     """The step of a quantised signal: its third differences are whole multiples of it."""
     steps = np.abs(third)
-    # what floating point leaves of a zero is no step
-    steps = steps[steps > 1e-6 * steps.max()] if steps.size else steps
+    # what floating point, or the digits of a file, leave of a zero is no step
+    steps = steps[steps > _DIGITS * np.quantile(steps, 0.95)] if steps.size else steps
     if steps.size < 16:
         return 0.0
     step = float(np.quantile(steps, 0.02))

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.criticism.data.hysteresis import play_lag, with_travel
-from pipeline.criticism.data.segment import Sensors
+from pipeline.criticism.data.segment import Sensors, SpeedSensor
 from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
 from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.operating import Array
@@ -22,7 +22,7 @@ def prepared(
     columns: dict[str, Array],
     period: float,
     policy: Policy,
-    speed_noise_rad_s: float | None = None,
+    speed: SpeedSensor | None = None,
 ) -> Sensors:
     """Noise, coarse steps and runs of columns, which get ready for `segment_of`.
 
@@ -35,7 +35,7 @@ def prepared(
         Sample period [s].
     policy
         Constants of judgement.
-    speed_noise_rad_s
+    speed
         Of a speed whose integral is the angle (`shaft_angle`).
 
     Returns
@@ -55,7 +55,7 @@ def prepared(
         runs = with_travel(columns, noise, policy.cutting)
     if "torque_shaft_nm" in columns:
         columns["behind_nm"] = play_lag(columns["torque_shaft_nm"], policy.cutting.play_share)
-    return Sensors(noise, steps, runs, speed_noise_rad_s=speed_noise_rad_s)
+    return Sensors(noise, steps, runs, speed=speed)
 
 
 def noise_and_steps(

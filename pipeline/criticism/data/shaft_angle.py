@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import UNSMOOTHED, Sensors
-from pipeline.criticism.data.sensor_noise import sensor_noise
+from pipeline.criticism.data.segment import UNSMOOTHED, Sensors, SpeedSensor
+from pipeline.criticism.data.sensor_noise import coarse_step, scatter, sensor_noise
 from pipeline.criticism.data.traces import parabolas, smoothed
 from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Machine
@@ -42,7 +42,7 @@ def with_angle(capture: Capture, names: list[str]) -> list[str]:
     return names
 
 
-def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> float | None:
+def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> SpeedSensor | None:
     """Adds the shaft angle to columns, from whatever gives it.
 
     Parameters
@@ -57,8 +57,8 @@ def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> f
 
     Returns
     -------
-    float or None
-        Standard deviation of the noise of a speed that was integrated [rad/s]; None of an angle.
+    SpeedSensor or None
+        That of a speed that was integrated; None of an angle.
 
     """
     if "theta_mech_rad" in columns:
@@ -70,7 +70,9 @@ def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> f
         columns["theta_mech_rad"] = np.concatenate(
             [[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * period]
         )
-        return sensor_noise(speed, machine.policy.sensor_noise)
+        noise = sensor_noise(speed, policy := machine.policy.sensor_noise)
+        step = coarse_step(speed, noise, policy)
+        return SpeedSensor(max(noise, scatter(speed, step, policy) if step else 0.0), step)
     else:
         columns["theta_mech_rad"] = np.zeros(next(iter(columns.values())).size)
     return None

@@ -81,17 +81,18 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     names += ["torque_shaft_nm"] if torque else []
     policy = machine.policy.cutting
     period, columns, keep = even_clock(capture, tuple(names), policy)
-    speed_noise = shaft_angle(columns, period, machine)
+    speed = shaft_angle(columns, period, machine)
     turned = float(np.ptp(columns["theta_mech_rad"]))
     size = columns["vd_v"].size
     window = window_of(period, size, policy)
     orders = machine.electrical_orders if angle and turned > policy.turning_rad else ()
     sensors = with_smooth_angle(
-        capture, columns, prepared(columns, period, machine.policy, speed_noise), machine, window
+        capture, columns, prepared(columns, period, machine.policy, speed), machine, window
     )
     if held and torque:
         # a noisy speed that is differenced, times J, would be a torque
-        still = held_speed(columns["theta_mech_rad"], (speed_noise or 0.0) * period, window, policy)
+        noise_rad = speed.noise_rad_s * period if speed is not None else 0.0
+        still = held_speed(columns["theta_mech_rad"], noise_rad, window, policy)
         torque = bool(2 * np.count_nonzero(still) > size)
         keep = keep & still if torque else keep
         sensors = replace(sensors, held_speed=torque)

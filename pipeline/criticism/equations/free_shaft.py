@@ -58,13 +58,13 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         names = [*names, "torque_shaft_nm"]
     policy = machine.policy.cutting
     period, columns, keep = even_clock(capture, tuple(names), policy)
-    speed_noise = shaft_angle(columns, period, machine)
+    speed = shaft_angle(columns, period, machine)
     channel = TORQUE if TORQUE in columns else SPEED
     if capture.meta.test == "cogging":
         return _slow_turn(capture, machine, period, columns, keep, channel)
     window = window_of(period, keep.size, policy)
     keep = keep & _coasts(columns["theta_mech_rad"], window, machine.policy)
-    sensors = prepared(columns, period, machine.policy, speed_noise)
+    sensors = prepared(columns, period, machine.policy, speed)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     columns, starts = thinned(columns, keep, window, policy.windows)
     weak = projection(columns["theta_mech_rad"], starts, window, ())

@@ -47,11 +47,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     further = [name for name in ("id_a", *TEMPERATURES) if capture.has(name)]
     policy = machine.policy.cutting
     period, columns, keep = even_clock(capture, ("iq_a", TORQUE, *further, *angle), policy)
-    speed_noise = shaft_angle(columns, period, machine)
+    speed = shaft_angle(columns, period, machine)
     size = keep.size
     window = window_of(period, size, policy)
     sensors = with_smooth_angle(
-        capture, columns, prepared(columns, period, machine.policy, speed_noise), machine, window
+        capture, columns, prepared(columns, period, machine.policy, speed), machine, window
     )
     columns["t_s"] = period * np.arange(size, dtype=np.float64)
     cut_out, starts = thinned(columns, keep, window, policy.windows)

@@ -116,6 +116,7 @@ BASE: tuple[Constant, ...] = (
     _unlogged("unlogged_winding_k", words="unrecorded winding over ambient"),
     _unlogged("unlogged_magnet_k", words="unrecorded magnet over ambient"),
     _of_log("late_speed_s", "s", "lateness of a speed that no angle is beside", curved=True),
+    _of_log("bend_speed_s2", "s²", "second order of that lateness", curved=True),
     _of_log("late_voltage_s", "s", "by how much motion follows a voltage late", curved=True),
     _of_log("electrical_s", "s", "L/R of a winding whose current is not logged"),
     _of_log("unsampled_share", "1", "change of flux that samples of a voltage miss"),
@@ -141,6 +142,8 @@ LATE_TORQUE = "late_torque_s"
 """Nuisance of every transducer: its filter."""
 LATE_SPEED = "late_speed_s"
 """Nuisance of a log whose motion is known by an observer's or a tachometer's speed alone."""
+BEND_SPEED = "bend_speed_s2"
+"""Its second order: a filter of first order has none, an observer half of a delay's."""
 LATE_VOLTAGE = "late_voltage_s"
 """Nuisance of a log of voltage and motion that two computers, or a filter, put on one clock."""
 ELECTRICAL = "electrical_s"

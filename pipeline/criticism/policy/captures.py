@@ -350,6 +350,11 @@ class Priors:
         5e-3, "s", "lateness of a speed that no angle is beside",
         why="observers and filters of drives are 1 to 10 ms late",
     )  # fmt: skip
+    bend_speed_s2: float = derived(
+        1.25e-5, "s²", "second order of that lateness",
+        source="half the square of `priors.late_speed_s`, as of a delay; an observer has half of "
+        "that, a filter of first order none",
+    )  # fmt: skip
     late_voltage_s: float = chosen(
         0.05, "s", "by how much motion follows a voltage late, where no current is logged",
         why="buses and filters of robots are up to 0.1 s late",

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import UNSMOOTHED, Segment, projected, row_index
+from pipeline.criticism.data.segment import UNSMOOTHED, Segment, SpeedSensor, projected, row_index
 from pipeline.criticism.data.sensor_noise import rounding_error, smoothed, unrounded
 from pipeline.criticism.data.traces import parabolas
 from pipeline.criticism.machine.model import Model, zero
@@ -20,6 +20,8 @@ from pipeline.criticism.residuals.residual import residual
 
 IN_ROTOR_FRAME = (("id_a", "iq_a"), ("vd_v", "vq_v"))
 """Columns of the two axes that a recorder turns by the angle that it reads."""
+_SPEED = "omega_mech_rad_s"
+"""A speed whose integral is the angle: no column of the segment."""
 
 
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
@@ -46,8 +48,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     of an angle that is an integrated speed it is a random walk, from anywhere in the turn: what a
     model has that goes with the angle is noise there. Signals that are coarse are rounded anew. The
     noise of an angle that was smoothed is smoothed alike: what is slow in it stays as it was. What
-    the smoothing changes in the residual counts too: it may have been noise or motion. An angle
-    that is rounded is rounded anew as well (`_of_rounding`).
+    the smoothing changes in the residual counts too: it may have been noise or motion. A rounded
+    angle, or speed that is integrated, is rounded anew as well (`_of_rounding`).
 
     """
     policy, recording = model.policy.noise_floors, _Recording.of(segment, model, values)
@@ -59,7 +61,7 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
         rough = {**segment.recorded, "theta_mech_rad": segment.recorded[UNSMOOTHED]}
         variance += recording.pooled([recording.change(rough)])
     of_rows: Array = variance[recording.group]
-    if segment.sensors.angle_step_rad:
+    if segment.sensors.rounded:
         of_rows = of_rows + _of_rounding(recording, variance)
     return np.sqrt(of_rows) + 1e-300
 
@@ -158,7 +160,7 @@ class _Recording:
         return np.mean(means, axis=0) if means else np.zeros(self.counts.size)
 
     def noisy(self, seed: int, count: int) -> Iterator[dict[str, Array]]:
-        """The columns with other noise of their sensors, but for the rounding of an angle."""
+        """The columns with other noise of their sensors, but for the rounding of a motion."""
         shifts = _shifts(self.segment, count, seed)
         for replicate in range(count):
             shift = {name: shifts[name][replicate] for name in self.segment.sensors.steps}
@@ -166,29 +168,35 @@ class _Recording:
             yield _noisy(self.segment, self.even, shift, generator)
 
     def roundings(self, count: int) -> Iterator[Array]:
-        """Changes of the weak residual [R] by the rounding of an angle, none where it is not."""
+        """Changes of the weak residual [R] by the rounding of a motion, none where it is not."""
         return map(self.change, self.rounded(count))
 
     def rounded(self, count: int) -> Iterator[dict[str, Array]]:
-        """The columns with an angle that is rounded anew, none where it is not rounded.
+        """The columns with an angle, or the speed that it is the integral of, rounded anew; none
+        where neither is rounded.
 
-        A rounded angle shows neither where between two steps it began nor, to a step a window, how
-        fast it was: both are spread evenly.
+        A rounded signal shows neither where between two steps it began nor, to a step a window, how
+        fast it moved: both are spread evenly.
         """
         sensors, weak = self.segment.sensors, self.segment.weak
-        if not sensors.angle_step_rad:
+        if not sensors.rounded:
             return
-        theta, even = self.segment.recorded["theta_mech_rad"], self.even["theta_mech_rad"]
+        theta = self.segment.recorded["theta_mech_rad"]
         ramp = np.arange(theta.size) / (theta.size if weak is None else weak.length)
         spread = (np.arange(count) + 0.5) / count - 0.5
         paces = 2.0 * np.random.default_rng(count).permutation(spread)
-        for shift, pace in zip(spread, paces, strict=True):
-            error = _readings_error(
-                even, sensors.angle_step_rad, sensors.readings, shift + pace * ramp
-            )
+        for number, (shift, pace) in enumerate(zip(spread, paces, strict=True)):
+            moved = shift + pace * ramp
+            if sensors.speed is not None:
+                generator = np.random.default_rng([count, number])
+                error = _rounded_speed(sensors.speed, self.even[_SPEED], moved, generator)
+                moved_rad = theta + _integrated(self.segment, error)
+                yield {**self.segment.recorded, "theta_mech_rad": moved_rad}
+                continue
+            even, step = self.even["theta_mech_rad"], sensors.angle_step_rad or 0.0
+            error = _readings_error(even, step, sensors.readings, moved)
             moved_rad = theta + parabolas(error, sensors.parabola)
-            turned = self._in_turned_frame(error)
-            yield {**turned, "theta_mech_rad": moved_rad}
+            yield {**self._in_turned_frame(error), "theta_mech_rad": moved_rad}
 
     def _in_turned_frame(self, error_rad: Array) -> dict[str, Array]:
         """The columns [n] with those of the rotor frame in one that is ahead by an error [rad] of
@@ -204,10 +212,10 @@ class _Recording:
 
 
 def _of_rounding(recording: _Recording, noise: Array) -> Array:
-    """Variance [R] that the rounding of an angle makes of the weak residual, beside that of the
+    """Variance [R] that the rounding of a motion makes of the weak residual, beside that of the
     `noise` [groups].
 
-    It is each window's own: where the shaft turns by nearly whole steps from sample to sample, the
+    It is each window's own: where a signal moves by nearly whole steps from sample to sample, its
     error creeps instead of jumping about, and none of it averages out [Widrow & Kollar (2008), ch.
     20]. Where a few roundings show next to nothing beside the noise, their mean will do.
     """
@@ -235,7 +243,7 @@ def _noisy(
     for name, column in segment.recorded.items():
         noise = _smoothed(segment, name, generator.normal(size=column.size))
         noisy[name] = column + noise if noise.any() else column
-    if sensors.speed_noise_rad_s is not None:
+    if sensors.speed is not None:
         anywhere = generator.uniform(0.0, 2.0 * math.pi)
         noisy["theta_mech_rad"] = noisy["theta_mech_rad"] + anywhere
     for name, step in sensors.steps.items():
@@ -243,6 +251,17 @@ def _noisy(
     if sensors.angle_step_rad:
         noisy["theta_mech_rad"] = segment.recorded["theta_mech_rad"]
     return noisy
+
+
+def _rounded_speed(
+    speed: SpeedSensor, even: Array, shift: Array, generator: np.random.Generator
+) -> Array:
+    """Error [n, rad/s] of a speed that is noisy before it is rounded: what noise dithers of a
+    rounding is as white as the noise.
+    """
+    above = _above_rounding(speed.noise_rad_s, speed.step_rad_s)
+    noise = above * generator.normal(size=even.size)
+    return noise + rounding_error(even + noise, speed.step_rad_s, shift)
 
 
 def _readings_error(even_rad: Array, step_rad: float, readings: int, shift: Array | float) -> Array:
@@ -264,6 +283,12 @@ def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
         name: smoothed(unrounded(segment.recorded[name], step), step, policy)
         for name, step in sensors.steps.items()
     }
+    if sensors.speed is not None and sensors.speed.step_rad_s:
+        # means of neighbours are in half steps
+        half = 0.5 * sensors.speed.step_rad_s
+        speed = np.diff(segment.recorded["theta_mech_rad"], append=math.nan) / segment.ts_s
+        speed[-1:] = speed[-2:-1]
+        even[_SPEED] = smoothed(unrounded(speed, half), half, policy)
     if sensors.angle_step_rad:
         theta = segment.recorded["theta_mech_rad"]
         rough = sensors.parabola == 1
@@ -273,13 +298,13 @@ def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
 
 def _smoothed(segment: Segment, name: str, normal: Array) -> Array:
     """Noise of a column from standard normal numbers [n]; that of a smoothed angle is smoothed, and
-    that of an integrated speed is a random walk.
+    that of an integrated speed is a random walk, none here where the speed is rounded.
     """
     width = segment.sensors.parabola if name == "theta_mech_rad" else 1
-    speed_noise = segment.sensors.speed_noise_rad_s
-    if name == "theta_mech_rad" and speed_noise is not None:
-        walk = speed_noise * segment.ts_s * np.cumsum(normal)
-        return walk if width == 1 else parabolas(walk, width)
+    speed = segment.sensors.speed
+    if name == "theta_mech_rad" and speed is not None:
+        white = 0.0 if speed.step_rad_s else speed.noise_rad_s
+        return _integrated(segment, white * normal)
     if width == 1:
         return _white(segment, name) * normal
     smooth = parabolas(normal, width)
@@ -288,8 +313,21 @@ def _smoothed(segment: Segment, name: str, normal: Array) -> Array:
 
 def _white(segment: Segment, name: str) -> float:
     """Standard deviation of a column's noise, without the rounding that follows the signal."""
-    rounding = segment.sensors.steps.get(name, 0.0) / math.sqrt(12.0)
-    return math.sqrt(max(segment.sensors.noise.get(name, 0.0) ** 2 - rounding**2, 0.0))
+    return _above_rounding(
+        segment.sensors.noise.get(name, 0.0), segment.sensors.steps.get(name, 0.0)
+    )
+
+
+def _above_rounding(noise: float, step: float) -> float:
+    """What a noise is beside that of a rounding in steps, in their unit."""
+    return math.sqrt(max(noise**2 - step**2 / 12.0, 0.0))
+
+
+def _integrated(segment: Segment, speed_rad_s: Array) -> Array:
+    """Angle [n, rad] of an error of a speed whose integral is the angle."""
+    walk = segment.ts_s * np.cumsum(speed_rad_s)
+    width = segment.sensors.parabola
+    return walk if width == 1 else parabolas(walk, width)
 
 
 def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:

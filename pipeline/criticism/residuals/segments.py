@@ -170,11 +170,12 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
     A shaft that turns by nearly whole steps a sample does not show the step itself, and its
     rounding is then periodic in the angle, as an electrical order is. A drive that logs means of
     n readings has its angle in fractions q of the step, with a noise of q √(n/12). A single reading
-    that alternates may seem to be of `_ALTERNATING`.
+    that alternates may seem to be of `_ALTERNATING`. The integral of a rounded speed is in steps as
+    well, but its error is a walk.
     """
     theta, step = segment.recorded.get("theta_mech_rad"), machine.encoder_rad
     theta = segment.recorded.get(UNSMOOTHED, theta)
-    if theta is None:
+    if theta is None or segment.sensors.speed is not None:
         return segment
     policy = machine.policy.sensor_noise
     if is_rounded(theta, step, policy):

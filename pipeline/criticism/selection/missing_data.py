@@ -101,11 +101,6 @@ def _needs(capture: Capture) -> str:
         return f"no equation takes a {test}"
     missing = [[n for n in equation.columns if not capture.has(n)] for equation in takers]
     fewest = min(map(len, missing))
-    if not fewest and _by_speed_alone(capture):
-        return (
-            "the drive shows its motion by its own speed alone, which filters make late: log the "
-            "angle (theta_mech_rad), or the voltages (vd_v, vq_v) as well"
-        )
     if not fewest:
         return (
             f"the {test} has the columns of an equation, but too few even samples, or no motion "
@@ -113,13 +108,6 @@ def _needs(capture: Capture) -> str:
         )
     ways = dict.fromkeys(" with ".join(names) for names in missing if len(names) == fewest)
     return f"a {test} needs {' or '.join(ways)} as well"
-
-
-def _by_speed_alone(capture: Capture) -> bool:
-    """Whether a drive log has a speed without what makes it useful: angle, voltage or torque."""
-    others = ("theta_mech_rad", "theta_elec_rad", "vq_v", "torque_shaft_nm")
-    speed = capture.meta.test == "drive" and capture.has("omega_mech_rad_s")
-    return speed and not any(capture.has(name) for name in others)
 
 
 def loaded_drives(campaign: Campaign, machine: Machine) -> tuple[str, ...]:

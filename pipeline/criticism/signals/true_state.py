@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.segment import Instrument, Segment, clock, slow_orders
 from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.machine.model import (
+    BEND_SPEED,
     EARLY_S,
     LATE_SPEED,
     UNLOGGED_AT_REST,
@@ -293,8 +294,9 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
         The error is evaluated at the true angle by a few rounds of iteration.
 
     """
-    if late := segment.fixed.get(LATE_SPEED, 0.0) * values[LATE_SPEED]:
-        x = _in_time(segment, x, late)
+    late, bend = (segment.fixed.get(name, 0.0) * values[name] for name in (LATE_SPEED, BEND_SPEED))
+    if late or bend:
+        x = _in_time(segment, x, late, bend)
     zero = zero_angle(segment, x, values)
     if not any(effect.angle is not None for effect in model.effects):
         turn = frame_turn(segment, x, model, values)
@@ -324,15 +326,23 @@ def _turned_back(x: Operating, error: Array, ahead: Complex) -> Operating:
     )
 
 
-def _in_time(segment: Segment, x: Operating, late_s: float) -> Operating:
-    """The state with a motion that was recorded late taken ahead, to the first order."""
-    period = segment.ts_s * segment.size / x.theta_rad.size
-    ahead = late_s * x.omega_rad_s
+def _in_time(segment: Segment, x: Operating, late_s: float, bend_s2: float) -> Operating:
+    """The state with a motion that was recorded late taken ahead, to the second order.
+
+    The angle goes ahead by its own differences: smoothed ones would bend it where the speed does.
+    """
+    points = x.theta_rad.size // segment.size
+    speed = np.gradient(x.theta_rad[::points], segment.ts_s)
+    ahead = late_s * speed
+    if bend_s2:
+        ahead += bend_s2 * np.gradient(speed, segment.ts_s)
+    if points > 1:
+        ahead = np.interp(np.arange(x.theta_rad.size) / points, np.arange(segment.size), ahead)
     return replace(
         x,
         eps_rad=x.eps_rad + x.machine.pole_pairs * ahead,
         theta_rad=x.theta_rad + ahead,
-        omega_rad_s=x.omega_rad_s + np.gradient(ahead, period),
+        omega_rad_s=x.omega_rad_s + late_s * np.gradient(x.omega_rad_s, segment.ts_s / points),
     )
 
 

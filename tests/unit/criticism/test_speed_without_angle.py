@@ -27,16 +27,21 @@ DRY_RAD_S2, VISCOUS_1_S = 70.0, 0.25
 CURRENT_A = 10.0
 
 
-def coast(seed: int, noise_rad_s: float, begins_rad_s: float, until: float = 0.98) -> Capture:
+def coast(
+    seed: int, noise_rad_s: float, begins_rad_s: float, until: float = 0.98, step_rad_s: float = 0.0
+) -> Capture:
     """The speed of a shaft with dry and viscous friction alone, once a millisecond, until a share
-    of the time at which it stops.
+    of the time at which it stops; in steps where one is given.
     """
     dry = DRY_RAD_S2 / VISCOUS_1_S
     ends_s = np.log1p(begins_rad_s / dry) / VISCOUS_1_S
     t_s = np.arange(0.0, until * ends_s, 1e-3)
     speed = (begins_rad_s + dry) * np.exp(-VISCOUS_1_S * t_s) - dry
     noise = noise_rad_s * np.random.default_rng(seed).standard_normal(t_s.size)
-    table = pl.DataFrame({"t_s": t_s, "omega_mech_rad_s": speed + noise})
+    recorded = speed + noise
+    if step_rad_s:
+        recorded = np.round(recorded / step_rad_s) * step_rad_s
+    table = pl.DataFrame({"t_s": t_s, "omega_mech_rad_s": recorded})
     meta = CaptureMeta("m", "spin_down", pole_pairs=2)
     return Capture(f"coast_{seed}.csv", f"{seed}", "verified", meta, (table,))
 
@@ -50,6 +55,24 @@ def test_a_speed_s_noise_is_the_floor_of_the_acceleration(noise_rad_s: float) ->
     assert len(errors) >= 3
     for error in errors:
         assert 0.8 < error.rmse / error.noise_floor < 1.25
+
+
+@pytest.mark.parametrize("step_rad_s", [0.1, 1.0])
+@pytest.mark.parametrize("noise_steps", [0.0, 0.2])
+def test_a_rounded_speed_is_the_floor_of_the_acceleration(
+    step_rad_s: float, noise_steps: float
+) -> None:
+    """Its integral is in steps as well, and was taken for a rounded angle: a floor of a tenth."""
+    noise_rad_s = noise_steps * step_rad_s
+    coasts = tuple(
+        coast(seed, noise_rad_s, begins, step_rad_s=step_rad_s)
+        for seed, begins in ((1, 450.0), (2, 310.0), (3, 150.0))
+    )
+    found = compare(Campaign("m", coasts), ModelSpec(), Constants({}))
+    errors = [e for e in found.errors if e.signal == "alpha_mech_rad_s2"]
+    assert len(errors) >= 3
+    for error in errors:
+        assert 0.6 < error.rmse / error.noise_floor < 1.3
 
 
 def slow_map(recorded: str) -> Capture:

@@ -1,0 +1,88 @@
+"""A drive log of current and of the drive's own speed, which an observer shows late."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.criticism.diagnosis import UNSTATED, base_fit, diagnose
+from pipeline.criticism.selection.requested_model import BaseFit
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+
+PERIOD_S, FINER = 5e-4, 8
+PSI_WB, PAIRS = 0.016, 4
+J_KGM2, DRY_NM, VISCOUS = 9e-5, 0.012, 3e-5
+OBSERVER_RAD_S, DAMPING = 2.0 * math.pi * 60.0, 0.7
+LATE_S, BEND_S2 = 2.0 * DAMPING / OBSERVER_RAD_S, OBSERVER_RAD_S**-2
+SPEED_NOISE_RAD_S, CURRENT_NOISE_A = 0.02, 0.01
+
+
+def log(seed: int, windage: float) -> Capture:
+    """Three seconds of a shaft that levels of current turn either way; `windage` [N·m s²]."""
+    random, step = np.random.default_rng(seed), PERIOD_S / FINER
+    levels = random.uniform(0.3, 2.2, 20) * np.tile((1.0, 1.0, -1.0, -1.0), 5)
+    level = np.repeat(levels, round(0.15 / step))
+    omega = seen = change = current = 0.0
+    rows = []
+    for number, wanted in enumerate(level):
+        current += step / 2e-3 * (wanted - 0.01 * omega - current)
+        drag = DRY_NM * math.tanh(omega / 0.05) + VISCOUS * omega + windage * omega * abs(omega)
+        omega += step / J_KGM2 * (1.5 * PAIRS * PSI_WB * current - drag)
+        change += step * (
+            OBSERVER_RAD_S**2 * (omega - seen) - 2.0 * DAMPING * OBSERVER_RAD_S * change
+        )
+        seen += step * change
+        if number % FINER == 0:
+            rows.append((number * step, current, seen))
+    t_s, i_q, speed = np.array(rows).T
+    table = pl.DataFrame(
+        {
+            "t_s": t_s,
+            "id_a": CURRENT_NOISE_A * random.standard_normal(t_s.size),
+            "iq_a": i_q + CURRENT_NOISE_A * random.standard_normal(t_s.size),
+            "omega_mech_rad_s": speed + SPEED_NOISE_RAD_S * random.standard_normal(t_s.size),
+        }
+    )
+    meta = CaptureMeta("m", "drive", pole_pairs=PAIRS)
+    return Capture(f"drive_{seed}.csv", f"{seed}", "verified", meta, (table,))
+
+
+@cache
+def campaign(windage: float = 0.0, stated: bool = True) -> Campaign:
+    known = {"psi_pm_wb": PSI_WB, "u_psi_pm_wb": 1e-3 * PSI_WB} if stated else {}
+    return Campaign("m", tuple(log(seed, windage) for seed in (1, 2)), known)
+
+
+def test_the_observer_s_lag_is_known_to_the_second_order() -> None:
+    base = base_fit(campaign(), ModelSpec(), Constants({}))
+    assert isinstance(base, BaseFit)
+    values = base.system.fit.values
+    assert float(base.system.reduced_chi2(base.system.residual).max()) < 1.5
+    assert values["late_speed_s"] == pytest.approx(LATE_S, rel=0.1)
+    assert values["bend_speed_s2"] == pytest.approx(BEND_S2, rel=0.15)
+    assert values["j_kgm2"] == pytest.approx(J_KGM2, rel=0.005)
+
+
+def test_nothing_is_missing_where_nothing_is() -> None:
+    found = diagnose(campaign(), ModelSpec(), Constants({}))
+    assert found.missing == ()
+    assert found.verdict in ("adequate", "insufficient")
+
+
+def test_an_effect_of_the_speed_is_named_without_an_angle_or_a_voltage() -> None:
+    found = diagnose(campaign(windage=5e-7), ModelSpec(), Constants({}))
+    assert found.missing == ("windage",)
+    assert found.ladder[0].held_out > 2.0 * found.ladder[-1].held_out
+    assert found.ladder[-1].held_out < 1.3
+
+
+def test_without_a_torque_constant_it_is_asked_for() -> None:
+    found = diagnose(campaign(stated=False), ModelSpec(), Constants({}))
+    assert found.verdict == "insufficient"
+    assert UNSTATED in found.notes
