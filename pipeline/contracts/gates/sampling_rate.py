@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed, warning
-from pipeline.contracts.requirements import LINE_CURRENTS
+from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES, PHASE_VOLTAGES
 from pipeline.contracts.rotation import turning
 from pipeline.contracts.waveform import noise_of, samples_per_time_constant
 from pipeline.physics.mechanics import cogging_order
@@ -100,7 +100,7 @@ def _interval_s(capture: Capture) -> float:
     return max(
         float(np.median(np.diff(table["t_s"].to_numpy())))
         for table in capture.tables
-        if {"vab_v", "vbc_v", "vca_v", "vq_v"} & set(table.columns) and table.height > 1
+        if {*LINE_VOLTAGES, *PHASE_VOLTAGES, "vq_v"} & set(table.columns) and table.height > 1
     )
 
 

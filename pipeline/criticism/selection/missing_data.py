@@ -129,7 +129,8 @@ def loaded_drives(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
         share, current = None, capture.has("iq_a")
         if current:
             log = drive_log(capture, machine)
-            share = unexplained_share(log, machine) if log and log.angle else None
+            used = log is not None and (log.angle or not capture.has("vq_v"))
+            share = unexplained_share(log, machine) if log and used else None
         elif capture.has("vq_v"):
             share = unexplained_voltage(capture, machine.policy)
         if share is not None and share >= machine.policy.cutting.unexplained_share:

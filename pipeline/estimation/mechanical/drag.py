@@ -23,6 +23,11 @@ from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import Array, LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns
 
+_UNSUPPORTED = (
+    "the drag curve is followed to no low speed: drawn on to standstill it is open by {:.2g} N·m, "
+    "more than all drag that was seen; record spin_downs down to rest"
+)
+
 
 def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float) -> DragFit:
     """Fits the rows: Coulomb and viscous first, then what the data demand, then a free curve.
@@ -132,16 +137,10 @@ def _row_sigma(rows: ShaftRows, design: Array, y: Array) -> Array:
 def _form_fails(rows: ShaftRows, design: Design, curve: Design, y: Array, level: float) -> bool:
     """Whether a free drag curve explains the rows better, beyond chance and beyond what matters.
 
-    Coast-downs show drag alone, so where there are enough of them they decide: the form fails if
-    it leaves more than `drag.material_share` of their deceleration (they see a millionth of it).
-    Else chance is judged by F with correlation counted, and a free curve must also move the drag
-    by more than that share of itself (rms over the rows).
+    Chance is judged by F with correlation counted. The curve must also move the drag by more than
+    `drag.material_share` of itself (rms over the rows; over the coast-downs where there are enough
+    of them, since they show drag alone).
     """
-    coasting = rows.kind == COAST
-    if coasts_decide(rows):
-        straight_fit = linear_fit(design.columns, y, _row_sigma(rows, design.columns, y))
-        rms = np.sqrt(np.mean(straight_fit.residuals[coasting] ** 2))
-        return bool(rms > policy().drag.material_share * np.sqrt(np.mean(y[coasting] ** 2)))
     sigma = _row_sigma(rows, curve.columns, y)
     loose, strict = linear_fit(curve.columns, y, sigma), linear_fit(design.columns, y, sigma)
     costs = [float(np.sum((f.residuals / sigma) ** 2)) for f in (loose, strict)]
@@ -153,9 +152,9 @@ def _form_fails(rows: ShaftRows, design: Design, curve: Design, y: Array, level:
     if fdtrc(extra, free, max(statistic, 0.0)) >= level:
         return False
     curved, straight = _drag_part(curve, loose), _drag_part(design, strict)
-    return bool(
-        np.std(curved - straight) > policy().drag.material_share * np.sqrt(np.mean(curved**2))
-    )
+    judged = rows.kind == COAST if coasts_decide(rows) else np.ones(y.size, dtype=bool)
+    apart, whole = (curved - straight)[judged], curved[judged]
+    return bool(np.std(apart) > policy().drag.material_share * np.sqrt(np.mean(whole**2)))
 
 
 def _without_negative_excess(
@@ -220,9 +219,10 @@ def _form_allowance(
     level = low_end(curve, rows.fastest_rad_s)[0]
     beyond = float(curve[1] - (curve[2] - curve[1]) * KNOTS[1] / (KNOTS[2] - KNOTS[1]))
     spread = max(abs(float(curve[0]) - level), abs(beyond - level))
+    unsupported = "" if spread <= np.median(np.abs(curve)) else _UNSUPPORTED.format(spread)
     why = (
         "drag is not Coulomb and viscous: its slope runs from "
         f"{slope.min():.2g} to {slope.max():.2g} N·m·s/rad over the speeds; see the drag curve, "
         "and record spin_downs with and without the suspected drag"
     )
-    return np.array([0.0, spread, 0.0]), ("", "", why)
+    return np.array([0.0, spread, 0.0]), ("", unsupported, why)

@@ -22,6 +22,14 @@ def test_samples_an_electrical_period_of_a_spin(per: float, expected: str) -> No
     assert said("sampling_rate", stated) == expected
 
 
+@pytest.mark.parametrize(("per", "expected"), [(2.45, "refused"), (5.1, "")])
+def test_phase_voltages_have_a_rate_as_lines_have(per: float, expected: str) -> None:
+    of_phases = turned(("va_v", "vb_v", "vc_v"), np.arange(400) * TURN / per)
+    speed = np.full(400, TURN / (5.0 * per * 1e-4))
+    made = capture("open_circuit", omega_mech_rad_s=speed, **of_phases, meta={"pole_pairs": 5})
+    assert said("sampling_rate", made) == expected
+
+
 def test_a_line_without_a_value_leaves_the_step_to_the_others() -> None:
     t = np.arange(-200, 2000)
     current = np.where(t > 0, -np.expm1(-t / 5.0), 0.0)

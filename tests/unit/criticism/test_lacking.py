@@ -12,7 +12,7 @@ import pytest
 
 from pipeline.criticism.comparison import compare
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of, pole_pairs_of
-from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.diagnosis import UNSTATED, diagnose
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.missing_data import unrecorded_signals
 from pipeline.execution.tasks.start import start_constants
@@ -57,13 +57,12 @@ def unnamed(campaign: Campaign) -> Campaign:
     return replace(campaign, captures=tuple(bare(c) for c in campaign.captures))
 
 
-def test_a_motion_by_a_drives_own_speed_alone_asks_for_the_angle():
-    """Nothing is wrong with its samples: a filtered speed says too little of the acceleration."""
+def test_a_loaded_motion_by_a_drives_own_speed_asks_for_the_torque():
+    """Nothing is wrong with its samples: a torque that nothing recorded turns the shaft."""
     few = without({"drive": (*ANGLES, "vd_v", "vq_v", "torque_shaft_nm")}, only("drive"))
     found = diagnose(few, STANDARD, start_constants(few))
     assert found.verdict == "insufficient"
-    (note,) = (note for note in found.notes if "speed alone" in note)
-    assert "log the angle (theta_mech_rad), or the voltages (vd_v, vq_v)" in note
+    (note,) = (note for note in found.notes if "log torque_shaft_nm" in note)
     assert "too few even samples" not in note
 
 
@@ -73,7 +72,7 @@ def test_a_short_coast_by_its_speed_has_too_few_samples():
     few = replace(coasts, captures=tuple(short))
     notes = diagnose(few, STANDARD, start_constants(few)).notes
     assert any("too few even samples" in note for note in notes)
-    assert not any("speed alone" in note for note in notes)
+    assert UNSTATED not in notes
 
 
 def test_the_second_harmonic_of_cogging_is_no_back_emf():

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.estimation.estimators.inertia import acceleration
-from pipeline.estimation.mechanical.drag import drag_of
+from pipeline.estimation.mechanical.drag import _form_allowance, drag_of
 from pipeline.estimation.mechanical.drag_fit import DragFit
 from pipeline.estimation.mechanical.drag_forms import CURVE, DRAG_FORMS, KNOTS, SHAPES, STRIBECK
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
@@ -98,6 +98,25 @@ def test_another_shape_of_the_excess_moves_drag_by_twice_its_doubt() -> None:
     apart = np.abs(second - law(bump)[1])
     assert found.u_form == pytest.approx([0.0, *apart / 2.0], rel=1e-6)
     assert np.all(found.u_form[1:] > 0.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_noise_of_a_coast_is_no_other_form(seed: int) -> None:
+    """A tenth of its deceleration, which a curve leaves over as two constants do."""
+    found, _ = fitted(straight, noise_rad_s2=0.1 * (COULOMB + VISCOUS * FASTEST) / J, seed=seed)
+    assert not found.free
+    assert found.constants(found.coefficients)[1] == pytest.approx(COULOMB, rel=0.5)
+
+
+def test_a_curve_that_is_open_at_standstill_tells_no_dry_friction() -> None:
+    """A curve of the same torque at every knot but the lowest, which no row supports."""
+    rows, _ = rows_of(straight, 1.0, 0)
+    for lowest, told in ((1.1 * COULOMB, True), (100.0 * COULOMB, False)):
+        curve = np.full(len(KNOTS), COULOMB)
+        curve[0] = lowest
+        spread, (_, dry, _) = _form_allowance(np.array([1.0, *curve]) / J, True, rows)
+        assert (dry == "") is told
+        assert bool(spread[1] < COULOMB) is told
 
 
 def test_slopes_of_a_free_curve_are_told_per_speed() -> None:
