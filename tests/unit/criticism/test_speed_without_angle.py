@@ -62,7 +62,10 @@ def test_a_speed_s_noise_is_the_floor_of_the_acceleration(noise_rad_s: float) ->
 def test_a_rounded_speed_is_the_floor_of_the_acceleration(
     step_rad_s: float, noise_steps: float
 ) -> None:
-    """Its integral is in steps as well, and was taken for a rounded angle: a floor of a tenth."""
+    """Its integral is in steps as well, and was taken for a rounded angle: a floor of a tenth.
+
+    It may be up to twice what is there: to a step a window, a pace is taken as unknown.
+    """
     noise_rad_s = noise_steps * step_rad_s
     coasts = tuple(
         coast(seed, noise_rad_s, begins, step_rad_s=step_rad_s)
@@ -72,7 +75,7 @@ def test_a_rounded_speed_is_the_floor_of_the_acceleration(
     errors = [e for e in found.errors if e.signal == "alpha_mech_rad_s2"]
     assert len(errors) >= 3
     for error in errors:
-        assert 0.6 < error.rmse / error.noise_floor < 1.3
+        assert 0.5 < error.rmse / error.noise_floor < 1.3
 
 
 def slow_map(recorded: str) -> Capture:
