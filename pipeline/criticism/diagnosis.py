@@ -332,14 +332,14 @@ def _temperature_note(end: SearchResult) -> tuple[str, ...]:
 def _verdict_of(end: SearchResult, not_excited: Sequence[Unexcited]) -> Verdict:
     """The verdict at the end of the ladder; `not_excited` are effects that nothing shows."""
     if end.freed or not end.ladder.explains(end.remainders):
-        return "insufficient" if _may_be_an_observer_s(end) else "unknown"
+        return "insufficient" if _may_be_observer_noise(end) else "unknown"
     last = end.ladder.steps[-1]
     if any(of_motor(last.system, name) for name in last.added):
         return "missing"
     return "insufficient" if not_excited else "adequate"
 
 
-def _may_be_an_observer_s(end: SearchResult) -> bool:
+def _may_be_observer_noise(end: SearchResult) -> bool:
     """Whether all that is left is of motions that a drive's own speed alone shows, and no state of
     the machine predicts it: the noise of an observer is not white, and may be all of it.
     """
@@ -347,7 +347,8 @@ def _may_be_an_observer_s(end: SearchResult) -> bool:
         return False
     last = end.ladder.steps[-1].system
     by_observer = {s.capture for s in last.segments if BEND_SPEED in s.fixed}
-    return all(left_over.capture in by_observer for left_over in end.remainders)
+    left_in = {left_over.capture for left_over in end.remainders}
+    return bool(left_in) and left_in <= by_observer
 
 
 def _ranking(

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.diagnosis import UNSTATED, base_fit, diagnose
+from pipeline.criticism.diagnosis import UNSTATED, _may_be_observer_noise, base_fit, diagnose
+from pipeline.criticism.search import SearchResult
 from pipeline.criticism.selection.requested_model import BaseFit
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
@@ -86,3 +89,21 @@ def test_without_a_torque_constant_it_is_asked_for() -> None:
     found = diagnose(campaign(stated=False), ModelSpec(), Constants({}))
     assert found.verdict == "insufficient"
     assert UNSTATED in found.notes
+
+
+@pytest.mark.parametrize(
+    ("left_in", "may_be"), [((), False), (("by_speed.csv",), True), (("by_speed.csv", "x"), False)]
+)
+def test_only_what_an_observer_alone_shows_may_be_its_noise(
+    left_in: tuple[str, ...], may_be: bool
+) -> None:
+    """A model that explains nothing is unknown even where no group is over its floor."""
+    segments = [SimpleNamespace(capture="by_speed.csv", fixed={"bend_speed_s2": 1.0})]
+    segments.append(SimpleNamespace(capture="x", fixed={}))
+    step = SimpleNamespace(system=SimpleNamespace(segments=segments))
+    left_over = [SimpleNamespace(capture=path) for path in left_in]
+    ladder = SimpleNamespace(steps=[step])
+    end = SimpleNamespace(
+        freed=(), sketch=None, change=None, ladder=ladder, remainders=tuple(left_over)
+    )
+    assert _may_be_observer_noise(cast("SearchResult", end)) is may_be
