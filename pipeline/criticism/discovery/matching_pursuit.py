@@ -25,7 +25,7 @@ from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.discovery import Discovery
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.regression.normal_equations import unit_diagonal
+from pipeline.criticism.regression.normal_equations import pseudo_inverse, unit_diagonal
 
 _RIDGE = 1e-9
 """Share of a curve's own information that is added to it: two curves of one shape do not run away,
@@ -64,11 +64,12 @@ class Pursuit:
         normal = model_matrix.T @ (root * model_matrix) + np.diag(
             system.prior_precision[:model_size]
         )
-        inverse = np.linalg.pinv(unit_diagonal(normal), hermitian=True)
-        scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        inverse = inverse / np.outer(scale, scale)
-        cross = model_matrix.T @ (root * hats)
-        slope = model_matrix.T @ (weight * system.residual) + prior_gradient
+        # in each parameter's own size: squares of what a fit hardly sees leave the range of numbers
+        information = np.diag(normal)
+        size = np.sqrt(np.where(information > 0.0, information, 1.0))
+        inverse = pseudo_inverse(normal / np.outer(size, size))
+        cross = (model_matrix / size).T @ (root * hats)
+        slope = (model_matrix / size).T @ (weight * system.residual) + prior_gradient / size
         self.gram = hats.T @ (root * hats) - cross.T @ inverse @ cross
         self.moment = -(hats.T @ (weight * system.residual) - cross.T @ inverse @ slope)
 

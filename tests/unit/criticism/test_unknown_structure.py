@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib.util
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pipeline.criticism.discovery.bases import coarse, fine, variables
 from pipeline.criticism.discovery.dictionary import CENTRED, SHAPES, Term
+from pipeline.criticism.discovery.matching_pursuit import Pursuit
 from pipeline.criticism.discovery.residual_inputs import ports, refined
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.effect import Effect
@@ -292,3 +294,24 @@ def test_a_wave_of_an_order_that_is_no_whole_number_is_told_with_its_phase():
     (cosine,) = (size for term, size in sizes.items() if "cos(4.83 theta_mech_rad)" in term)
     assert np.hypot(sine, cosine) == pytest.approx(0.03, rel=0.02)
     assert np.arctan2(cosine, sine) == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_parameter_that_nothing_shows_is_no_infinite_one_beside_others_that_nearly_tie(seed):
+    """What rounding leaves of it was divided by the square of its own size, which is none."""
+    random = np.random.default_rng(seed)
+    model = random.normal(size=(200, 8))
+    model[:, 5:] = model[:, :3] + 1e-7 * random.normal(size=(200, 3))
+    model[:, 4] = 0.0
+    rows = SimpleNamespace(
+        matrix=np.column_stack([model, random.normal(size=(200, 3))]),
+        residual=random.normal(size=200),
+        prior_precision=np.zeros(11),
+        prior_gradient=np.zeros(11),
+        size=200,
+        policy=DEFAULT,
+    )
+    pursuit = Pursuit(rows, 8, None, np.ones(200))
+    free = pursuit.system.matrix[:, 8:]
+    left = free - model @ np.linalg.lstsq(model, free, rcond=1e-5)[0]
+    assert pursuit.gram == pytest.approx(left.T @ left, rel=1e-3, abs=0.1)
