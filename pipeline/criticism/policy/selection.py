@@ -101,7 +101,7 @@ class Selection:
     )  # fmt: skip
     inertia_ratio: float = chosen(
         2.0, "1", "ratio of a fit's inertia and a rough fit's from which on a fit begins anew",
-        why="a rough fit is a tenth off at most; a spoiled inertia came in tens of times",
+        why="most rough fits are a tenth off; a spoiled inertia came in tens of times",
     )  # fmt: skip
     tangent_penalties: float = chosen(
         20.0, "BIC penalties",

@@ -8,6 +8,7 @@ a step that does harm may be followed by one that more than mends it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -20,7 +21,7 @@ from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.regression.bounds import Best, bounded_step
 from pipeline.criticism.regression.columns import Column
-from pipeline.criticism.regression.fit import Fit, floors
+from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.noise_floors import rough_floor
 from pipeline.criticism.residuals.segments import sparse
@@ -214,6 +215,12 @@ def first_fit(rough: Fit) -> LinearSystem:
         Of a short programme of captures, the best of three starts: all equations together, those of
         the winding first, and those of the shaft first.
 
+    Notes
+    -----
+    A few windows by the machine's own scale tell a small inertia badly, and the noise of an
+    acceleration is that of a current over the inertia. So a fit that ends far from the rough one
+    has floors of its own.
+
     """
     floor = floors(rough.segments, rough.model, rough.values)
     begun = replace(rough, model=_pinned(rough.model), sigma=floor, near=rough.values)
@@ -221,7 +228,25 @@ def first_fit(rough: Fit) -> LinearSystem:
     if len(rough.segments) <= rough.policy.fit.short_programme:
         ends += [_one_side_first(begun, side) for side in _SIDES]
     end = min(ends, key=lambda end: end.deviance)
-    return gauss_newton(replace(end.fit, model=rough.model)) if rough.model.stated() else end
+    if rough.model.stated():
+        end = gauss_newton(replace(end.fit, model=rough.model))
+    if not floors_changed(end.fit):
+        return end
+    own = floors(end.fit.segments, end.fit.model, end.fit.values)
+    return gauss_newton(replace(end.fit, sigma=own, near=end.fit.values), before=end)
+
+
+def floors_changed(fit: Fit) -> bool:
+    """Whether some noise floor is another one at the values of a fit than the fit was made with.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+
+    """
+    grown = np.concatenate(floors_grown(fit))
+    return bool(np.abs(np.log(grown)).max() >= math.log(fit.policy.selection.floor_ratio))
 
 
 def rough_anew(fit: Fit) -> Fit:

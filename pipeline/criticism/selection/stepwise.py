@@ -10,8 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.regression.fit import Fit, floors, floors_grown, tolerances
-from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
+from pipeline.criticism.regression.fit import Fit, floors, tolerances
+from pipeline.criticism.regression.gauss_newton import (
+    first_fit,
+    floors_changed,
+    gauss_newton,
+    rough_anew,
+)
 from pipeline.criticism.regression.goodness import leave_out, significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.normal_equations import NormalEquations
@@ -257,9 +262,7 @@ def _floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
     time. An encoder off its centre drives J to next to nothing, an unbalance to six times what it
     is, and the floors were made with that J.
     """
-    policy = fit.policy.selection
-    grown = np.concatenate(floors_grown(fit))
-    changed = np.abs(np.log(grown)).max() >= math.log(policy.floor_ratio)
+    policy, changed = fit.policy.selection, floors_changed(fit)
     if changed:
         floor = floors(fit.segments, fit.model, fit.values)
         fit = replace(fit, sigma=floor, near=fit.values)

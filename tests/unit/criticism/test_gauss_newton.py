@@ -5,14 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
+from pipeline.criticism.diagnosis import base_fit
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.regression.fit import Fit, floors
+from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.selection.stepwise import _floored_anew
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
 from tests.unit.criticism.machines import BASE, coasting, fitted, log, machine, with_drag
 
 STRIBECK = Model(machine(), (effects()["stribeck"],))
@@ -133,3 +138,42 @@ def test_an_unexplained_torque_does_not_move_the_flux(off):
     priors = found.model.priors()
     for name in ("gain_current", "gain_voltage", "gain_torque"):
         assert abs(found.values[name]) < 3.0 * priors[name][1]
+
+
+def moved_by_current() -> Campaign:
+    """Two seconds at 2 kHz of a light shaft that a noisy current turns either way."""
+    step, pairs, psi, inertia, dry = 5e-4, 7, 0.01, 4e-5, 0.004
+    random = np.random.default_rng(3)
+    level = np.repeat(random.uniform(0.2, 0.6, 20) * np.tile((1.0, -1.0), 10), 200)
+    omega = theta = 0.0
+    angles = []
+    for current in level:
+        angles.append(theta)
+        torque = 1.5 * pairs * psi * current - dry * np.tanh(omega)
+        theta += step * (omega + 0.5 * step * torque / inertia)
+        omega += step * torque / inertia
+    table = pl.DataFrame(
+        {
+            "t_s": step * np.arange(level.size),
+            "id_a": random.normal(0.0, 0.02, level.size),
+            "iq_a": level + random.normal(0.0, 0.02, level.size),
+            "theta_mech_rad": np.array(angles) + random.normal(0.0, 1e-5, level.size),
+        }
+    )
+    capture = Capture(
+        "drive.csv", "1", "verified", CaptureMeta("m", "drive", pole_pairs=7), (table,)
+    )
+    return Campaign("m", (capture,), {"psi_pm_wb": psi, "u_psi_pm_wb": 1e-3 * psi})
+
+
+@pytest.mark.parametrize("share", [0.3, 3.0])
+def test_floors_are_those_of_the_fit_and_not_of_a_rough_one_far_from_it(share: float) -> None:
+    """The noise of an acceleration is that of the current over the inertia: with three times the
+    inertia a sound motor was nine times over it.
+    """
+    end = base_fit(moved_by_current(), ModelSpec(), Constants({})).system.fit
+    inertia = end.values["j_kgm2"]
+    system = first_fit(end.at({"j_kgm2": share * inertia}))
+    assert system.fit.values["j_kgm2"] == pytest.approx(inertia, rel=0.02)
+    assert np.concatenate(floors_grown(system.fit)) == pytest.approx(1.0, abs=0.2)
+    assert float(system.reduced_chi2(system.residual).max()) < 1.5
