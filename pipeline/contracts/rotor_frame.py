@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import replace
 
 import numpy as np
 import polars as pl
 
 from pipeline.contracts.protocol import warning
-from pipeline.contracts.requirements import DQ, LINE_CURRENTS, LINE_VOLTAGES, PHASE_VOLTAGES
+from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES, PHASE_VOLTAGES
 from pipeline.physics.frames import Complex, space_vector, vector_of_lines
 from pipeline.records.capture import Capture
 from pipeline.records.finding import Finding
 
 TESTS = ("drive", "torque_map")
 ANGLE = "theta_elec_rad"
+_CURRENTS, _VOLTAGES = ("id_a", "iq_a"), ("vd_v", "vq_v")
 
 
 def in_rotor_frame(capture: Capture) -> tuple[Capture, list[Finding]]:
@@ -29,8 +31,8 @@ def in_rotor_frame(capture: Capture) -> tuple[Capture, list[Finding]]:
     -------
     capture
         With `id_a`, `iq_a` in every table of two line currents and `theta_elec_rad`, and `vd_v`,
-        `vq_v` where two voltages of phases or lines are there too; as it was where some table
-        has dq columns, or in tests that are not of a turning machine.
+        `vq_v` where two voltages of phases or lines are there too and none of the drive's own; as
+        it was where some table has dq currents, or in tests that are not of a turning machine.
     findings
         One that says so.
 
@@ -44,9 +46,10 @@ def in_rotor_frame(capture: Capture) -> tuple[Capture, list[Finding]]:
     R. H. Park, AIEE Trans. 48(3), 1929, 716, doi:10.1109/T-AIEE.1929.5055275.
 
     """
-    if capture.meta.test not in TESTS or capture.columns.intersection(DQ):
+    if capture.meta.test not in TESTS or capture.columns & {*_CURRENTS}:
         return capture, []
-    tables = tuple(_turned(table) for table in capture.tables)
+    wanted = {*_CURRENTS, *(() if capture.columns & {*_VOLTAGES} else _VOLTAGES)}
+    tables = tuple(_turned(table, wanted) for table in capture.tables)
     added = sorted({n for t in tables for n in t.columns} - capture.columns)
     if not added:
         return capture, []
@@ -55,8 +58,8 @@ def in_rotor_frame(capture: Capture) -> tuple[Capture, list[Finding]]:
     return replace(capture, tables=tables), [warning(capture, "rotor_frame", words, remedy)]
 
 
-def _turned(table: pl.DataFrame) -> pl.DataFrame:
-    """The table with what its angle makes of its phases."""
+def _turned(table: pl.DataFrame, wanted: Set[str]) -> pl.DataFrame:
+    """The table with what its angle makes of its phases, of the columns that are `wanted`."""
     current = _vector(table, LINE_CURRENTS)
     if current is None or ANGLE not in table.columns:
         return table
@@ -65,9 +68,13 @@ def _turned(table: pl.DataFrame) -> pl.DataFrame:
     if volts is None:
         lines = {n: table[n].to_numpy() for n in LINE_VOLTAGES if n in table.columns}
         volts = vector_of_lines(lines) if len(lines) > 1 else None
-    turned = {} if volts is None else {"vd_v": (volts * back).real, "vq_v": (volts * back).imag}
-    turned |= {"id_a": (current * back).real, "iq_a": (current * back).imag}
-    return table.with_columns(**{name: pl.Series(values) for name, values in turned.items()})
+    turned = {} if volts is None else dict(zip(_VOLTAGES, _axes(volts * back), strict=True))
+    turned |= zip(_CURRENTS, _axes(current * back), strict=True)
+    return table.with_columns(**{n: pl.Series(x) for n, x in turned.items() if n in wanted})
+
+
+def _axes(vector: Complex) -> tuple[Array, Array]:
+    return vector.real, vector.imag
 
 
 def _vector(table: pl.DataFrame, names: tuple[str, ...]) -> Complex | None:

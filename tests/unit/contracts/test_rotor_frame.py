@@ -64,6 +64,15 @@ def test_currents_alone_are_turned_without_voltages() -> None:
     assert not capture.has("vq_v")
 
 
+def test_a_drive_s_own_dq_voltages_leave_the_currents_to_its_phases() -> None:
+    own = {name: DQ[name] + 0.1 for name in ("vd_v", "vq_v")}
+    capture, findings = validate(log(*LINES, **own), {})
+    for name, true in {**DQ, **own}.items():
+        assert capture.arrays(name)[name] == pytest.approx(true, abs=1e-9), name
+    (said,) = [f for f in findings if f.code == "rotor_frame"]
+    assert said.message.startswith("id_a, iq_a are made")
+
+
 def test_what_the_drive_logs_itself_stays() -> None:
     own = {"iq_a": DQ["iq_a"] + 0.1}
     capture, findings = validate(log(**own), {})
