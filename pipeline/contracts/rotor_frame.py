@@ -10,7 +10,7 @@ import polars as pl
 
 from pipeline.contracts.protocol import warning
 from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES, PHASE_VOLTAGES
-from pipeline.physics.frames import Complex, space_vector, vector_of_lines
+from pipeline.physics.frames import Array, Complex, space_vector, vector_of_lines
 from pipeline.records.capture import Capture
 from pipeline.records.finding import Finding
 

@@ -70,8 +70,8 @@ class Pursuit:
         inverse = pseudo_inverse(normal / np.outer(size, size))
         cross = (model_matrix / size).T @ (root * hats)
         slope = (model_matrix / size).T @ (weight * system.residual) + prior_gradient / size
-        self.gram = hats.T @ (root * hats) - cross.T @ inverse @ cross
-        self.moment = -(hats.T @ (weight * system.residual) - cross.T @ inverse @ slope)
+        self.gram: Array = hats.T @ (root * hats) - cross.T @ inverse @ cross
+        self.moment: Array = -(hats.T @ (weight * system.residual) - cross.T @ inverse @ slope)
 
     def hats_of(self, term: Term) -> Array:
         """A term as coefficients [K] of the port's hats and waves.
@@ -136,7 +136,7 @@ class Pursuit:
         solved = np.linalg.lstsq(
             normal + _RIDGE * np.diag(np.diag(normal)), curves.T @ self.moment, rcond=1e-10
         )
-        return solved[0]
+        return np.asarray(solved[0], dtype=np.float64)
 
     def curves(self, terms: Sequence[Term]) -> Array:
         """Terms as coefficients of the hats and waves of the input.
