@@ -35,6 +35,12 @@ _TURNING = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
 _LINES_A = ("ia_a", "ib_a", "ic_a")
 
 
+_BINS_AN_ORDER = 4
+"""Bins of angle for a wave of the highest order of a spectrum: twice what Nyquist needs."""
+_SAME_ANGLE = 1e-7
+"""Difference of two readings of one angle [turn], by rounding of their numbers."""
+
+
 PAIRLESS = (
     "nothing gives the pole pairs, without which no speed means anything to the winding: record an "
     "open circuit spin with line voltages and angle, or state pole_pairs in the captures"
@@ -75,7 +81,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
     bases = tuple(int(str(n)) for n in (pole_pairs, slots) if n)
     harmonics, usual = policy.cutting.harmonics, policy.cutting.highest_order
     highest = harmonics * math.lcm(int(str(slots)), 2 * pole_pairs) if slots else 0
-    orders = torque_orders(campaign.of("cogging"), max(highest, usual), usual) or holding_orders(
+    orders = torque_orders(campaign.of("cogging"), max(highest, usual)) or holding_orders(
         campaign.of("holding_current"), bases, policy, usual
     )
     return Machine(
@@ -162,7 +168,10 @@ def _travel_turns(capture: Capture) -> float:
     """How far the shaft goes in a capture [turns]; infinite without an angle."""
     if capture.has("theta_mech_rad"):
         theta = capture.arrays("theta_mech_rad")["theta_mech_rad"]
-        return float(np.nanmax(theta) - np.nanmin(theta)) / TURN_RAD if theta.size else 0.0
+        steps = np.abs(np.diff(theta))
+        # the last sample stands for the way to the next
+        last = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+        return (float(np.nanmax(theta) - np.nanmin(theta)) + last) / TURN_RAD if theta.size else 0.0
     return math.inf if any(capture.has(name) for name in _TURNING) else 0.0
 
 
@@ -309,8 +318,8 @@ def _period(capture: Capture) -> float:
     return float(np.median(np.diff(capture.arrays("t_s")["t_s"])))
 
 
-def torque_orders(captures: Iterable[Capture], highest: int, usual: int) -> tuple[int, ...]:
-    """Orders that stand out of every slow turn's torque spectrum.
+def torque_orders(captures: Iterable[Capture], highest: int) -> tuple[int, ...]:
+    """Orders that stand out of the torque spectrum of slow turns.
 
     Parameters
     ----------
@@ -318,8 +327,6 @@ def torque_orders(captures: Iterable[Capture], highest: int, usual: int) -> tupl
         Slow turns.
     highest
         Highest order [1/turn].
-    usual
-        The same [1/turn] where samples are too few for that.
 
     Returns
     -------
@@ -328,42 +335,52 @@ def torque_orders(captures: Iterable[Capture], highest: int, usual: int) -> tupl
 
     Notes
     -----
-    The torque is averaged in even bins of angle over whole turns; an order counts where its
-    amplitude is 6 times the spectrum's median (of a Rayleigh floor 2^-36 of orders pass that), in
-    every capture of at least one turn.
+    The torque is averaged in even bins of angle over whole turns, as many as have a sample each; an
+    order counts where its amplitude is 6 times the spectrum's median (of a Rayleigh floor 2^-36 of
+    orders pass that), in every capture whose bins are fine enough to show it.
 
     """
-    common_orders: set[int] | None = None
+    spectra = []
     for capture in captures:
-        if not capture.has("theta_mech_rad", "torque_shaft_nm"):
-            continue
-        signals = capture.arrays("theta_mech_rad", "torque_shaft_nm")
-        angle_and_torque = signals["theta_mech_rad"], signals["torque_shaft_nm"]
-        capture_orders = _standing_out(*angle_and_torque, highest)
-        if capture_orders is None and highest > usual:
-            capture_orders = _standing_out(*angle_and_torque, usual)
-        if capture_orders is not None:
-            common_orders = (
-                capture_orders if common_orders is None else common_orders & capture_orders
-            )
-    return tuple(sorted(common_orders or ()))
+        if capture.has("theta_mech_rad", "torque_shaft_nm"):
+            signals = capture.arrays("theta_mech_rad", "torque_shaft_nm")
+            theta, torque = signals["theta_mech_rad"], signals["torque_shaft_nm"]
+            spectra.append(_standing_out(theta, torque, highest))
+    orders = set().union(*(found for _, found in spectra))
+    return tuple(sorted(k for k in orders if all(k in found or k > to for to, found in spectra)))
 
 
-def _standing_out(theta: Array, torque: Array, highest: int) -> set[int] | None:
-    turns = int(np.ptp(theta) / (2 * math.pi))
-    if turns < 1:
-        return None
-    bins = 4 * highest
-    place = np.floor((theta - theta.min()) / (2 * math.pi) * bins).astype(np.int64)
+def _standing_out(theta: Array, torque: Array, highest: int) -> tuple[int, set[int]]:
+    """The highest order that a capture's angles show, and the orders that stand out."""
+    bins, turns = _even_bins(theta, _BINS_AN_ORDER * highest), max(int(np.ptp(theta) / TURN_RAD), 1)
+    seen = min(highest, bins // _BINS_AN_ORDER)
+    if seen < 1:
+        return 0, set()
+    place = np.floor((theta - theta.min()) / TURN_RAD * bins + 0.5).astype(np.int64)
     inside = place < turns * bins
     place = place[inside] % bins
-    count = np.bincount(place, minlength=bins)
-    if (count == 0).any():
-        return None
+    count = np.maximum(np.bincount(place, minlength=bins), 1)
     mean = np.bincount(place, torque[inside], minlength=bins) / count
-    spectrum = np.abs(np.fft.rfft(mean))[1 : highest + 1]
+    spectrum = np.abs(np.fft.rfft(mean))[1 : seen + 1]
     floor = float(np.median(spectrum))
-    return {int(k) + 1 for k in np.flatnonzero(spectrum > 6.0 * floor)}
+    return seen, {int(k) + 1 for k in np.flatnonzero(spectrum > 6.0 * floor)}
+
+
+def _even_bins(theta: Array, most: int) -> int:
+    """Bins of angle a turn that have a sample each, `most` of them where samples are many.
+
+    Of an encoder they hold as many lines each: where bins hold one line and two by turns, a strong
+    order beats with them, and others stand out.
+    """
+    around = np.sort((theta - theta.min()) % TURN_RAD)
+    steps = np.append(np.diff(around), TURN_RAD - around[-1])
+    # what rounding of a number alone parts is one angle
+    apart = steps[steps > _SAME_ANGLE * TURN_RAD]
+    filled = TURN_RAD / float(apart.max())
+    lines = round(TURN_RAD / float(np.quantile(apart, 0.1)))
+    least = math.ceil(lines / filled - 0.01)
+    each = (m for m in range(max(lines // most, least), least - 1, -1) if lines % m == 0)
+    return next((lines // m for m in each), min(most, int(filled)))
 
 
 PARAMETERS: Mapping[str, str] = {

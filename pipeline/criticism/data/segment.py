@@ -65,6 +65,9 @@ class Sensors:
     held_speed
         Whether only windows of such a speed are used in which it does not change, so that no
         inertia is in the torque.
+    phase_samples
+        Samples over which an angle is smoothed that is the phase of the line voltages, whose noise
+        it then has; 0 of any other.
 
     """
 
@@ -76,6 +79,7 @@ class Sensors:
     parabola: int = 1
     speed: SpeedSensor | None = None
     held_speed: bool = False
+    phase_samples: int = 0
 
     @property
     def rounded(self) -> bool:

@@ -176,9 +176,9 @@ def smoothed(signal: Array, step: float, policy: SensorNoise) -> Array:
     Returns
     -------
     array [n]
-        Smoothed by the longest parabola that leaves no more than a rounding does, step / √12. A
-        shorter one would keep part of the beat between the steps and the sampling, and a longer one
-        bends that the signal has.
+        Smoothed by the longest parabola, up to one for all, that leaves no more than a rounding
+        does, step / √12. A shorter one would keep part of the beat between the steps and the
+        sampling, and a longer one bends that the signal has.
 
     Notes
     -----
@@ -186,15 +186,13 @@ def smoothed(signal: Array, step: float, policy: SensorNoise) -> Array:
 
     """
     most = policy.smooth_share * step / math.sqrt(12.0)
-    best = signal
-    for length in policy.smooth:
-        if length > signal.size:
-            break
+    whole = signal.size - 1 + signal.size % 2
+    lengths = (*(n for n in policy.smooth if n < whole), whole)
+    for length in reversed(lengths):
         even = parabolas(signal, length)
-        if best is not signal and float((signal - even).std()) > most:
-            break
-        best = even
-    return best
+        if length == lengths[0] or float((signal - even).std()) <= most:
+            return even
+    return signal
 
 
 def scatter(signal: Array, step: float, policy: SensorNoise) -> float:

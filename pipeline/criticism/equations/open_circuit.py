@@ -68,6 +68,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     else:
         keep &= _by_voltage(columns, machine, window, period)
     sensors = _beside_waves(prepared(columns, period, machine.policy), columns, machine, window)
+    if not encoder:
+        # of the phase alone, which the noise of the voltages makes anew
+        noise = {**sensors.noise, "theta_mech_rad": 0.0}
+        samples = _phase_samples(window, period, policy)
+        sensors = replace(sensors, noise=noise, phase_samples=samples)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     columns, starts = thinned(columns, keep, window, policy.windows)
     orders, margin = machine.electrical_orders, policy.wave_samples
@@ -134,7 +139,7 @@ def _by_voltage(
     )
     upright = phase - 0.5 * math.pi * sense
     angle = smoothed(upright, width)
-    short = 2 * (round(machine.policy.cutting.speed_s / period) // 2) + 1
+    short = _phase_samples(window, period, machine.policy.cutting)
     if short < width and inside.any():
         orders = np.arange(1, machine.policy.cutting.voltage_orders + 1)
         waves = np.exp(1j * orders * angle[:, None])
@@ -143,6 +148,11 @@ def _by_voltage(
         angle += smoothed(deviation - basis @ coefficients, short)
     columns["theta_mech_rad"] = angle / machine.pole_pairs
     return inside
+
+
+def _phase_samples(window: int, period: float, policy: Cutting) -> int:
+    """Samples that the phase of voltages is smoothed over."""
+    return min(2 * (round(policy.speed_s / period) // 2), 2 * (window // 2)) + 1
 
 
 def _steady(weak: Projection, theta: Array, policy: Cutting) -> NDArray[np.bool_]:

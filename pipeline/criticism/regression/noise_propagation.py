@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import UNSMOOTHED, Segment, SpeedSensor, projected, row_index
 from pipeline.criticism.data.sensor_noise import rounding_error, smoothed, unrounded
-from pipeline.criticism.data.traces import parabolas
+from pipeline.criticism.data.traces import LINES_V, parabolas
+from pipeline.criticism.data.traces import smoothed as box_mean
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.operating import Array, Signals, Values
 from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.criticism.regression.sampler import Sampler
 from pipeline.criticism.residuals.residual import residual
+from pipeline.physics.frames import vector_of_lines
 
 IN_ROTOR_FRAME = (("id_a", "iq_a"), ("vd_v", "vq_v"))
 """Columns of the two axes that a recorder turns by the angle that it reads."""
@@ -165,7 +167,22 @@ class _Recording:
         for replicate in range(count):
             shift = {name: shifts[name][replicate] for name in self.segment.sensors.steps}
             generator = np.random.default_rng([seed, replicate])
-            yield _noisy(self.segment, self.even, shift, generator)
+            noisy = _noisy(self.segment, self.even, shift, generator)
+            if self.segment.sensors.phase_samples:
+                noisy["theta_mech_rad"] = self._by_phase(noisy)
+            yield noisy
+
+    def _by_phase(self, noisy: Signals) -> Array:
+        """The angle [n, rad] that is the smoothed phase of line voltages, by noisy ones."""
+        of_lines = (
+            vector_of_lines({name: columns[name] for name in LINES_V if name in columns})
+            for columns in (self.segment.recorded, noisy)
+        )
+        before, after = of_lines
+        error = np.angle(after * np.conj(before)) / self.model.machine.pole_pairs
+        width = self.segment.sensors.phase_samples
+        theta: Array = self.segment.recorded["theta_mech_rad"] + box_mean(error, width)
+        return theta
 
     def roundings(self, count: int) -> Iterator[Array]:
         """Changes of the weak residual [R] by the rounding of a motion, none where it is not."""
@@ -279,8 +296,13 @@ def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
     that was smoothed stays as it is.
     """
     sensors = segment.sensors
+
+    def even_of(signal: Array, step: float) -> Array:
+        parts = np.split(signal, _joins(segment))
+        return np.concatenate([smoothed(part, step, policy) for part in parts])
+
     even = {
-        name: smoothed(unrounded(segment.recorded[name], step), step, policy)
+        name: even_of(unrounded(segment.recorded[name], step), step)
         for name, step in sensors.steps.items()
     }
     if sensors.speed is not None and sensors.speed.step_rad_s:
@@ -288,12 +310,22 @@ def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
         half = 0.5 * sensors.speed.step_rad_s
         speed = np.diff(segment.recorded["theta_mech_rad"], append=math.nan) / segment.ts_s
         speed[-1:] = speed[-2:-1]
-        even[_SPEED] = smoothed(unrounded(speed, half), half, policy)
+        even[_SPEED] = even_of(unrounded(speed, half), half)
     if sensors.angle_step_rad:
         theta = segment.recorded["theta_mech_rad"]
         rough = sensors.parabola == 1
-        even["theta_mech_rad"] = smoothed(theta, sensors.angle_step_rad, policy) if rough else theta
+        even["theta_mech_rad"] = even_of(theta, sensors.angle_step_rad) if rough else theta
     return even
+
+
+def _joins(segment: Segment) -> NDArray[np.int64]:
+    """Samples that do not follow the one before in time: a segment may be a selection of windows,
+    and nothing is even across two of them.
+    """
+    time = segment.recorded.get("t_s")
+    if time is None:
+        return np.empty(0, dtype=np.int64)
+    return np.flatnonzero(np.abs(np.diff(time) / segment.ts_s - 1.0) > 0.5) + 1
 
 
 def _smoothed(segment: Segment, name: str, normal: Array) -> Array:
