@@ -73,7 +73,10 @@ ARITHMETIC = {
         "_REACH",
         "_FLOATING",
         "_DIGITS",
+        "_MOST_DECIMALS",
+        "_RARE",
     },
+    "data/machine_scale.py": {"_BINS_AN_ORDER", "_SAME_ANGLE"},  # twice Nyquist; rounding
     "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight
     "design/experiments.py": {"_SEED"},
     "equations/holding.py": {"_CRAWL", "_ROUNDS"},  # beside zero and not at it; of a fixed point

@@ -27,6 +27,9 @@ _DIGITS = 1e-3
 """Share of a step that the digits of a file may leave where there is none."""
 _FLOATING = 1e-9
 """Share of a signal's size that is rounding of floating-point numbers."""
+_MOST_DECIMALS, _RARE = 9, 0.01
+"""Decimals of a file that may be seen beside a step; share of third differences between the two
+where the digits of a file lie far beneath a step."""
 
 
 def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> float:
@@ -161,7 +164,9 @@ def unrounded(signal: Array, step: float) -> Array:
     return np.interp(np.arange(signal.size), known[order], level[order])
 
 
-def smoothed(signal: Array, step: float, policy: SensorNoise) -> Array:
+def smoothed(
+    signal: Array, step: float, policy: SensorNoise, between: Array | None = None
+) -> Array:
     """What a rounded signal was, as far as its samples tell.
 
     Parameters
@@ -172,6 +177,8 @@ def smoothed(signal: Array, step: float, policy: SensorNoise) -> Array:
         Of the rounding [same unit].
     policy
         Lengths of the local parabola that smooths it.
+    between
+        The signal between its steps [n, same unit], which is smoothed instead (`unrounded`).
 
     Returns
     -------
@@ -189,7 +196,7 @@ def smoothed(signal: Array, step: float, policy: SensorNoise) -> Array:
     whole = signal.size - 1 + signal.size % 2
     lengths = (*(n for n in policy.smooth if n < whole), whole)
     for length in reversed(lengths):
-        even = parabolas(signal, length)
+        even = parabolas(signal if between is None else between, length)
         if length == lengths[0] or float((signal - even).std()) <= most:
             return even
     return signal
@@ -213,9 +220,12 @@ def scatter(signal: Array, step: float, policy: SensorNoise) -> float:
         [same unit]. Between steps noise is hidden, and third differences miss that part of it.
 
     """
-    off = signal - smoothed(unrounded(signal, step), step, policy)
+    off = signal - smoothed(signal, step, policy, unrounded(signal, step))
     count = max(off.size // policy.block, 1)
-    return math.sqrt(float(np.median([(part**2).mean() for part in np.array_split(off, count)])))
+    noise = math.sqrt(float(np.median([(part**2).mean() for part in np.array_split(off, count)])))
+    # a bend that smoothing may leave is no noise
+    alone = step / math.sqrt(12.0)
+    return min(noise, alone) if noise <= policy.smooth_share * alone else noise
 
 
 def rounding_error(even: Array, step: float, shift: Array | float) -> Array:
@@ -268,7 +278,11 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     if third.size < policy.block:
         return 0.0
     # of a shaft that turns by nearly whole steps a sample most are zero, but for a file's digits
-    third = third[np.abs(third) > _DIGITS * np.quantile(np.abs(third), 0.95)]
+    size = np.abs(third)
+    beneath, digits = _DIGITS * np.quantile(size, 0.95), 4.0 * _decimal(signal)
+    if np.mean((size > digits) & (size <= 3.0 * digits)) < _RARE:
+        beneath = max(beneath, digits)
+    third = third[size > beneath]
     if third.size < policy.block:
         return 0.0
     third = third[np.abs(third) < policy.burst * np.median(np.abs(third)) + 1e-300]
@@ -296,6 +310,15 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
             if coherence[1] >= coherence[0] - policy.snap_loss:
                 return fraction
     return step
+
+
+def _decimal(signal: Array) -> float:
+    """The last decimal that most values have: a third difference is off by four at most."""
+    for decimals in range(_MOST_DECIMALS):
+        scaled = signal * 10.0**decimals
+        if np.mean(np.abs(scaled - np.round(scaled)) < _FLOATING * 10.0**decimals) > 0.5:
+            return float(10.0**-decimals)
+    return 0.0
 
 
 def _sharpened(signal: Array, step: float, together: float) -> tuple[float, Array]:

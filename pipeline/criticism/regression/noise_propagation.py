@@ -297,20 +297,21 @@ def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
     """
     sensors = segment.sensors
 
-    def even_of(signal: Array, step: float) -> Array:
-        parts = np.split(signal, _joins(segment))
-        return np.concatenate([smoothed(part, step, policy) for part in parts])
+    def even_of(signal: Array, step: float, between: Array | None = None) -> Array:
+        columns = np.stack([signal, signal if between is None else between])
+        parts = np.split(columns, _joins(segment), axis=1)
+        return np.concatenate([smoothed(part[0], step, policy, part[1]) for part in parts])
 
-    even = {
-        name: even_of(unrounded(segment.recorded[name], step), step)
-        for name, step in sensors.steps.items()
-    }
+    even = {}
+    for name, step in sensors.steps.items():
+        column = segment.recorded[name]
+        even[name] = even_of(column, step, unrounded(column, step))
     if sensors.speed is not None and sensors.speed.step_rad_s:
         # means of neighbours are in half steps
         half = 0.5 * sensors.speed.step_rad_s
         speed = np.diff(segment.recorded["theta_mech_rad"], append=math.nan) / segment.ts_s
         speed[-1:] = speed[-2:-1]
-        even[_SPEED] = even_of(unrounded(speed, half), half)
+        even[_SPEED] = even_of(speed, half, unrounded(speed, half))
     if sensors.angle_step_rad:
         theta = segment.recorded["theta_mech_rad"]
         rough = sensors.parabola == 1

@@ -82,6 +82,15 @@ def test_a_shaft_that_turns_by_nearly_whole_steps_a_sample_shows_its_step():
     assert rounding_step(theta, SENSORS) == pytest.approx(step, rel=1e-9)
 
 
+@pytest.mark.parametrize("pace", [0.03, 0.94, 47.2])
+def test_digits_of_a_file_beneath_the_steps_are_no_step(pace):
+    """A long spin in seven digits has 1e-5 rad at its end, a fortieth of the encoder's step."""
+    step = 2.0 * np.pi / 2**14
+    theta = step * (np.floor(pace * np.arange(5000)) + 0.5) + 20.0
+    told = rounding_step(np.array([float(f"{angle:.7g}") for angle in theta]), SENSORS)
+    assert told == pytest.approx(step, rel=1e-9)
+
+
 def test_the_step_of_a_drive_that_logs_means_of_readings_is_a_part_of_the_encoder_s():
     """A mean of 16 readings is in sixteenths of a step; a bench logs each of them."""
     step, segment = 2.0 * np.pi / 8192, log()
