@@ -100,6 +100,10 @@ class Ripple:
         why="a control loop moves the current in some ten rows; at half of it steps of a speed's "
         "reference passed for waves",
     )  # fmt: skip
+    fast_share: float = chosen(
+        0.5, "1", "share of a wave's power in its rows, beside what is slow, that shows its size",
+        why="a wave is all slow or hardly: in between its phases pass the limit within its rows",
+    )  # fmt: skip
     predicted: float = chosen(
         0.5, "1", "share of what is not slow that waves predict in rows they were not fitted to",
         why="with less, most of it is something else; at 0.7 harmonics left 1.7 noise floors",

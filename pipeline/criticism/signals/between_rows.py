@@ -117,7 +117,8 @@ class Waves:
         Notes
         -----
         By least squares beside cosines of time: a wave whose rows come at phases that move on
-        slowly is no other than a slow current, and stays small.
+        slowly is no other than a slow current. Where most of it is one, what is left of it would
+        need any size to be a step of the current.
 
         """
         width, step = policy.rows, policy.rows // 4
@@ -133,6 +134,7 @@ class Waves:
         halves = np.arange(round(2.0 * policy.slow * width))
         slow, _ = np.linalg.qr(np.cos(np.pi / width * np.outer(np.arange(width) + 0.5, halves)))
         apart = waves - slow @ (slow.T @ waves)
+        apart *= _fast_shares(waves, apart)[:, None, :] > policy.fast_share
         fast = current[rows] - (current[rows] @ slow) @ slow.T
         fit = _fitted(apart, fast, policy.predicted)
         row, part = np.divmod(np.arange(step * len(parts)), len(parts))
@@ -163,6 +165,14 @@ class Waves:
         total = np.zeros(size, dtype=np.complex128)
         total[self.places] = (self.beyond @ (self.fit @ current[self.rows][:, :, None]))[:, :, 0]
         return total
+
+
+def _fast_shares(waves: Array, apart: Array) -> Array:
+    """Share [b, k] of each order's power in its rows [b, w, k] that is `apart` from the slow."""
+    order = np.tile(np.arange(len(ORDERS)), 2)
+    same = (order[:, None] == order).astype(float)
+    power, left = (np.einsum("bwk,bwk->bk", part, part) @ same for part in (waves, apart))
+    return left / np.maximum(power, 1e-300)
 
 
 def _fitted(apart: Array, fast: Complex, least: float) -> Array:

@@ -67,6 +67,19 @@ def test_a_wave_that_every_row_has_at_nearly_the_same_phase_is_a_slow_current() 
     assert np.abs(waves.added(current, AT.size)).max() < 0.01
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_pulses_of_a_speed_loop_are_no_wave_whose_phase_moves_on_slowly(seed: int) -> None:
+    """What is not slow in such a wave is next to nothing, and made amperes of a pulse."""
+    random = np.random.default_rng(seed)
+    current = 0.01 * NOISE + 0.04j
+    for row in np.cumsum(random.integers(20, 110, 4)).tolist():
+        size = random.uniform(-0.6, 0.6)
+        current[row : row + 8] += 1j * size * np.exp(-np.arange(8) / random.uniform(1.0, 3.0))
+    eps = 2.0 * np.pi / 6.0 * (1.0 - random.uniform(0.01, 0.09)) * np.arange(ROWS)
+    waves = Waves.of(clock(ROW_S * np.arange(ROWS)), current, eps, PARTS, POLICY)
+    assert np.abs(waves.added(current, AT.size)).max() < 0.02
+
+
 def test_waves_that_rows_hardly_tell_apart_stay_small() -> None:
     """At half a wave of order 6 a row its sine is next to nothing in any of them."""
     straight, with_waves = missed(1.0005 * np.pi / 6.0)
