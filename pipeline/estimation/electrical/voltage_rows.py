@@ -24,6 +24,11 @@ from pipeline.records.capture import Array, Capture
 
 D_FLUX = "d flux"
 LATE = "acceleration"
+Q_TURNED = "speed times q voltage"
+Q_FLUX_BENT = "q flux of high current"
+D_FLUX_BENT = "d flux of high current"
+CROSS_FLUX = "q flux of d current"
+D_DROP = "d drop"
 NEAR_ZERO = "drop near zero current"
 """What a compensation of dead time leaves: it takes the sense of a current from a sample."""
 
@@ -113,6 +118,7 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
     if v_d is not None:
         columns[TURNED] = weak.integral(speed * v_d)
         columns[V_D] = weak.integral(v_d)
+        columns[Q_TURNED] = weak.integral(speed * v_q)
     return columns
 
 
@@ -144,6 +150,10 @@ def _integrals(
         integrals[D_FLUX] = weak.integral(speed * i_d)
         integrals["d current"] = weak.integral(i_d)
         integrals["d inductive"] = weak.integral(i_d, 1)
+        integrals[D_DROP] = weak.integral(i_d / np.sqrt(modulus**2 + noise**2 + 1e-300))
+        integrals[Q_FLUX_BENT] = weak.integral(speed * i_q * modulus**2)
+        integrals[D_FLUX_BENT] = weak.integral(speed * i_d**2)
+        integrals[CROSS_FLUX] = weak.integral(speed * i_d * i_q)
     return integrals
 
 

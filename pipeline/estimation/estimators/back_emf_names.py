@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.electrical.pole_pairs import pole_pairs_to_use
 from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.physics.coupling import CouplingName, coupling_as
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, derived
+from pipeline.records.pole_pairs import BY_VOLTAGE
 
 METHOD = Method("back_emf_names")
 KE = "ke_phase_peak_v_s_rad"
@@ -46,11 +47,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     estimates = [
         _named(name, coupling_as(as_name, ke.number), ke) for name, as_name in NAMES.items()
     ]
-    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    pairs, words = pole_pairs_to_use(known, campaign)
     if pairs is None:
-        flux = METHOD.missing("psi_pm_wb", "state pole_pairs: the flux is Ke over the pole pairs")
+        flux = METHOD.missing("psi_pm_wb", f"the flux is Ke over the pole pairs: {words}")
     else:
-        flux = _named("psi_pm_wb", ke.number / pairs, ke)
+        flux = _named("psi_pm_wb", ke.number / pairs, ke, words)
     return Fit((flux, *estimates))
 
 
@@ -58,12 +59,12 @@ def _spins(campaign: Campaign) -> set[str]:
     return {capture.path for capture in campaign.of("open_circuit")}
 
 
-def _named(name: str, value: float, ke: Estimate) -> Estimate:
+def _named(name: str, value: float, ke: Estimate, words: str = "") -> Estimate:
     power = -1.0 if name == "kv_ll_peak_rpm_v" else 1.0
     unit = METHOD.unit(name)
     terms = [(power * value / ke.number, ke)]
     named = derived(name, unit, value, terms, METHOD.name, ke.at)
-    return replace(named, note=f"from Ke of {ke.method}")
+    return replace(named, note="; ".join(w for w in (f"from Ke of {ke.method}", words) if w))
 
 
 ESTIMATOR = Estimator(
@@ -72,6 +73,6 @@ ESTIMATOR = Estimator(
     ("drive", "torque_map"),
     EXPERIMENT,
     fit,
-    uses=(KE, "pole_pairs"),
+    uses=(KE, "pole_pairs", BY_VOLTAGE),
     rank=40,
 )

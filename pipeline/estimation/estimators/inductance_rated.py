@@ -8,11 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.estimation.electrical.flux_pairs import Flux, flux_pairs, frame_of, instant_voltage
-from pipeline.estimation.electrical.operating_points import (
-    Point,
-    operating_points,
-    pole_pairs_of,
-)
+from pipeline.estimation.electrical.operating_points import Point, operating_points
+from pipeline.estimation.electrical.pole_pairs import pole_pairs_to_use
 from pipeline.estimation.electrical.sample_hold import hold_s
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
@@ -27,6 +24,7 @@ from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
+from pipeline.records.pole_pairs import BY_VOLTAGE
 from pipeline.records.uncertainty import Contribution
 
 METHOD = Method("inductance_rated")
@@ -69,7 +67,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     """
     del options
     captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "vd_v", "vq_v")]
-    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    pairs, rests = pole_pairs_to_use(known, campaign)
     table = operating_points(captures, pairs)
     points = [
         p
@@ -77,7 +75,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         if np.isfinite([p.vd_v, p.vq_v, p.omega_mech_rad_s]).all() and not p.standing
     ]
     if pairs is None or not points:
-        why = "pole pairs unknown" if points else "no settled points with voltages at speed"
+        why = rests if points else "no settled points with voltages at speed"
         return METHOD.nothing(GIVES, f"{why}; {EXPERIMENT}")
     magnet = magnet_coefficient(known)[0]
     points = _without_ripple(points, pairs, magnet, known.best("r_phase_ohm"))
@@ -89,6 +87,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         f"{table.note()}; {_timing_words(captures)}; frame turned by {turned_rad:g} rad, "
         f"currents {1e6 * look.behind_s:.3g} µs late, taken out"
     )
+    words = "; ".join(w for w in (words, rests) if w)
     estimates = (
         _estimate("ld_rated_h", _direct, *of_axes, look, words),
         _estimate("lq_rated_h", _quadrature, *of_axes[::-1], look, words),
@@ -310,7 +309,8 @@ ESTIMATOR = Estimator(
     tests=("torque_map",),
     experiment=EXPERIMENT,
     fit=fit,
-    uses=("pole_pairs", "temp_coeff_magnet_1_k", "r_phase_ohm"),
+    uses=("pole_pairs", BY_VOLTAGE, "temp_coeff_magnet_1_k", "r_phase_ohm"),
+    aids=(BY_VOLTAGE,),
     rank=0,
     clock_powers=dict.fromkeys(GIVES, 1),
 )

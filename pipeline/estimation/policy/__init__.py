@@ -20,6 +20,7 @@ from pipeline.estimation.policy.electrical import (
     Inverter,
     MeterTable,
     Points,
+    PolePairs,
     Steps,
 )
 from pipeline.estimation.policy.mechanical import (
@@ -56,6 +57,7 @@ class Policy:
     steps: Steps = section(Steps)
     points: Points = section(Points)
     flux_pairs: FluxPairs = section(FluxPairs)
+    pole_pairs: PolePairs = section(PolePairs)
     meter_table: MeterTable = section(MeterTable)
     inverter: Inverter = section(Inverter)
     aligned: Aligned = section(Aligned)
