@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.estimation.electrical.self_heating import warming
 from pipeline.estimation.electrical.step_record import integrated_form
 from pipeline.estimation.electrical.terminals import (
     bridged,
@@ -38,6 +39,7 @@ from pipeline.records.capture import Array, Campaign, Capture, CaptureMeta
 TEST = "resistance"
 STEP = "current_step"
 UNLOGGED = "assumed:temp_winding_degc"
+WARMED = "assumed:winding_warmed"
 POINT_OPTIONS = {"zero_crossing": 0.03, "temp_assumed_degc": 25.0}
 
 
@@ -63,6 +65,9 @@ class Point:
         Whether the temperature was recorded and not assumed.
     u_temp_k
         Standard error of the mean temperature by noise and rounding; 0 where it was not logged.
+    warming
+        How far the resistance of this pair rises within its capture [1], where the temperature was
+        not logged.
 
     """
 
@@ -76,14 +81,20 @@ class Point:
     meta: CaptureMeta
     temp_logged: bool = True
     u_temp_k: float = 0.0
+    warming: float = 0.0
 
     @property
     def temperature_source(self) -> str:
         """The source of the error of its temperature: a thermometer, or what stands in for one.
 
-        That is one error in all captures without: they were recorded one after the other.
+        That is one error in all captures without, as far as the winding stays as warm as it is.
         """
         return temperature_source(self.meta) if self.temp_logged else UNLOGGED
+
+    @property
+    def warming_source(self) -> str:
+        """The source of the error by what the winding warmed unlogged, the capture's own."""
+        return f"{WARMED}:{self.capture}"
 
 
 def direct_current_points(
@@ -190,7 +201,9 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> Ite
     if column is not None and logged:
         readings = capture.arrays(column)[column]
         temps = bridged(columns["t_s"], columns[column])
-    for plateau in _settled(capture, columns["i_a"]):
+    settled = _settled(capture, columns["i_a"])
+    warmed = 0.0 if logged or capture.meta.test == STEP else warming(columns, settled)
+    for plateau in settled:
         v, i = columns["v_v"][plateau.rows], columns["i_a"][plateau.rows]
         temp = float(temps[plateau.rows].mean())
         errors = (_standard_error(v), _standard_error(i))
@@ -200,7 +213,7 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> Ite
         means = (float(v.mean()) - rising, float(i.mean()))
         errors = (math.hypot(errors[0], rising / math.sqrt(3.0)), errors[1])
         u_temp_k = _error_of_temperature(readings, plateau.size / temps.size) if logged else 0.0
-        yield Point(index, pair, *means, temp, *errors, capture.meta, logged, u_temp_k)
+        yield Point(index, pair, *means, temp, *errors, capture.meta, logged, u_temp_k, warmed)
 
 
 def _captures(campaign: Campaign) -> tuple[Capture, ...]:
@@ -237,6 +250,9 @@ def _rising_v(columns: Mapping[str, Array], rows: slice) -> float | None:
 def uncertainties_of(points: Sequence[Point], captures: Sequence[Capture]) -> dict[str, float]:
     """Standard uncertainty of each source of `shifted`.
 
+    Between captures without a thermometer the winding may be as warm as all others together made
+    it, or have cooled again: uniform (GUM 4.3.7) over what their currents warm it within them.
+
     Parameters
     ----------
     points
@@ -253,6 +269,9 @@ def uncertainties_of(points: Sequence[Point], captures: Sequence[Capture]) -> di
     u_rel = instrument_uncertainties(captures)
     if any(not point.temp_logged for point in points):
         u_rel[UNLOGGED] = policy().magnet.unlogged_k
+    warmed = {p.warming_source: p.warming for p in points if p.warming > 0.0}
+    kelvin = sum(warmed.values()) / COPPER_COEFFICIENT_25_1_K
+    u_rel |= dict.fromkeys(warmed, kelvin / math.sqrt(12.0))
     return u_rel
 
 
@@ -287,7 +306,9 @@ def shifted(points: Sequence[Point], shift: Shift) -> list[Point]:
             p,
             v_v=p.v_v * (1.0 + shift.get(voltage_source(p.meta), 0.0)),
             i_a=p.i_a * (1.0 + shift.get(current_source(p.meta), 0.0)),
-            temp_degc=p.temp_degc + shift.get(p.temperature_source, 0.0),
+            temp_degc=p.temp_degc
+            + shift.get(p.temperature_source, 0.0)
+            + shift.get(p.warming_source, 0.0),
         )
         for p in points
     ]

@@ -12,6 +12,7 @@ from pipeline.estimation.electrical.direct_current import (
     POINT_OPTIONS,
     STEP,
     TEST,
+    WARMED,
     Point,
     captures_of,
     direct_current_points,
@@ -280,7 +281,10 @@ def fit_resistance(campaign: Campaign, known: Constants, options: Mapping[str, f
         parts = [METHOD.scatter(name, u, fit.dof), *shared[k], *allowances[name]]
         estimates[name] = METHOD.measured(name, value, parts, used, _conditions(points), notes)
     if len(columns.pairs) == 3:
-        estimates["resistance_imbalance"] = _imbalance(values, covariance, fit.dof, points, used)
+        warmed = _warmed(values, shared)
+        estimates["resistance_imbalance"] = _imbalance(
+            values, covariance, fit.dof, points, used, warmed
+        )
     return Fit(
         tuple(estimates.get(n) or _absent(n) for n in GIVES), (_plot(points, fit.residuals),)
     )
@@ -338,8 +342,10 @@ def _imbalance(
     dof: float,
     points: Sequence[Point],
     captures: Sequence[Capture],
+    warmed: float = 0.0,
 ) -> Estimate:
-    """(max - min)/mean of the phases; the gains cancel, the scatter of the two extremes stays.
+    """(max - min)/mean of the phases; the gains cancel, the scatter of the two extremes stays, and
+    what the winding `warmed` from pair to pair [1].
 
     The range of three equal phases exceeds 3.31 of their standard deviations in 5 % of cases, a
     given pair's difference 2.77: their ratio widens u (studentized range, Tukey 1949).
@@ -352,8 +358,30 @@ def _imbalance(
     u = RANGE_OF_THREE * math.sqrt(max(float(spread), 0.0)) / mean
     name, value = "resistance_imbalance", float(np.ptp(phases)) / mean
     note = "read high by chance where the phases differ by less than u"
-    parts = [METHOD.scatter(name, u, dof)]
-    return METHOD.measured(name, value, parts, captures, _conditions(points), note)
+    parts = [METHOD.scatter(name, u, dof), Contribution(WARMED, RANGE_OF_THREE * warmed, "B")]
+    warm = f"the winding's own warming may make {warmed:.2g} of it: log temp_winding_degc"
+    words = [note, warm if u < warmed and value < 3.0 * RANGE_OF_THREE * warmed else ""]
+    return METHOD.measured(name, value, parts, captures, _conditions(points), words)
+
+
+def _warmed(values: Mapping[str, float], shared: Sequence[Sequence[Contribution]]) -> float:
+    """Standard uncertainty of the imbalance [1] by what the winding warmed from pair to pair: of
+    the two phases that differ by it most.
+    """
+    names = list(values)
+    parts = {
+        phase: {
+            part.source: part.u
+            for part in shared[names.index(f"r_{phase}_ohm")]
+            if part.source.startswith(WARMED)
+        }
+        for phase in "abc"
+    }
+    apart = [
+        math.sqrt(sum((parts[one][source] - parts[two][source]) ** 2 for source in parts[one]))
+        for one, two in ("ab", "bc", "ca")
+    ]
+    return max(apart) / float(np.mean([values[f"r_{phase}_ohm"] for phase in "abc"]))
 
 
 def _absent(name: str) -> Estimate:
