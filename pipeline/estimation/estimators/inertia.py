@@ -230,19 +230,23 @@ def _over_time(
 
 
 def _of_a_known_sign(estimates: tuple[Estimate, ...]) -> tuple[Estimate, ...]:
-    """The estimates; none where the inertia, which comes first and scales the others, may be zero.
+    """The estimates; none where the inertia, which comes first and scales the others, may be zero,
+    and no drag beside one below zero.
 
-    What is not known to its own size is published by nobody (`estimation.registry`).
+    What is not known to its own size is published by nobody (`estimation.registry`), nor is an
+    inertia below zero. A current or a torque of the wrong sign makes one, and turns the drag's too.
     """
     inertia = estimates[0]
-    if not inertia.known or within(np.array(inertia.u), np.array(abs(inertia.number))):
+    sized = inertia.known and within(np.array(inertia.u), np.array(abs(inertia.number)))
+    if not inertia.known or (sized and inertia.number > 0.0):
         return estimates
     note = (
         f"the acceleration does not follow the torque: the inertia came out as "
         f"{inertia.number:.3g} ± {inertia.u:.2g} kg·m²; look at the signs of iq_a and "
         f"torque_shaft_nm, else {EXPERIMENT}"
     )
-    return METHOD.nothing(GIVES, note).estimates
+    drags = METHOD.nothing(GIVES[1:], note).estimates
+    return (inertia, *drags) if sized else METHOD.nothing(GIVES, note).estimates
 
 
 def _setups_reason(setups: Sequence[Setup]) -> str:

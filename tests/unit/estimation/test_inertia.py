@@ -12,6 +12,7 @@ from pipeline.estimation.estimators.cogging import ESTIMATOR as COGGING
 from pipeline.estimation.estimators.inertia import ESTIMATOR as INERTIA
 from pipeline.estimation.estimators.spin_down import ESTIMATOR as SPIN_DOWN
 from pipeline.estimation.estimators.torque_map import ESTIMATOR as TORQUE_MAP
+from pipeline.estimation.registry import fit_all
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
@@ -70,6 +71,22 @@ def test_inertia_carries_the_torque_gain_and_not_the_current_gain() -> None:
     shares = {part.source: part.u / inertia.number for part in inertia.budget}
     assert shares["torque@sim-1"] == pytest.approx(0.002, rel=0.01)
     assert abs(shares.get("current@sim-1", 0.0)) < 2e-5
+
+
+def test_currents_of_the_wrong_sign_give_no_friction() -> None:
+    """Viscous friction came out as measured and below zero beside an inertia that was withheld."""
+    plan = tuple((s, t, {**how, "load": 0.0}) for s, t, how in CAMPAIGN if t == "drive")
+    motor = replace(design("gimbal-5208"), effects={})
+    drives = with_currents(campaign_of(campaign(motor, EXACT_BENCH, 11, plan)), -1.0)
+    unloaded = (
+        replace(c, tables=tuple(t.drop("torque_shaft_nm") for t in c.tables))
+        for c in drives.captures
+    )
+    known = fit_all(replace(drives, captures=tuple(unloaded)), {})[0]
+    for name in ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad"):
+        assert known.best(name) is None, name
+    (viscous,) = (e for e in known.all_of("b_visc_nm_s_rad") if e.method == "inertia")
+    assert "look at the signs of iq_a" in viscous.note
 
 
 def with_currents(captures: Campaign, gain: float) -> Campaign:
