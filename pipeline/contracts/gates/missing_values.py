@@ -23,7 +23,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
     Notes
     -----
-    Fewer than `fewest` values of a column that the test rests on refuse. A column with values in
+    Fewer than `fewest` values of a column that the test rests on refuse, in a table with a clock;
+    without one each row is a reading by itself, and one is enough. A column with values in
     fewer than `dense_share` [1] of the rows is a slow stream written into a fast table, not a
     fault: its blanks are left as they are. A stream that the test does not rest on may hold a
     single row.
@@ -40,12 +41,13 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
         finite = {name: np.isfinite(table[name].to_numpy()) for name in names}
         dense = {n: g for n, g in finite.items() if g.mean() >= options["dense_share"]}
         keep = np.all(list(dense.values()), axis=0) if dense else np.ones(table.height, dtype=bool)
+        fewest = options["fewest"] if "t_s" in table.columns else 1.0
         for name in names:
-            if np.count_nonzero(finite[name]) < options["fewest"]:
+            if np.count_nonzero(finite[name]) < fewest:
                 raise CaptureError(
                     NAME,
                     f"{name} has {counted(int(np.count_nonzero(finite[name])), 'value')}; "
-                    f"{meta.test} needs {options['fewest']:.0f} at least",
+                    f"{meta.test} needs {fewest:.0f} at least",
                     "record for longer, or faster",
                 )
         if keep.all():
@@ -64,7 +66,7 @@ GATE = Gate(
     {
         # Below half, blanks are the rule: two rates in one table.
         "dense_share": 0.5,
-        # One value makes no fit; what more a test needs its other gates ask for.
+        # One value of a trace makes no fit; what more a test needs its other gates ask for.
         "fewest": 2.0,
     },
 )

@@ -256,13 +256,18 @@ def _estimate(
     used: Sequence[Capture],
     options: Mapping[str, float],
 ) -> Estimate:
-    """The estimate of a value read with its scatter and degrees of freedom."""
+    """The estimate of a value read with its scatter and degrees of freedom.
+
+    What one reading scatters is not known: no more than the meter's gain may be off.
+    """
     value, u, dof = read
     parts = [METHOD.scatter(name, u, dof)]
     words = [note]
     if METHOD.unit(name) != "deg":
         gain, unstated = _gain(used, options)
         parts.append(Contribution(f"lcr@{station(used[0].meta)}", gain * abs(value), "B"))
+        if u == 0.0:
+            parts.append(Contribution(f"assumed:one_reading:{name}", gain * abs(value), "B"))
         words.append(unstated)
     frequencies = [
         float(np.nanmean(c.arrays("freq_hz")["freq_hz"])) for c in used if c.has("freq_hz")

@@ -8,11 +8,16 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from pipeline.contracts.registry import gates
 from pipeline.estimation.estimators import (
     lcr,
 )
+from pipeline.estimation.registry import fit_all
 from pipeline.numerics.least_squares import linear_fit
+from pipeline.records.capture import Campaign
 from tests.unit.estimation.signals import capture, estimates
+
+GATES = {gate.name: gate for gate in gates()}
 
 
 def meter(mean=4e-3, a=-1e-3, b=0.0, *, step=15.0, noise=0.0, pair="ab", gain=None, **more):
@@ -176,3 +181,21 @@ def test_five_angles_or_angles_that_do_not_part_the_swing_are_no_table() -> None
     near = meter(noise=1e-9)
     table = near.tables[0].with_columns(theta_elec_deg=near.tables[0]["theta_elec_deg"] * 0.2)
     assert not estimates(lcr.ESTIMATOR, replace(near, tables=(table,)))["ld_h"].known
+
+
+def test_one_row_of_three_pairs_is_a_reading() -> None:
+    """A meter's table has no clock; one row was refused, and its saliency had no uncertainty."""
+    rows = {
+        name: np.array([4e-3 - 1e-3 * math.cos(2.0 * math.radians(17.0 - axis))])
+        for name, axis in (("lab_h", -30.0), ("lbc_h", 90.0), ("lca_h", 210.0))
+    }
+    table = capture("lcr", "lcr", theta_elec_deg=np.array([17.0]), **rows)
+    assert GATES["missing_values"].check(table, GATES["missing_values"].options).masks == ()
+    known = fit_all(Campaign("m", (table,)), {})[0]
+    for name, true in (("ld_h", 1.5e-3), ("lq_h", 2.5e-3)):
+        found = known.best(name)
+        assert found is not None
+        assert found.number == pytest.approx(true, rel=1e-9)
+    ratio = known.best("saliency_ratio")
+    assert ratio is not None
+    assert 0.001 * ratio.number < ratio.u < 0.05 * ratio.number
