@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from pipeline.estimation.policy import policy
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import Plateau
 from pipeline.records.capture import Array
-
-PARTS = 10
-COOLING = (np.inf, 1.0, 0.3, 0.1)
 
 
 def warming(columns: Mapping[str, Array], plateaus: Sequence[Plateau]) -> float:
@@ -43,13 +41,15 @@ def warming(columns: Mapping[str, Array], plateaus: Sequence[Plateau]) -> float:
     (lumped capacitance).
 
     """
+    how = policy().self_heating
+    shares = [np.inf, *(how.cooling_step**-k for k in range(how.cooling_times))]
     t, current = columns["t_s"], columns["i_a"]
-    rows = [part for plateau in plateaus for part in np.array_split(_rows_of(plateau), PARTS)]
+    rows = [part for plateau in plateaus for part in np.array_split(_rows_of(plateau), how.parts)]
     rows = [part for part in rows if part.size]
     volts, amps = (np.array([float(columns[n][p].mean()) for p in rows]) for n in ("v_v", "i_a"))
     weights = 1.0 / np.sqrt([float(part.size) for part in rows])
     best, rise = np.inf, 0.0
-    for share in COOLING:
+    for share in shares:
         heat = _heat(t, current**2, share * float(t[-1] - t[0]))
         over = np.array([float(heat[part].mean()) for part in rows])
         design = np.column_stack([amps, amps * over])

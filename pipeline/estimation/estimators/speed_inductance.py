@@ -204,4 +204,5 @@ ESTIMATOR = Estimator(
     fit=fit,
     uses=("ld_h", "lq_h", "pole_pairs"),
     terms=METHOD.terms,
+    clock_powers={BY_VOLTAGE: 1},
 )

@@ -21,6 +21,7 @@ from pipeline.estimation.policy.electrical import (
     MeterTable,
     Points,
     PolePairs,
+    SelfHeating,
     Steps,
 )
 from pipeline.estimation.policy.mechanical import (
@@ -58,6 +59,7 @@ class Policy:
     points: Points = section(Points)
     flux_pairs: FluxPairs = section(FluxPairs)
     pole_pairs: PolePairs = section(PolePairs)
+    self_heating: SelfHeating = section(SelfHeating)
     meter_table: MeterTable = section(MeterTable)
     inverter: Inverter = section(Inverter)
     aligned: Aligned = section(Aligned)

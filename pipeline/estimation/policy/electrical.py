@@ -132,6 +132,24 @@ class FluxPairs:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SelfHeating:
+    """How the rise of a winding's resistance under direct current is read."""
+
+    parts: int = chosen(
+        10, "1", "parts that a plateau is cut into",
+        why="they show how the rise bends, and average the noise",
+    )  # fmt: skip
+    cooling_step: float = chosen(
+        3.0, "1", "ratio of the cooling times that are tried, from a capture's length down",
+        why="a rise that lies between two of them is found to a fifth",
+    )  # fmt: skip
+    cooling_times: int = chosen(
+        3, "1", "how many cooling times are tried beside none",
+        why="a winding that cools in less than a tenth of a capture is settled on its plateaus",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PolePairs:
     """When voltages at speed contradict stated pole pairs."""
 

