@@ -197,6 +197,29 @@ class NormalEquations:
         power = _rounded(self.power + (self.slope + slope)[:, places] @ step)
         return replace(self, power=power, slope=slope)
 
+    def sheared(self, place: int, along: NDArray[np.int64], by: Array) -> NormalEquations:
+        """The normal equations with multiples of some columns added to another one.
+
+        Parameters
+        ----------
+        place
+            The column that changes.
+        along
+            Columns [k] that are added to it.
+        by
+            Multiple of each in every group [G, k].
+
+        """
+        every = np.arange(self.slope.shape[1])
+        rows = self.normal[self._products(along[:, None], every)]
+        row = self.normal[self._products(np.array(place), every)]
+        row += np.einsum("gk,kng->ng", by, rows)
+        row[place] += np.einsum("gk,kg->g", by, row[along])
+        slope, normal = self.slope.copy(), self.normal.copy()
+        slope[:, place] += (by * self.slope[:, along]).sum(axis=1)
+        normal[self._products(np.array(place), every)] = row
+        return replace(self, slope=slope, normal=normal)
+
     def deviance(self) -> float:
         """−2 log likelihood where the fit stands, and what the priors cost."""
         cost = self.prior.cost() + self.prior.elsewhere

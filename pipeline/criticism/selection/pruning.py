@@ -16,6 +16,7 @@ from pipeline.criticism.machine.model import zero
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
+from pipeline.criticism.regression.left_out import loss_at
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import NormalEquations
 from pipeline.criticism.selection.choices import better_of
@@ -179,10 +180,7 @@ def _loss(system: LinearSystem, known: NormalEquations, names: Sequence[str]) ->
     model_columns = system.model_columns
     left_out = np.array([n for n in model_columns if system.columns[n].name in names], dtype=int)
     move = np.array([-system.fit.values[system.columns[n].name] for n in left_out])
-    return (
-        known.moved(left_out, move).only(np.setdiff1d(model_columns, left_out)).best().deviance
-        - known.deviance()
-    )
+    return loss_at(system, known, left_out, move)
 
 
 def _doubtful(

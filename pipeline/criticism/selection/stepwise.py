@@ -18,6 +18,7 @@ from pipeline.criticism.regression.gauss_newton import (
     rough_anew,
 )
 from pipeline.criticism.regression.goodness import leave_out, significant_groups
+from pipeline.criticism.regression.left_out import loss_at
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.normal_equations import NormalEquations
 from pipeline.criticism.selection.acceptance import (
@@ -454,7 +455,7 @@ def loss_without(
     Returns
     -------
     float
-        To first order: the model is taken as linear between here and there.
+        To first order around the model without them.
 
     """
     stems = tuple(f"{name}." for name in names)
@@ -462,9 +463,6 @@ def loss_without(
     left_out = np.array(
         [n for n in model_columns if system.columns[n].name.startswith(stems)], dtype=int
     )
-    stay = np.setdiff1d(model_columns, left_out)
-    if instead is not None:
-        stay = np.concatenate([stay, instead])
     machine = fit.machine
     amplitude = {
         f"{e.name}.{p.name}": p.amplitude
@@ -474,5 +472,5 @@ def loss_without(
     names_out = [system.columns[n].name for n in left_out]
     move = np.array([-fit.values[n] if amplitude[n] else 0.0 for n in names_out])
     equations = system.normal_equations() if normal_equations is None else normal_equations
-    end = equations.moved(left_out, move).only(stay).best(*fit.policy.selection.thorough)
-    return end.deviance - equations.deviance()
+    places = () if instead is None else instead
+    return loss_at(system, equations, left_out, move, places, *fit.policy.selection.thorough)

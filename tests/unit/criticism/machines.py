@@ -243,3 +243,18 @@ def asking_for(negligible):
     windage = effects()["windage"]
     parameters = tuple(replace(p, negligible=negligible) for p in windage.parameters)
     return {**LIBRARY, "windage": replace(windage, parameters=parameters)}
+
+
+def coast_under_load(sense: float, load_nm: float = 3e-5, seed: int = 5) -> Segment:
+    """A coast from 200 rad/s in a sense, against dry and viscous friction and a load that pulls one
+    way.
+    """
+    ts, n, b, inertia = 1e-3, 3000, BASE["b_nm_s_rad"], BASE["j_kgm2"]
+    rate, steady = b / inertia, sense * (4e-4 + sense * load_nm) / b
+    t = ts * np.arange(n)
+    theta = (200.0 * sense + steady) / rate * -np.expm1(-rate * t) - steady * t
+    plain = coasting(n)
+    sigma = plain.sensors.noise["theta_mech_rad"]
+    theta += np.random.default_rng(seed).normal(0.0, sigma, n)
+    weak = projection(theta, np.arange(40, n - 140, 50), 100, ())
+    return replace(plain, recorded={"theta_mech_rad": theta}, weak=weak)

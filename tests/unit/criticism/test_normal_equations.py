@@ -65,3 +65,14 @@ def test_moved_and_along_are_the_same_as_rows_moved_and_chosen():
     again = normal_equations(matrix[:, [0, 2]], left, none, none).best()
     assert some.step == pytest.approx(again.step)
     assert some.deviance == pytest.approx(again.deviance)
+
+
+def test_sheared_is_the_same_as_columns_added_to_another():
+    matrix, residual = rows()
+    by = np.array([[0.3, -1.0], [0.0, 2.0], [1.5, 0.4]])
+    changed = matrix.copy()
+    changed[:, 2] += (by[GROUP] * matrix[:, [0, 3]]).sum(axis=1)
+    sheared = normal_equations(matrix, residual).sheared(2, np.array([0, 3]), by)
+    direct = normal_equations(changed, residual)
+    assert sheared.slope == pytest.approx(direct.slope)
+    assert sheared.normal == pytest.approx(direct.normal)
