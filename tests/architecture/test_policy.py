@@ -74,7 +74,6 @@ ARITHMETIC = {
         "_FLOATING",
         "_DIGITS",
         "_MOST_DECIMALS",
-        "_RARE",
     },
     "data/machine_scale.py": {"_BINS_AN_ORDER", "_SAME_ANGLE"},  # twice Nyquist; rounding
     "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight

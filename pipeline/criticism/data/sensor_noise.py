@@ -27,9 +27,8 @@ _DIGITS = 1e-3
 """Share of a step that the digits of a file may leave where there is none."""
 _FLOATING = 1e-9
 """Share of a signal's size that is rounding of floating-point numbers."""
-_MOST_DECIMALS, _RARE = 9, 0.01
-"""Decimals of a file that may be seen beside a step; share of third differences between the two
-where the digits of a file lie far beneath a step."""
+_MOST_DECIMALS = 9
+"""Decimals of a file that may be seen beside a step."""
 
 
 def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> float:
@@ -193,13 +192,14 @@ def smoothed(
 
     """
     most = policy.smooth_share * step / math.sqrt(12.0)
-    whole = signal.size - 1 + signal.size % 2
-    lengths = (*(n for n in policy.smooth if n < whole), whole)
-    for length in reversed(lengths):
-        even = parabolas(signal if between is None else between, length)
-        if length == lengths[0] or float((signal - even).std()) <= most:
+    rough = signal if between is None else between
+    whole = max(signal.size - 1 + signal.size % 2, 1)
+    shortest, *longer = *(n for n in policy.smooth if n < whole), whole
+    for length in reversed(longer):
+        even = parabolas(rough, length)
+        if float((signal - even).std()) <= most:
             return even
-    return signal
+    return parabolas(rough, shortest)
 
 
 def scatter(signal: Array, step: float, policy: SensorNoise) -> float:
@@ -280,7 +280,7 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     # of a shaft that turns by nearly whole steps a sample most are zero, but for a file's digits
     size = np.abs(third)
     beneath, digits = _DIGITS * np.quantile(size, 0.95), 4.0 * _decimal(signal)
-    if np.mean((size > digits) & (size <= 3.0 * digits)) < _RARE:
+    if np.mean((size > digits) & (size <= 3.0 * digits)) < policy.between:
         beneath = max(beneath, digits)
     third = third[size > beneath]
     if third.size < policy.block:

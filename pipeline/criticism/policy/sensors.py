@@ -42,6 +42,10 @@ class SensorNoise:
         12.0, "1", "third difference over the median one that is a jump and not the rounding",
         why="rounding alone comes to four",
     )  # fmt: skip
+    between: float = chosen(
+        0.01, "1", "share of third differences between digits of a file and a step far above them",
+        why="of steps alone there are none in between; of a noisy angle they have every size",
+    )  # fmt: skip
     together: float = derived(
         0.5, "1", "coherence of the phase below which there is no step",
         source="noise of 0.04 steps, added after the rounding, comes to it",

@@ -9,14 +9,14 @@ from pipeline.records.constants import Constants
 from pipeline.records.pole_pairs import BY_VOLTAGE, contradicts, voltages_say
 
 
-class PolePairs(NamedTuple):
+class PolePairsToUse(NamedTuple):
     """Pole pairs, None where there are none to rest on, and on what they rest, in words."""
 
     number: int | None
     words: str
 
 
-def pole_pairs_to_use(known: Constants, campaign: Campaign) -> PolePairs:
+def pole_pairs_to_use(known: Constants, campaign: Campaign) -> PolePairsToUse:
     """Counted pole pairs, else stated ones that the voltages at speed do not contradict.
 
     Parameters
@@ -29,16 +29,16 @@ def pole_pairs_to_use(known: Constants, campaign: Campaign) -> PolePairs:
     """
     counted, seen = known.best("pole_pairs"), known.best(BY_VOLTAGE)
     if counted is not None:
-        return PolePairs(round(counted.number), "")
+        return PolePairsToUse(round(counted.number), "")
     stated = campaign.nameplate("pole_pairs")
     voltages = "" if seen is None else f"; {voltages_say(seen)}"
     if not isinstance(stated, int):
-        return PolePairs(None, f"state pole_pairs, or record an open_circuit spin{voltages}")
+        return PolePairsToUse(None, f"state pole_pairs, or record an open_circuit spin{voltages}")
     if seen is not None and contradicts(seen, stated):
-        return PolePairs(
+        return PolePairsToUse(
             None,
             f"the captures state {stated} pole pairs{voltages}: correct `pole_pairs`, or the "
             "inductances, or record an open_circuit spin, which counts them",
         )
     rests = f"rests on the {stated} pole pairs that the captures state"
-    return PolePairs(stated, f"{rests}{voltages or '; nothing recorded counts them'}")
+    return PolePairsToUse(stated, f"{rests}{voltages or '; nothing recorded counts them'}")
