@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from pipeline.criticism.data.traces import parabolas
 from pipeline.criticism.operating import Array
@@ -269,21 +270,26 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     Notes
     -----
     Third differences d of a rounded signal are whole steps q, so that their phase e^{j2πd/q} stays
-    at 1 at the right q, even where a number format has rounded it once more. Parts of the
-    record, longer and longer, give q sharply enough to separate 4000 steps a turn from 4096.
+    at 1 at the right q, even where a number format has rounded it once more. Where a format keeps a
+    number of digits, small angles have more decimals: they are looked at first, for multiples of a
+    coarse decimal may lie near those of a fraction of q. Parts of the record, longer and longer,
+    give q sharply enough to separate 4000 steps a turn from 4096.
 
     """
     signal = signal[np.isfinite(signal)]
-    third = np.diff(signal, 3)
-    if third.size < policy.block:
+    if signal.size < policy.block + 3:
         return 0.0
-    # of a shaft that turns by nearly whole steps a sample most are zero, but for a file's digits
-    size = np.abs(third)
-    beneath, digits = _DIGITS * np.quantile(size, 0.95), 4.0 * _decimal(signal)
-    if np.mean((size > digits) & (size <= 3.0 * digits)) < policy.between:
-        beneath = max(beneath, digits)
-    third = third[size > beneath]
-    if third.size < policy.block:
+    largest = sliding_window_view(np.abs(signal), 4).max(axis=1)
+    decades = np.floor(np.log10(np.maximum(largest, _FLOATING)))
+    of_decade = {decade: _decimal(largest[decades == decade]) for decade in np.unique(decades)}
+    decimals = np.array([of_decade[decade] for decade in decades])
+    differences, third = np.diff(signal, 3), np.empty(0)
+    for decimal in np.unique(decimals):
+        alike = differences[decimals == decimal]
+        third = np.append(third, _beyond_digits(alike, decimal, policy))
+        if third.size >= policy.block:
+            break
+    else:
         return 0.0
     third = third[np.abs(third) < policy.burst * np.median(np.abs(third)) + 1e-300]
     spread = float(np.sqrt((third**2).mean())) if third.size >= policy.block else 0.0
@@ -310,6 +316,17 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
             if coherence[1] >= coherence[0] - policy.snap_loss:
                 return fraction
     return step
+
+
+def _beyond_digits(third: Array, decimal: float, policy: SensorNoise) -> Array:
+    """Third differences that are more than a file's digits: of a shaft that turns by nearly whole
+    steps a sample most are zero, but for those.
+    """
+    size = np.abs(third)
+    beneath, digits = _DIGITS * np.quantile(size, 0.95), 4.0 * decimal
+    if np.mean((size > digits) & (size <= 3.0 * digits)) < policy.between:
+        beneath = max(beneath, digits)
+    return third[size > beneath]
 
 
 def _decimal(signal: Array) -> float:
