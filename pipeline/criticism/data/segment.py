@@ -58,6 +58,8 @@ class Sensors:
         was not determined.
     readings
         Rounded readings that each sample of such an angle is the mean of.
+    dither_rad
+        Standard deviation of the white noise of such an angle before it is rounded.
     parabola
         Samples of the parabola that the angle was smoothed by; 1 for none.
     speed
@@ -76,6 +78,7 @@ class Sensors:
     runs_rad: Array | None = None
     angle_step_rad: float | None = None
     readings: int = 1
+    dither_rad: float = 0.0
     parabola: int = 1
     speed: SpeedSensor | None = None
     held_speed: bool = False

@@ -24,6 +24,10 @@ _REACH = 1.5
 in the next; number of the parts; spacing of trial steps, at first and at the end, in turns of the
 phase over a part; how many spacings they reach around the step before. A lobe of the coherence is
 a turn wide: a wider spacing misses it, a finer one costs time."""
+_SHIFTS = (-0.375, -0.125, 0.125, 0.375)
+_ROUNDS = 3
+"""Parts of a step by which a motion is moved to be rounded anew, evenly spread; rounds in which its
+noise is found: a noise of 0.4 steps is found to a few per cent in two."""
 _DIGITS = 1e-3
 """Share of a step that the digits of a file may leave where there is none."""
 _FLOATING = 1e-9
@@ -227,6 +231,38 @@ def scatter(signal: Array, step: float, policy: SensorNoise) -> float:
     # a bend that smoothing may leave is no noise
     alone = step / math.sqrt(12.0)
     return min(noise, alone) if noise <= policy.smooth_share * alone else noise
+
+
+def dither_of(angle: Array, step: float, policy: SensorNoise) -> float:
+    """White noise of an angle before it was rounded.
+
+    Parameters
+    ----------
+    angle
+        As recorded [n, rad].
+    step
+        Of the rounding [rad].
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    float
+        Standard deviation [rad] with which the same motion, rounded anew, has the third differences
+        that are recorded. Without noise the error of a rounding is not white where steps and
+        sampling beat.
+
+    """
+    noise = sensor_noise(angle, policy, steady=True)
+    even = smoothed(angle, math.sqrt(12.0) * noise, policy) / step
+    normal = np.random.default_rng(even.size).normal(size=even.size)
+    power = 0.0
+    for _ in range(_ROUNDS):
+        noisy = even + math.sqrt(power) * normal
+        anew = [np.round(noisy + shift) for shift in _SHIFTS]
+        shown = [sensor_noise(one, policy, steady=True) for one in anew]
+        power = max(power + (noise / step) ** 2 - float(np.mean(np.square(shown))), 0.0)
+    return step * math.sqrt(power)
 
 
 def rounding_error(even: Array, step: float, shift: Array | float) -> Array:

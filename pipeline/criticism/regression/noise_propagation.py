@@ -211,6 +211,9 @@ class _Recording:
                 yield {**self.segment.recorded, "theta_mech_rad": moved_rad}
                 continue
             even, step = self.even["theta_mech_rad"], sensors.angle_step_rad or 0.0
+            if sensors.dither_rad:
+                generator = np.random.default_rng([count, number])
+                even = even + sensors.dither_rad * generator.normal(size=even.size)
             error = _readings_error(even, step, sensors.readings, moved)
             moved_rad = theta + parabolas(error, sensors.parabola)
             yield {**self._in_turned_frame(error), "theta_mech_rad": moved_rad}
@@ -266,7 +269,9 @@ def _noisy(
     for name, step in sensors.steps.items():
         noisy[name] = noisy[name] + rounding_error(even[name], step, shift[name])
     if sensors.angle_step_rad:
-        noisy["theta_mech_rad"] = segment.recorded["theta_mech_rad"]
+        dither = sensors.dither_rad * generator.normal(size=segment.size)
+        theta = segment.recorded["theta_mech_rad"]
+        noisy["theta_mech_rad"] = theta + parabolas(dither, sensors.parabola)
     return noisy
 
 
@@ -315,7 +320,8 @@ def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
     if sensors.angle_step_rad:
         theta = segment.recorded["theta_mech_rad"]
         rough = sensors.parabola == 1
-        even["theta_mech_rad"] = even_of(theta, sensors.angle_step_rad) if rough else theta
+        passing = math.hypot(sensors.angle_step_rad, math.sqrt(12.0) * sensors.dither_rad)
+        even["theta_mech_rad"] = even_of(theta, passing) if rough else theta
     return even
 
 

@@ -10,6 +10,7 @@ import pytest
 from pipeline.criticism.data.segment import Sensors, projected, row_index
 from pipeline.criticism.data.sensor_noise import (
     coarse_step,
+    dither_of,
     is_rounded,
     resolution,
     rounding_error,
@@ -217,6 +218,46 @@ def test_a_rounded_angle_is_as_loud_in_each_window_as_its_pace_makes_it():
     assert floor.max() > 3.0 * np.median(floor)
     assert np.abs(np.log(floor / np.sqrt(power))).max() < np.log(3.0)
     assert np.mean(power / floor**2) == pytest.approx(1.0, abs=0.3)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("pace", [0.01, 1.43, 13.8])
+def test_noise_before_a_rounding_is_what_the_rounding_alone_does_not_make(pace, share):
+    """Steps and sampling beat, so that the error of a rounding may pass for more noise than it is,
+    or for less."""
+    step, samples = 2.0 * np.pi / 2**14, np.arange(12000)
+    moved = pace * samples + 3.0 * np.sin(samples / 400.0)
+    noisy = moved + share * np.random.default_rng(5).standard_normal(samples.size)
+    dither = dither_of(step * np.round(noisy), step, SENSORS)
+    assert dither / step == pytest.approx(share, abs=0.1)
+
+
+def test_noise_of_an_encoder_counts_beside_its_rounding():
+    """Steps of 0.38 mrad and noise of half of one, at a pace of which the steps alone make little:
+    a hundredth of J θ″ of the whole."""
+    step, even = 2.0 * np.pi / 2**14, log()
+    group, _, valid, groups = row_index(even)
+    mine = group[valid] == groups.index(("torque_shaft_nm", 0))
+    model, random = Model(machine(), ()), np.random.default_rng(9)
+    exact = step * 12.37 * np.arange(even.size)
+
+    def weak(theta):
+        recorded = {**even.recorded, "theta_mech_rad": theta}
+        return projected(even, residual(even, model, BASE, recorded))[valid][mine]
+
+    def read():
+        return step * np.round(exact / step + 0.5 * random.standard_normal(exact.size))
+
+    power = np.mean([(weak(read()) - weak(exact)) ** 2 for _ in range(20)])
+    quiet = dict.fromkeys(even.sensors.noise, 0.0)
+    noisy = {**even.recorded, "theta_mech_rad": read()}
+    told = replace(even, recorded=noisy, sensors=Sensors(quiet, angle_step_rad=step))
+    segment = _by_encoder(told, machine())
+    assert segment.sensors.angle_step_rad == step
+    floor = noise_floor(segment, model, BASE, 1)[mine]
+    assert np.mean(floor**2) == pytest.approx(power, rel=0.4)
+    alone = replace(segment, sensors=replace(segment.sensors, dither_rad=0.0))
+    assert np.mean(noise_floor(alone, model, BASE, 1)[mine] ** 2) < 0.5 * power
 
 
 def test_an_angle_that_hides_its_pace_is_as_loud_as_what_it_may_hide():
