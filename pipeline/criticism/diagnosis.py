@@ -347,8 +347,10 @@ def _may_be_observer_noise(end: SearchResult) -> bool:
         return False
     last = end.ladder.steps[-1].system
     by_observer = {s.capture for s in last.segments if BEND_SPEED in s.fixed}
-    left_in = {left_over.capture for left_over in end.remainders}
-    return bool(left_in) and left_in <= by_observer
+    return bool(end.remainders) and all(
+        left_over.capture in by_observer and not left_over.signal.endswith("_v")
+        for left_over in end.remainders
+    )
 
 
 def _ranking(

@@ -81,6 +81,45 @@ def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> fl
     return max(level, _rounding(third) / math.sqrt(12.0))
 
 
+def slow_noise(signal: Array, longest: float, policy: SensorNoise) -> float:
+    """Standard deviation of white noise that is as loud as a signal's is in means of its samples.
+
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit], finite, of a filtered or observed quantity.
+    longest
+        Samples of a mean at the most.
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    float
+        Unit of the signal; `sensor_noise` where the noise is white.
+
+    Notes
+    -----
+    What a filter passes of a noise is smooth from sample to sample: third differences of samples
+    miss it, and those of means do not. Lengths double until the means show the motion, which grows
+    faster than any noise that a loop of second order leaves.
+
+    References
+    ----------
+    Allan, Proc. IEEE 54(2), 1966, 221, doi:10.1109/PROC.1966.4634 (variances of means).
+
+    """
+    loudest = before = sensor_noise(signal, policy)
+    length = 2
+    while length <= longest and signal.size // length >= policy.block * policy.blocks:
+        means = signal[: signal.size // length * length].reshape(-1, length).mean(axis=1)
+        level = math.sqrt(length) * sensor_noise(means, policy)
+        if level > policy.motion_growth * before:
+            break
+        loudest, before, length = max(loudest, level), level, 2 * length
+    return loudest
+
+
 def resolution(signal: Array, policy: SensorNoise) -> float:
     """The step that a signal's values are whole multiples of.
 

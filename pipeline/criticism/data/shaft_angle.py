@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import UNSMOOTHED, Sensors, SpeedSensor
-from pipeline.criticism.data.sensor_noise import coarse_step, scatter, sensor_noise
-from pipeline.criticism.data.traces import parabolas, smoothed
+from pipeline.criticism.data.sensor_noise import coarse_step, scatter, sensor_noise, slow_noise
+from pipeline.criticism.data.traces import parabolas, smoothed, window_of
 from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Cutting
@@ -71,8 +71,10 @@ def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> S
             [[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * period]
         )
         noise = sensor_noise(speed, policy := machine.policy.sensor_noise)
-        step = coarse_step(speed, noise, policy)
-        return SpeedSensor(max(noise, scatter(speed, step, policy) if step else 0.0), step)
+        if step := coarse_step(speed, noise, policy):
+            return SpeedSensor(max(noise, scatter(speed, step, policy)), step)
+        window = window_of(period, speed.size, machine.policy.cutting)
+        return SpeedSensor(slow_noise(speed, window / policy.window_means, policy), 0.0)
     else:
         columns["theta_mech_rad"] = np.zeros(next(iter(columns.values())).size)
     return None

@@ -11,7 +11,7 @@ from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
 from pipeline.criticism.data.traces import thinned, window_of
 from pipeline.criticism.data.unlogged_load import rests, runs_free
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
-from pipeline.criticism.machine.model import BEND_SPEED, STATE, Model, Pieces, clock_gain
+from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
 from pipeline.criticism.machine.two_masses import reach
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
@@ -55,7 +55,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
     """
     log = None if capture.has(TORQUE) else drive_log(capture, machine)
-    if log is None or (not log.angle and capture.has("vq_v")) or not runs_free(log, machine):
+    if log is None or not runs_free(log, machine):
         return None
     shaft = {name: log.columns[name] for name in _USED if name in log.columns}
     shaft["t_s"] = log.period_s * np.arange(log.keep.size, dtype=np.float64)
@@ -77,7 +77,6 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         channels=(TORQUE,),
         weak=weak,
         blocks=in_time(middle, log.keep.size),
-        fixed={} if log.angle else {BEND_SPEED: 1.0},
     )
     return replace(segment, unthinned=Unthinned(full))
 

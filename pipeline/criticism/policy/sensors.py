@@ -27,6 +27,14 @@ class SensorNoise:
         (0.3, -0.5244), "1", "quantile over the blocks, and the normal variable's value there",
         why="a low one, since steps and bursts only add",
     )  # fmt: skip
+    motion_growth: float = derived(
+        4.0, "1", "growth of a noise with means of twice the length that no noise has",
+        source="a loop of second order falls by 40 dB a decade; a smooth motion grows by eleven",
+    )  # fmt: skip
+    window_means: float = chosen(
+        5.0, "1", "the longest means in which a speed's noise is looked at, in a window",
+        why="third differences of them see two waves a window, as its acceleration does",
+    )  # fmt: skip
     steady: tuple[float, ...] = chosen(
         (0.6, 0.2533), "1", "the same of an angle", why="its rounding comes and goes"
     )

@@ -14,6 +14,7 @@ from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equation_of, equations
 from pipeline.criticism.machine.model import (
+    BEND_SPEED,
     COAST_SHARES,
     EARLY_S,
     EARLY_SHARES,
@@ -150,10 +151,10 @@ def _unlogged(segment: Segment, equation: Equation, machine: Machine) -> dict[st
 
 
 def _late_speed(segment: Segment, capture: Capture) -> dict[str, float]:
-    """The nuisance of a motion that is known by a drive's own speed alone."""
+    """The nuisances of a motion that is known by a drive's own speed alone."""
     has_angle = capture.has("theta_mech_rad") or capture.has("theta_elec_rad")
     drive_speed = segment.instrument.name == "drive" and capture.has("omega_mech_rad_s")
-    return {LATE_SPEED: 1.0} if drive_speed and not has_angle else {}
+    return {LATE_SPEED: 1.0, BEND_SPEED: 1.0} if drive_speed and not has_angle else {}
 
 
 def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:
