@@ -14,7 +14,7 @@ def _torque(x: Operating, q: Values) -> Array:
 
 
 def _parallel(x: Operating, q: Values) -> Complex:
-    return q["parallel"] * loss_current(x, _torque(x, q))
+    return loss_current(x, _torque(x, q), q["parallel"])
 
 
 EFFECT = Effect(

@@ -227,7 +227,7 @@ def first_fit(rough: Fit) -> LinearSystem:
     ends = [gauss_newton(begun)]
     if len(rough.segments) <= rough.policy.fit.short_programme:
         ends += [_one_side_first(begun, side) for side in _SIDES]
-    end = min(ends, key=_misfit)
+    end = min(ends, key=misfit)
     if rough.model.stated():
         end = gauss_newton(replace(end.fit, model=rough.model))
     if not floors_changed(end.fit):
@@ -236,10 +236,24 @@ def first_fit(rough: Fit) -> LinearSystem:
     return gauss_newton(replace(end.fit, sigma=own, near=end.fit.values), before=end)
 
 
-def _misfit(system: LinearSystem) -> float:
-    """How far the equations are missed, each counted once: what a model lacks is one error in all
-    windows of a signal. By their numbers, a drag that the model lacks, in hundreds of windows,
-    would make a winding of the wrong size of a few tens.
+def misfit(system: LinearSystem) -> float:
+    """How far the equations are missed, each counted once.
+
+    Parameters
+    ----------
+    system
+        A fit.
+
+    Returns
+    -------
+    float
+        Sum of log(1 + χ²/n) over the groups of rows.
+
+    Notes
+    -----
+    What a model lacks is one error in all windows of a signal. By their numbers, a drag that it
+    lacks, in hundreds of windows, would be worth a winding of the wrong size in a few tens.
+
     """
     return float(np.log1p(system.reduced_chi2(system.residual)).sum())
 

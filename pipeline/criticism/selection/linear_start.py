@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from pipeline.criticism.data.segment import rows_where
 from pipeline.criticism.effect import Effect, LinearForm
 from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.fit import Fit, floors
-from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.gauss_newton import gauss_newton, misfit
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.candidates import Candidate, first_of_each, searched
 from pipeline.criticism.selection.improvement import FitQuality, clears, fall_below_floor, share_of
@@ -67,8 +68,18 @@ def with_linear_start(
             continue
         begun = _fit_from_form(wide.fit, candidate.effect, form)
         if begun is not None:
-            so_far = with_better(so_far, scored(wide, candidate, begun), offered)
+            end = min(map(_fitted, _by_choices(begun)), key=misfit)
+            so_far = with_better(so_far, _score_of(wide, candidate, end), offered)
     return tuple(so_far)
+
+
+def _by_choices(begun: Fit) -> list[Fit]:
+    """A start with every value of its last effect's choices: a linear form is of one of them."""
+    effect = begun.model.effects[-1]
+    choices = [p for p in effect.parameters_of(begun.machine) if p.choice]
+    names = [f"{effect.name}.{p.name}" for p in choices]
+    values = product(*(p.scan for p in choices))
+    return [begun.at(dict(zip(names, one, strict=True))) for one in values]
 
 
 def with_better(
@@ -133,8 +144,17 @@ def scored(wide: LinearSystem, candidate: Candidate, begun: Fit) -> Score:
     with the effect.
 
     """
+    return _score_of(wide, candidate, _fitted(begun))
+
+
+def _fitted(begun: Fit) -> LinearSystem:
+    """A fit from a start, by the noise floors of its end."""
     refitted = gauss_newton(replace(begun, sigma=floors(begun.segments, begun.model, begun.values)))
-    end = _reweighted(refitted.fit, refitted.fit)
+    return _reweighted(refitted.fit, refitted.fit)
+
+
+def _score_of(wide: LinearSystem, candidate: Candidate, end: LinearSystem) -> Score:
+    """The score of an effect at its fit, over one without it by the same noise floors."""
     return score_between(_reweighted(wide.fit, end.fit), end, candidate)
 
 

@@ -325,7 +325,10 @@ def test_power_that_the_iron_takes_from_the_winding_is_what_its_drag_takes_from_
     taken = 1.5 * np.real(induced * np.conj(effect.parallel(x, q)))
     assert taken == pytest.approx(effect.torque(x, q) * x.omega_rad_s, rel=1e-12)
     assert not effect.parallel(x, {**q, "parallel": 0.0}).any()
-    assert not effect.parallel(replace(x, inverter=False), q).any()
+    open_winding = replace(x, inverter=False)
+    assert not effect.parallel(open_winding, q).any()
+    eddies = effect.parallel(open_winding, {**q, "parallel": 2.0})
+    assert eddies == pytest.approx(effect.parallel(x, q))
 
 
 def test_a_resistance_beside_the_magnetising_branch_is_the_iron_s_loss_in_both_equations():
@@ -353,6 +356,22 @@ def test_a_resistance_beside_the_magnetising_branch_is_the_iron_s_loss_in_both_e
     assert np.abs(pieces.psi_wb - psi).max() < 0.03 * lost
     without = 1.5 * p * np.imag(np.conj(bare.psi_wb) * x.i_a)
     assert np.abs(given - torque).max() < 0.03 * np.abs(without - torque).max()
+
+
+def test_eddy_currents_beside_an_open_winding_turn_its_voltage_to_the_d_axis():
+    """v = jω ψ(−v/R_fe) of open terminals: v_d is ω² L_q ψ / R_fe whichever way the shaft turns."""
+    r_fe, p = 40.0, 7
+    x = replace(operating(), inverter=False, iq_a=np.zeros(60), id_a=np.zeros(60))
+    size = p * 1.5 * p * x.machine.scales["speed_rad_s"] * BASE["psi_wb"] ** 2 / r_fe
+    model = Model(machine(), (LIBRARY["iron_eddy"],))
+    values = {**BASE, **dict.fromkeys(model.parameters(), 0.0)}
+    values |= {"iron_eddy.drag_nm": size, "iron_eddy.parallel": 2.0}
+    omega = p * x.omega_rad_s
+    volts = 1j * omega * evaluate(model, x, values).psi_wb
+    reluctance = omega * BASE["lq_h"] / r_fe
+    expected = omega * BASE["psi_wb"] * reluctance
+    assert np.abs(reluctance).max() > 0.01
+    assert volts.real == pytest.approx(expected, rel=0.05, abs=1e-3 * np.abs(expected).max())
 
 
 def test_a_constant_load_is_a_drag_only_where_no_transducer_records_it():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import polars as pl
@@ -12,8 +14,13 @@ from pipeline.criticism.diagnosis import base_fit
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown
-from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
-from pipeline.criticism.regression.linear_system import linear_system
+from pipeline.criticism.regression.gauss_newton import (
+    first_fit,
+    gauss_newton,
+    misfit,
+    rough_anew,
+)
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.stepwise import _floored_anew
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
@@ -177,3 +184,16 @@ def test_floors_are_those_of_the_fit_and_not_of_a_rough_one_far_from_it(share: f
     assert system.fit.values["j_kgm2"] == pytest.approx(inertia, rel=0.02)
     assert np.concatenate(floors_grown(system.fit)) == pytest.approx(1.0, abs=0.2)
     assert float(system.reduced_chi2(system.residual).max()) < 1.5
+
+
+def test_a_winding_is_not_given_up_for_what_a_drag_lacks() -> None:
+    """χ²/n of 300 windows of motion and of 32 of each voltage, at two ends of one fit: by likelihood
+    the second is better by 400.
+    """
+    drag_lacks, winding_lost = (
+        cast(
+            "LinearSystem", SimpleNamespace(residual=None, reduced_chi2=lambda _, q=q: np.array(q))
+        )
+        for q in ([60.0, 0.5, 0.01], [4.0, 6300.0, 13000.0])
+    )
+    assert misfit(drag_lacks) < misfit(winding_lost)

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model
 from pipeline.criticism.machine.two_masses import (
     far_drag,
     inertia_scale,
@@ -17,12 +19,14 @@ from pipeline.criticism.machine.two_masses import (
     spring_of,
     spring_twist,
 )
+from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.selection.linear_start import _by_choices
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.design import Bench
 from tests.simulated import campaign_of, design
-from tests.unit.criticism.machines import BASE, operating
+from tests.unit.criticism.machines import BASE, machine, operating
 
 TESTS = ("resistance_ab", "torque_map_slow", "torque_map_backward", "drive_0", "spin_down_forward")
 MOTORS = [("gimbal-5208", 65.0, 0.8, 14.0), ("servo-ipm", 120.0, 0.7, 9.0)]
@@ -64,6 +68,25 @@ def test_most_inertia_behind_a_soft_shaft_is_found_with_its_size(
 def test_a_stiff_shaft_on_the_same_bench_is_quiet(motor):
     name, _, _, dyno_hz = motor
     assert ladder(name, dyno_hz, 4).missing == ()
+
+
+@pytest.mark.slow
+def test_a_far_end_that_a_stiff_dynamometer_holds_is_found_from_the_same_start():
+    """The linear form is that of a dynamometer that gives way; the transducer stands elsewhere."""
+    soft = softness("gimbal-5208", 60.0, 0.38)
+    found = ladder("gimbal-5208", 0.0, 3, compliance={"size": soft, "load_fraction": 0.38})
+    assert found.missing == ("compliance",)
+    assert found.ladder[-1].parameters["compliance.share"][0] == pytest.approx(0.38, rel=0.02)
+    assert found.ladder[-1].held_out < 0.05 * found.ladder[0].held_out + 0.5
+
+
+def test_a_start_is_tried_with_the_transducer_wherever_it_may_stand():
+    model = Model(machine(), (effects()["compliance"],))
+    spring = {"share": 0.4, "twist_rad": 0.02, "damping_s": 0.0, "between": -1.0}
+    values = {**BASE, **{f"compliance.{name}": value for name, value in spring.items()}}
+    starts = _by_choices(Fit((), model, values, (), values))
+    assert [one.values["compliance.between"] for one in starts] == [0.0, 1.0, -1.0]
+    assert all(one.values["compliance.share"] == 0.4 for one in starts)
 
 
 def ringing():

@@ -95,7 +95,11 @@ def test_digits_of_a_file_beneath_the_steps_are_no_step(pace):
 def test_a_step_of_nearly_twice_a_file_s_decimal_is_no_half():
     """Seven digits of hundreds of rad are 1e-4: two of them are half of a step, but for 4 %."""
     step, t = 2.0 * np.pi / 2**14, np.arange(20000) * 2e-4
-    moved = 75.0 * t + 0.02 * np.sin(2.0 * np.pi * 9.0 * t) + 1e-4 * np.random.default_rng(3).standard_normal(t.size)
+    moved = (
+        75.0 * t
+        + 0.02 * np.sin(2.0 * np.pi * 9.0 * t)
+        + 1e-4 * np.random.default_rng(3).standard_normal(t.size)
+    )
     theta = [float(f"{angle:.7g}") for angle in np.round(moved / step) * step]
     assert rounding_step(np.array(theta), SENSORS) == pytest.approx(step, rel=1e-9)
 
