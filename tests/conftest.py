@@ -28,6 +28,12 @@ hypothesis.settings.register_profile(
 hypothesis.settings.load_profile("project")
 
 
+def pytest_collection_finish() -> None:
+    """What was collected stays until the end: looking for garbage passes over it."""
+    gc.collect()
+    gc.freeze()
+
+
 class Here(Executor):
     """Does each task at once, where it is submitted."""
 

@@ -43,7 +43,10 @@ def test_a_rival_is_told_where_the_captures_cannot_part_them():
     assert set(others) == {"windage", "brake"} - set(last.added)
 
 
-@pytest.mark.parametrize(("rare", "named"), [("windage", "brake"), ("brake", "windage")])
+@pytest.mark.parametrize(
+    ("rare", "named"),
+    [("windage", "brake"), pytest.param("brake", "windage", marks=pytest.mark.slow)],
+)
 def test_of_two_that_tie_the_one_that_benches_have_is_named(rare, named):
     """A clock that is off by 2 % explains as much as a gain that is, and clocks seldom are."""
     library = {name: replace(effects()["windage"], name=name) for name in ("windage", "brake")}
@@ -52,7 +55,10 @@ def test_of_two_that_tie_the_one_that_benches_have_is_named(rare, named):
     assert search(fitted(segments), library)[-1].added == (named,)
 
 
-@pytest.mark.parametrize(("rare", "named"), [("windage", "brake"), ("brake", "windage")])
+@pytest.mark.parametrize(
+    ("rare", "named"),
+    [pytest.param("windage", "brake", marks=pytest.mark.slow), ("brake", "windage")],
+)
 def test_of_two_that_tie_the_one_of_a_usual_size_is_named(rare, named):
     library = {name: replace(effects()["windage"], name=name) for name in ("windage", "brake")}
     (size,) = library[rare].parameters
@@ -76,7 +82,12 @@ def test_a_rival_is_told_whatever_size_it_comes_out_at():
     ("less", "named", "others"),
     [
         (0.05, {"constant_load"}, set()),
-        (0.02, {"constant_load", "direction_friction"}, {"constant_load", "direction_friction"}),
+        pytest.param(
+            0.02,
+            {"constant_load", "direction_friction"},
+            {"constant_load", "direction_friction"},
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_friction_that_would_drive_is_no_name(less, named, others):
@@ -103,7 +114,7 @@ def test_a_friction_that_would_drive_is_no_name(less, named, others):
     assert set(alternatives_to(found, last.system, offered)) == others - {found}
 
 
-@pytest.mark.parametrize("told", ["brake", "windage", None])
+@pytest.mark.parametrize("told", ["brake", pytest.param("windage", marks=pytest.mark.slow), None])
 def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
     """Two forms that are one: the look's word counts, and without it each is the other's
     alternative.

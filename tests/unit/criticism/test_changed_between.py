@@ -41,6 +41,7 @@ def sizes(note):
     return [float(size) * (1.0 if sense == "higher" else -1.0) for size, sense in found]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dry", "viscous"), [(1.02, 1.02), pytest.param(0.98, 0.985, marks=pytest.mark.slow)]
 )

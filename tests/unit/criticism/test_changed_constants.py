@@ -42,7 +42,7 @@ def change(segments):
 @pytest.mark.parametrize(
     ("name", "share", "changed"),
     [
-        ("psi_wb", -0.04, (3, 4)),
+        pytest.param("psi_wb", -0.04, (3, 4), marks=pytest.mark.slow),
         pytest.param("psi_wb", 0.02, (1,), marks=pytest.mark.slow),
         pytest.param("r_ohm", 0.07, (0, 2), marks=pytest.mark.slow),
         ("b_nm_s_rad", 4.0, (2,)),
@@ -67,6 +67,7 @@ def test_of_two_captures_that_disagree_nobody_knows_which_is_odd():
     assert change(captures((1,), psi_wb=-0.04)[:2]) is None
 
 
+@pytest.mark.slow
 def test_an_effect_that_every_capture_has_is_no_change():
     """A drag that bends with speed, five times: no cut between captures takes most of it."""
     bent = []

@@ -24,7 +24,7 @@ def freed(found) -> LinearSystem | None:
     ("course", "stems", "share", "tau_s"),
     [
         (relaxing(1.8, 1.0), COASTS, 0.8, 1.0),
-        (relaxing(1.3, 0.5), DRIVES, 0.3, 0.5),
+        pytest.param(relaxing(1.3, 0.5), DRIVES, 0.3, 0.5, marks=pytest.mark.slow),
         pytest.param(relaxing(1.0, 0.5, last=1.25), COASTS, -0.2, 0.5, marks=pytest.mark.slow),
     ],
 )
@@ -41,8 +41,8 @@ def test_both_shares_and_the_time_constant_are_found(course, stems, share, tau_s
     [
         ("", DRIVES),
         pytest.param("windage", COASTS, marks=pytest.mark.slow),
-        ("windage,stribeck", COASTS),
-        ("iron_eddy", COASTS),
+        pytest.param("windage,stribeck", COASTS, marks=pytest.mark.slow),
+        pytest.param("iron_eddy", COASTS, marks=pytest.mark.slow),
     ],
 )
 def test_friction_of_any_form_over_speed_is_no_change(effects, stems):

@@ -52,8 +52,8 @@ def from_on(time_s, share):
 @pytest.mark.parametrize(
     ("name", "share", "time_s", "rest", "after"),
     [
-        ("psi_wb", -0.05, 0.23, (0.0, -0.05, 0.0), ("log_2",)),
-        ("psi_wb", 0.03, 0.12, (0.0, 0.0, 0.0), ()),
+        pytest.param("psi_wb", -0.05, 0.23, (0.0, -0.05, 0.0), ("log_2",), marks=pytest.mark.slow),
+        pytest.param("psi_wb", 0.03, 0.12, (0.0, 0.0, 0.0), (), marks=pytest.mark.slow),
         ("r_ohm", 0.08, 0.29, (0.08, 0.08, 0.0), ("log_1", "log_2")),
     ],
 )

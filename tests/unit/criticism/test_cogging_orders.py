@@ -23,7 +23,10 @@ PLAN = (
 )
 
 
-@pytest.mark.parametrize(("effects", "missing"), [(MOTOR.effects, ("cogging",)), ({}, ())])
+@pytest.mark.parametrize(
+    ("effects", "missing"),
+    [(MOTOR.effects, ("cogging",)), pytest.param({}, (), marks=pytest.mark.slow)],
+)
 def test_cogging_is_named_without_the_number_of_slots(effects, missing):
     """12 slots and 14 poles cog 84 times a turn, twelve times a pole pair: order 6p is empty."""
     motor = replace(MOTOR, effects=effects)

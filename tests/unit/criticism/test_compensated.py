@@ -81,6 +81,7 @@ def test_a_compensation_is_found_over_a_wider_current_than_it_was_first_tried_at
     assert after < 0.1 * before
 
 
+@pytest.mark.slow
 def test_a_term_that_is_not_worth_its_parameters_does_not_come_back() -> None:
     """Of a dead time of its own form, with a little of another effect left over."""
     plain = log(noise=1.0)

@@ -81,6 +81,7 @@ def test_in_captures_of_one_test_it_may_be_the_machine():
     assert drifting_segments(system.fit, left) is None
 
 
+@pytest.mark.slow
 def test_wander_follows_no_state_of_the_machine_and_a_drag_does():
     """What tells the two apart, since a drag in logs as short as these is slow as well."""
 
@@ -99,6 +100,7 @@ def test_wander_follows_no_state_of_the_machine_and_a_drag_does():
         assert (sketch is not None) is told
 
 
+@pytest.mark.slow
 def test_a_walk_far_beyond_the_noise_stays_a_remainder():
     size = DEFAULT.selection.drift_size
     segments = (walked(5, "torque_map", 60 * size), walked(6, "drive", 60 * size))

@@ -63,7 +63,14 @@ def log(
     return Campaign("m", (Capture("log.csv", "0", "verified", meta, (table,)),))
 
 
-@pytest.mark.parametrize(("seed", "late_s"), [(1, 0.0), (2, 0.03), (3, 0.12)])
+@pytest.mark.parametrize(
+    ("seed", "late_s"),
+    [
+        pytest.param(1, 0.0, marks=pytest.mark.slow),
+        pytest.param(2, 0.03, marks=pytest.mark.slow),
+        (3, 0.12),
+    ],
+)
 def test_the_feedforward_constants_are_known_and_nothing_else(seed: int, late_s: float) -> None:
     """R, ψ, J and friction are not known one by one, nor are their ratios named a second time."""
     found = compare(log(seed, late_s), ModelSpec(), Constants({}))

@@ -90,6 +90,7 @@ def test_windage_and_eddy_drag_are_parted_by_more_speeds():
     assert any("spin_down" in one.experiment or "torque" in one.experiment for one in found)
 
 
+@pytest.mark.slow
 def test_a_larger_effect_is_parted_with_more_power():
     small, large = (told("windage", size, "iron_eddy") for size in (1e-4, 2e-4))
     power = {one.experiment: one.power for one in small}

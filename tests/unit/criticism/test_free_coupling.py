@@ -71,6 +71,7 @@ def test_the_motion_of_a_free_shaft_shows_share_and_stiffness():
     assert twist == pytest.approx(full["size"] * torque, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_rigid_shaft_has_none_and_is_at_its_floor():
     system = base(coupled=False)
     assert coupling(system) is None
@@ -78,6 +79,7 @@ def test_a_rigid_shaft_has_none_and_is_at_its_floor():
     assert system.fit.values["j_kgm2"] == pytest.approx(MOTOR.j_rotor_kgm2, rel=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("coupled", "name"), [(True, "compliance"), pytest.param(False, None, marks=pytest.mark.slow)]
 )

@@ -113,10 +113,10 @@ def test_the_true_model_reproduces_an_independently_integrated_motor():
 @pytest.mark.parametrize(
     ("moved", "signal"),
     [
-        ({"r_ohm": 1.05 * BASE["r_ohm"]}, "omega_mech_rad_s"),
+        pytest.param({"r_ohm": 1.05 * BASE["r_ohm"]}, "omega_mech_rad_s", marks=pytest.mark.slow),
         ({"psi_wb": 1.01 * BASE["psi_wb"]}, "omega_mech_rad_s"),
         ({"b_nm_s_rad": 20 * BASE["b_nm_s_rad"]}, "iq_a"),
-        ({"lq_h": 1.1 * BASE["lq_h"]}, "id_a"),
+        pytest.param({"lq_h": 1.1 * BASE["lq_h"]}, "id_a", marks=pytest.mark.slow),
     ],
 )
 def test_a_wrong_constant_makes_a_larger_error(moved: dict[str, float], signal: str):

@@ -74,7 +74,9 @@ def test_whichever_end_is_better_stays(monkeypatch):
     assert _floored_anew(found).values is found.values
 
 
-@pytest.mark.parametrize(("share", "times"), [(1e-3, 1), (0.7, 0), (3.0, 1)])
+@pytest.mark.parametrize(
+    ("share", "times"), [pytest.param(1e-3, 1, marks=pytest.mark.slow), (0.7, 0), (3.0, 1)]
+)
 def test_a_fit_is_begun_anew_only_from_another_inertia(monkeypatch, share, times):
     """What is left over the floor may be no fault of the fit: two seconds a step for nothing."""
     segments = tuple(log(seed=n, noise=1.0) for n in (1, 2))
@@ -173,7 +175,7 @@ def moved_by_current() -> Campaign:
     return Campaign("m", (capture,), {"psi_pm_wb": psi, "u_psi_pm_wb": 1e-3 * psi})
 
 
-@pytest.mark.parametrize("share", [0.3, 3.0])
+@pytest.mark.parametrize("share", [pytest.param(0.3, marks=pytest.mark.slow), 3.0])
 def test_floors_are_those_of_the_fit_and_not_of_a_rough_one_far_from_it(share: float) -> None:
     """The noise of an acceleration is that of the current over the inertia: with three times the
     inertia a sound motor was nine times over it.

@@ -81,7 +81,9 @@ def test_the_usual_offset_is_a_step_of_a_converter_of_twice_the_current():
         assert priors[name] == (0.0, pytest.approx(step_a, rel=0.05))
 
 
-@pytest.mark.parametrize(("late_s", "told"), [(4e-6, False), (2e-5, True)])
+@pytest.mark.parametrize(
+    ("late_s", "told"), [pytest.param(4e-6, False, marks=pytest.mark.slow), (2e-5, True)]
+)
 def test_an_encoder_that_is_read_late_is_no_name_and_told_where_it_is_far_off(late_s, told):
     motor = replace(design("gimbal-5208"), effects={})
     plan = tuple(step for step in CAMPAIGN if step[0] in ("torque_map_fast", "drive_0"))
@@ -95,6 +97,7 @@ def test_an_encoder_that_is_read_late_is_no_name_and_told_where_it_is_far_off(la
         assert (float(said), unit) == (pytest.approx(late_s, abs=3.0 * float(u)), "s")
 
 
+@pytest.mark.slow
 def test_without_the_nuisance_it_would_be_a_name():
     """What the nuisance is for: with a prior of nothing the same captures name two delays."""
     motor = replace(design("gimbal-5208"), effects={})

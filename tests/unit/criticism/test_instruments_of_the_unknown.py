@@ -46,6 +46,7 @@ def speed(signals):
     return np.convolve(np.gradient(signals["theta_mech_rad"]), np.full(101, 1 / 101), mode="same")
 
 
+@pytest.mark.slow
 def test_a_loose_encoder_is_an_angle_error_that_goes_by_the_direction():
     found = sketch(logs(loose(0.01, speed)), "vd_v", "vq_v", TORQUE)
     assert found is not None

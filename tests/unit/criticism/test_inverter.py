@@ -112,6 +112,7 @@ def losses():
     return dict(zip(POINTS, both.reshape(len(POINTS), -1, 2), strict=True))
 
 
+@pytest.mark.slow
 def test_the_ripple_of_unequal_inductances_turns_with_the_rotor():
     """By their mean it was off by a seventh of what is lost, where it just exceeds the current."""
     x = point(*SALIENT, angles=25, l_q=2.0 * L_H)

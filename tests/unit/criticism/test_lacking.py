@@ -75,6 +75,7 @@ def test_a_short_coast_by_its_speed_has_too_few_samples():
     assert UNSTATED not in notes
 
 
+@pytest.mark.slow
 def test_the_second_harmonic_of_cogging_is_no_back_emf():
     """Nothing but a holding current shows it, and no spectrum of a torque says that it is there."""
     few = only("holding_current", "flux_map", "current_step", "resistance")
@@ -121,6 +122,7 @@ def test_a_log_without_an_angle_tells_of_its_voltages_alone():
         assert set(segment.weak.orders.tolist()) == {0}
 
 
+@pytest.mark.slow
 def test_a_torque_map_without_torque_excites_less_and_says_what_to_record():
     """With the drives gone, nothing else shows what a load does to friction."""
     few = only("torque_map", "drive", "cogging", "resistance", "spin_down")

@@ -91,6 +91,7 @@ def test_the_back_emf_follows_the_angle_where_a_drives_own_speed_is_late() -> No
     assert values["psi_wb"] == pytest.approx(TRUE["psi_pm_wb"], rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])
 def test_a_speed_of_a_period_ago_is_no_missing_effect(late: float) -> None:
     assert diagnosed(late, 0.0).missing == ()

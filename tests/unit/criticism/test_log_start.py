@@ -50,6 +50,7 @@ def test_a_transducer_in_the_coupling_shows_what_is_behind_it(name, hidden, shar
         assert gap == pytest.approx(0.006, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gimbal-5208", pytest.param("servo-ipm", marks=pytest.mark.slow)])
 def test_a_rigid_shaft_on_the_same_bench_is_quiet(name):
     assert diagnosed(name, 6).missing == ()

@@ -120,6 +120,7 @@ def test_a_frame_is_chosen_where_it_is_not_stated(timing, meter, many, chosen) -
     assert system.segments[0].instrument.frame == chosen
 
 
+@pytest.mark.slow
 def test_the_frame_is_asked_again_when_an_effect_joins() -> None:
     """The search begins in the wrong frame, as behind a dead time that spoke for it."""
 

@@ -48,6 +48,7 @@ def test_no_other_line_is_the_mains(freq):
     assert hum_of(logs(rms=0.02, freq=freq), PLAIN, BASE) == ()
 
 
+@pytest.mark.slow
 def test_white_noise_hums_in_none_of_forty_programmes():
     for first in range(0, 120, 3):
         recorded = [recording(seed=first + n) for n in range(3)]

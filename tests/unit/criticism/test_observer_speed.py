@@ -93,6 +93,7 @@ def test_nothing_is_missing_where_nothing_is() -> None:
     assert found.verdict in ("adequate", "insufficient")
 
 
+@pytest.mark.slow
 def test_an_effect_of_the_speed_is_named_without_an_angle_or_a_voltage() -> None:
     found = diagnose(campaign(windage=5e-7), ModelSpec(), Constants({}))
     assert found.missing == ("windage",)

@@ -44,7 +44,7 @@ def test_waves_under_load_are_found_by_their_orders():
     assert left(*[spinning(seed, ((19, 0.02),), "vq_v") for seed in (1, 2)]) == (19,)
 
 
-@pytest.mark.parametrize("order", [4.83, 16.4])
+@pytest.mark.parametrize("order", [4.83, pytest.param(16.4, marks=pytest.mark.slow)])
 def test_an_order_that_is_no_whole_number_is_told_as_close_as_the_angles_tell_it(order):
     """Fourteen turns tell orders apart by a fourteenth, and one that is clear a hundred times as
     well.

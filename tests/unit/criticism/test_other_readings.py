@@ -25,7 +25,9 @@ PLACES = {
 }
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize(
+    "place", [pytest.param("in the shaft", marks=pytest.mark.slow), "at the stator"]
+)
 @pytest.mark.parametrize(
     ("hidden", "tests"),
     [

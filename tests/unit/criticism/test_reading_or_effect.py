@@ -60,6 +60,7 @@ def searched(segments):
     return last, frame
 
 
+@pytest.mark.slow
 def test_a_frame_beside_an_iron_loss_is_no_delay() -> None:
     last, frame = searched([held(0.5, with_iron(0.04, seed)) for seed in (5, 6)])
     assert last.added == ("iron_eddy",)
@@ -110,7 +111,13 @@ def test_a_delay_of_the_wrong_sign_is_rare(delay_s: float, rare: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("delay_s", "frame"), [(10e-6, 0.0), (16e-6, 0.0), (35e-6, 0.5), (60e-6, 0.5)]
+    ("delay_s", "frame"),
+    [
+        (10e-6, 0.0),
+        pytest.param(16e-6, 0.0, marks=pytest.mark.slow),
+        (35e-6, 0.5),
+        pytest.param(60e-6, 0.5, marks=pytest.mark.slow),
+    ],
 )
 def test_a_delay_is_named_beside_the_frame_that_leaves_it_the_least(delay_s, frame) -> None:
     """But none that is negative: such a voltage would be logged after it acted."""

@@ -117,6 +117,7 @@ def test_a_handful_of_orders_hold_the_rotor_and_all_below_160_are_a_trap():
     assert held > 0.14
 
 
+@pytest.mark.slow
 def test_a_late_speed_is_what_the_resistance_was_hiding():
     """R from 0.69 by the drive's own speed towards the 0.485 ohm of standstill by the angle's."""
     log = campaign("laas_solo")

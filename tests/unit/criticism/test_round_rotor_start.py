@@ -47,7 +47,7 @@ def bent(size_rad: float) -> Fit:
     return replace(fit, values={**fit.values, "ld_h": 40.0 * BASE["ld_h"]})
 
 
-@pytest.mark.parametrize("size_rad", [0.004, 0.02])
+@pytest.mark.parametrize("size_rad", [0.004, pytest.param(0.02, marks=pytest.mark.slow)])
 def test_an_error_of_the_angle_is_found_from_a_round_rotor(size_rad):
     tangent, started = scores_at(bent(size_rad))
     assert not tangent.passes

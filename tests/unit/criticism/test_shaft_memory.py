@@ -90,7 +90,7 @@ def simulated_shaft(share: float, softness: float):
     return kept[::fine, 0], torque[::fine], load[::fine], kept[::fine, 1]
 
 
-@pytest.mark.parametrize("between", [0.0, 1.0])
+@pytest.mark.parametrize("between", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_a_compliant_shaft_is_two_masses_and_a_spring(between: float):
     """Load, or the coupling's torque, from the motor's angle and torque to a tenth of what a
     rigid shaft misses by.

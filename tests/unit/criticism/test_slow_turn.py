@@ -42,7 +42,11 @@ def slow_turn(
 
 @pytest.mark.parametrize(
     ("cogging_nm", "order", "missing"),
-    [(0.06, ORDER, ("cogging",)), (0.06, 3 * SLOTS, ("cogging",)), (0.0, ORDER, ())],
+    [
+        (0.06, ORDER, ("cogging",)),
+        pytest.param(0.06, 3 * SLOTS, ("cogging",), marks=pytest.mark.slow),
+        (0.0, ORDER, ()),
+    ],
 )
 def test_cogging_of_one_turn_each_way_is_named(cogging_nm, order, missing):
     """Nothing tells the inertia: floors by the one that a rough fit ends with hid the cogging."""

@@ -46,7 +46,7 @@ def coast(
     return Capture(f"coast_{seed}.csv", f"{seed}", "verified", meta, (table,))
 
 
-@pytest.mark.parametrize("noise_rad_s", [0.02, 0.2])
+@pytest.mark.parametrize("noise_rad_s", [pytest.param(0.02, marks=pytest.mark.slow), 0.2])
 def test_a_speed_s_noise_is_the_floor_of_the_acceleration(noise_rad_s: float) -> None:
     """White noise of a speed walks in its integral; it was taken as white in the angle."""
     coasts = tuple(coast(seed, noise_rad_s, 450.0) for seed in (1, 2, 3))
@@ -57,8 +57,8 @@ def test_a_speed_s_noise_is_the_floor_of_the_acceleration(noise_rad_s: float) ->
         assert 0.8 < error.rmse / error.noise_floor < 1.25
 
 
-@pytest.mark.parametrize("step_rad_s", [0.1, 1.0])
-@pytest.mark.parametrize("noise_steps", [0.0, 0.2])
+@pytest.mark.parametrize("step_rad_s", [pytest.param(0.1, marks=pytest.mark.slow), 1.0])
+@pytest.mark.parametrize("noise_steps", [pytest.param(0.0, marks=pytest.mark.slow), 0.2])
 def test_a_rounded_speed_is_the_floor_of_the_acceleration(
     step_rad_s: float, noise_steps: float
 ) -> None:

@@ -70,7 +70,10 @@ def test_a_diagnosis_rests_on_what_is_stated_as_well():
     assert abs(value - TRUE["torque_coulomb_nm"]) < REACH * u
 
 
-@pytest.mark.parametrize("size_nm", [0.0, pytest.param(0.02, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "size_nm",
+    [pytest.param(0.0, marks=pytest.mark.slow), pytest.param(0.02, marks=pytest.mark.slow)],
+)
 def test_a_stated_torque_constant_is_enough_for_a_log_of_current_and_motion(size_nm):
     """A drive without voltages and transducer was `insufficient`, whatever the motor."""
     motor = MOTOR.having(cogging=size_nm) if size_nm else MOTOR

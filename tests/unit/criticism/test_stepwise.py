@@ -229,6 +229,7 @@ def test_beside_an_effect_of_its_kind_another_must_stand_for_more_than_its_error
     assert (_form_error_factors(last.system, ()) == 1.0).all()
 
 
+@pytest.mark.slow
 def test_what_is_asked_for_is_looked_for_at_all_its_trial_shapes():
     """From the first of them, 1 rad/s, a bump of 20 rad/s is out of sight."""
 
@@ -279,6 +280,7 @@ def test_what_goes_with_an_effect_is_no_larger_than_there_can_be(mean, possible)
     assert material(Fit((), model, values, (), values), gain) is possible
 
 
+@pytest.mark.slow
 def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkeypatch):
     def unsure(system, _):
         return system.fit.model.effects[-1].name != "windage"

@@ -36,7 +36,9 @@ def recorded(*lost: str, drives: int = 2) -> Campaign:
     return replace(whole, captures=tuple(map(part, whole.captures)))
 
 
-@pytest.mark.parametrize("lost", [VOLTS, ("theta_mech_rad", *VOLTS)])
+@pytest.mark.parametrize(
+    "lost", [pytest.param(VOLTS, marks=pytest.mark.slow), ("theta_mech_rad", *VOLTS)]
+)
 def test_a_log_without_voltages_that_lacks_nothing_names_nothing(lost) -> None:
     """Rest, pulses and lines of the encoder were no errors of theirs: `current_delay`."""
     found = diagnose(recorded(*lost), ModelSpec(), Constants())

@@ -185,6 +185,7 @@ def test_two_variables_are_told_where_it_takes_two():
     assert "omega_mech_rad_s" in found.times
 
 
+@pytest.mark.slow
 def test_a_test_that_was_done_once_is_held_out_in_parts():
     """A drag that melts as one log warms: no other log knows of it, but its other parts do."""
     warmed, cold = _slowly_warmed(5), _cool(log(noise=1.0, seed=6))

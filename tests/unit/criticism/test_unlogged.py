@@ -101,7 +101,8 @@ def test_a_hot_winding_at_rest_without_a_thermometer():
     assert r.u / r.value == pytest.approx(leads, rel=0.1)
 
 
-def test_a_winding_that_warms_within_a_log_without_a_thermometer_is_no_effect():
+@pytest.mark.parametrize("named", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_winding_that_warms_within_a_log_without_a_thermometer_is_no_effect(named):
     """Six kelvin in a second were named `skin_effect`; with thermometers nothing was missing."""
     light = {name: getattr(MOTOR, name) / 120.0 for name in ("cth_winding_j_k", "cth_magnet_j_k")}
     plan = tuple((f"drive_{n}", "drive", {}) for n in range(2))
@@ -109,10 +110,11 @@ def test_a_winding_that_warms_within_a_log_without_a_thermometer_is_no_effect():
     temperatures = [c.arrays("temp_winding_degc", "temp_magnet_degc") for c in whole.captures]
     rises = [t["temp_winding_degc"][-1] - t["temp_winding_degc"][0] for t in temperatures]
     assert min(rises) > 5.0
-    for captures in (whole, without(whole, "temp_winding_degc", "temp_magnet_degc")):
+    blind = without(whole, "temp_winding_degc", "temp_magnet_degc")
+    for captures in (whole, blind) if named else ():
         result = diagnose(captures, ModelSpec(), Constants())
         assert (result.verdict, result.missing) == ("adequate", ())
-    values = base_fit(captures, ModelSpec(), Constants()).system.fit.values
+    values = base_fit(blind, ModelSpec(), Constants()).system.fit.values
     for n, rise in enumerate(rises):
         assert values[f"warming_winding_k_{n}"] == pytest.approx(rise, rel=0.4)
 
@@ -132,7 +134,7 @@ def test_a_shaft_that_rests_has_no_speed():
     assert machine.scales["speed_rad_s"] == 1.0
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_drive_without_an_angle(seed):
     """Its observer is late: that read as resistance, and left an error of many noise floors."""
     whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), seed, (("log", "drive", {}),)))

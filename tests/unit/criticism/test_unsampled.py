@@ -58,7 +58,8 @@ def inductance(folder: Path, text: str) -> ModelParameter:
 
 
 @pytest.mark.parametrize(
-    ("bandwidth_hz", "in_step"), [(30.0, False), (100.0, False), (600.0, True)]
+    ("bandwidth_hz", "in_step"),
+    [(30.0, False), pytest.param(100.0, False, marks=pytest.mark.slow), (600.0, True)],
 )
 def test_q_inductance_holds_or_is_not_given(
     tmp_path: Path, bandwidth_hz: float, in_step: bool

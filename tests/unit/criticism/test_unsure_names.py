@@ -49,7 +49,7 @@ def with_all(segments: tuple[Segment, ...], *added: Effect) -> LinearSystem:
     return gauss_newton(replace(fit, model=model, values=values))
 
 
-@pytest.mark.parametrize("first", NAMES)
+@pytest.mark.parametrize("first", [NAMES[0], pytest.param(NAMES[1], marks=pytest.mark.slow)])
 def test_a_size_that_may_be_zero_once_all_others_are_in_is_no_name(
     first: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

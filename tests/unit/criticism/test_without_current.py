@@ -19,7 +19,11 @@ SPINS = tuple(step for step in CAMPAIGN if step[0].startswith("open_circuit"))
 
 @pytest.mark.parametrize(
     ("hidden", "plan"),
-    [((), COASTS + SPINS), (("windage",), COASTS), (("bemf_harmonics",), SPINS)],
+    [
+        pytest.param((), COASTS + SPINS, marks=pytest.mark.slow),
+        (("windage",), COASTS),
+        (("bemf_harmonics",), SPINS),
+    ],
 )
 def test_what_turns_without_current_is_enough_for_a_diagnosis(hidden, plan):
     """A drag is known over the inertia alone; a harmonic in its own size."""

@@ -81,6 +81,7 @@ def test_a_drive_of_current_and_angle_has_the_inertia_over_the_flux():
     assert with_flux["psi_wb"].status == "stated"
 
 
+@pytest.mark.slow
 def test_a_q_axis_log_has_its_winding_temperature_and_its_torque():
     keep = ("iq_a", "vq_v", "theta_mech_rad", "temp_winding_degc", "torque_shaft_nm")
     found = compared(recorded(("drive", {}), keep=keep, **PAIRS))
@@ -95,6 +96,7 @@ def test_a_log_that_lacks_the_d_voltage_alone_has_its_d_current():
     assert told["ld_h"].u < 0.1 * TRUE["ld_h"]
 
 
+@pytest.mark.slow
 def test_coasts_ask_for_no_pole_pairs():
     coasts = recorded(("spin_down", {"direction": 1}), ("spin_down", {"direction": -1}),
                       keep=("theta_mech_rad", "omega_mech_rad_s"))  # fmt: skip

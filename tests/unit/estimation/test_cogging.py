@@ -21,6 +21,7 @@ from tests.unit.estimation.mechanical import chain, fitted, number, recorded, wi
 from tests.unit.estimation.signals import capture, estimates
 
 
+@pytest.mark.slow
 def test_lost_angles_do_not_take_creep_friction_away() -> None:
     """Turns and speed are those of the other rows."""
     captures = recorded("cogging")

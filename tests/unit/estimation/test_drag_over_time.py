@@ -66,12 +66,14 @@ def true_constants(motor: Motor) -> Mapping[str, float]:
     ("course", "stems"),
     [
         (relaxing(1.8, 0.4), COASTS),
-        (relaxing(1.3, 1.0), COASTS),
+        pytest.param(relaxing(1.3, 1.0), COASTS, marks=pytest.mark.slow),
         (relaxing(1.8, 30.0), COASTS),
-        (relaxing(1.0, 0.5, last=1.3), COASTS),
-        (((0.0, 1.0), (0.6, 1.0), (0.601, 1.3), (9.0, 1.3)), COASTS),
+        pytest.param(relaxing(1.0, 0.5, last=1.3), COASTS, marks=pytest.mark.slow),
+        pytest.param(
+            ((0.0, 1.0), (0.6, 1.0), (0.601, 1.3), (9.0, 1.3)), COASTS, marks=pytest.mark.slow
+        ),
         (relaxing(1.8, 3.0), DRIVES),
-        (relaxing(1.8, 30.0), DRIVES),
+        pytest.param(relaxing(1.8, 30.0), DRIVES, marks=pytest.mark.slow),
     ],
 )
 def test_friction_of_captures_in_which_it_changes_is_not_published_as_sure(course, stems):

@@ -52,7 +52,7 @@ def all_starts(p, **how):
 
 
 @pytest.mark.parametrize("noise_v", [pytest.param(1e-4, marks=pytest.mark.slow), 3e-3])
-@pytest.mark.parametrize("p", [1, 2, 7, 14])
+@pytest.mark.parametrize("p", [*(pytest.param(p, marks=pytest.mark.slow) for p in (1, 2)), 7, 14])
 def test_pole_pairs_from_every_start_angle(p, noise_v):
     """Also where an extreme of the flux is passed just after the start or before the end."""
     runs = all_starts(p, noise_v=noise_v)

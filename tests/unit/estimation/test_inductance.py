@@ -60,7 +60,7 @@ def terminal(pair, theta_deg, ld, lq):
     ("timing", "edge"),
     [
         ("instant", 0.9),
-        ("held", 0.0),
+        pytest.param("held", 0.0, marks=pytest.mark.slow),
         ("centred", 0.5),
         *(pytest.param("instant", edge, marks=pytest.mark.slow) for edge in (0.0, 0.5)),
         *(pytest.param("centred", edge, marks=pytest.mark.slow) for edge in (0.0, 0.9)),

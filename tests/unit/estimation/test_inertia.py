@@ -38,7 +38,14 @@ def test_coast_down_ratios(name: str) -> None:
     assert viscous == pytest.approx(motor.b_visc_nm_s_rad / motor.j_rotor_kgm2, rel=2e-3)
 
 
-@pytest.mark.parametrize("effect", ["windage", "stribeck", "angle_eccentricity"])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "windage",
+        pytest.param("stribeck", marks=pytest.mark.slow),
+        pytest.param("angle_eccentricity", marks=pytest.mark.slow),
+    ],
+)
 def test_coast_down_ratios_with_more_than_coulomb_and_viscous(effect: str) -> None:
     motor = design("gimbal-5208")
     known = chain(recorded(effect), SPIN_DOWN)
@@ -51,7 +58,7 @@ OTHERS = ("windage", "unbalance", "bemf_harmonics", "torque_lag")
 
 @pytest.mark.parametrize(
     "effect",
-    ["", "cogging", "stribeck", *(pytest.param(one, marks=pytest.mark.slow) for one in OTHERS)],
+    ["", "stribeck", *(pytest.param(one, marks=pytest.mark.slow) for one in ("cogging", *OTHERS))],
 )
 def test_inertia_and_friction(effect: str) -> None:
     motor = design("gimbal-5208")
@@ -161,7 +168,12 @@ def test_a_drive_of_a_few_windows_is_refused_with_the_experiment(start_s: float)
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
-    "length_s", [0.06, 0.15, *(pytest.param(s, marks=pytest.mark.slow) for s in (0.1, 0.3))]
+    "length_s",
+    [
+        0.06,
+        pytest.param(0.15, marks=pytest.mark.slow),
+        *(pytest.param(s, marks=pytest.mark.slow) for s in (0.1, 0.3)),
+    ],
 )
 def test_inertia_of_a_short_drive_is_right_or_refused(length_s: float) -> None:
     motor = design("gimbal-5208")

@@ -509,7 +509,7 @@ def fed(*, ks=0.5, kv=0.02, ka=2e-3, delay=0.0, rows=12000, rate=1000.0, noise=1
                    vq_v=v + noise * rng.standard_normal(rows))  # fmt: skip
 
 
-@pytest.mark.parametrize("delay", [0.0, 4e-3])
+@pytest.mark.parametrize("delay", [pytest.param(0.0, marks=pytest.mark.slow), 4e-3])
 def test_feedforward_of_voltage_and_motion(delay: float) -> None:
     found = estimates(feedforward.ESTIMATOR, fed(delay=delay))
     assert found["ks_v"].number == pytest.approx(0.5, rel=0.02)

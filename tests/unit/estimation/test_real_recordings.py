@@ -37,8 +37,9 @@ def true_constants(motor: str) -> dict[str, Any]:
     return constants["constants"]
 
 
-# Every estimate of one of these motors takes ten seconds and more; tests/e2e/test_rig.py has P0.
-MOTORS = ("P1", *(pytest.param(name, marks=pytest.mark.slow) for name in ("P2", "P3", "P4")))
+# Every estimate of one of these motors takes ten seconds and more; tests/e2e/test_rig.py has P0,
+# tests/unit/estimation/test_electrical.py the electrical constants of P1.
+MOTORS = [pytest.param(name, marks=pytest.mark.slow) for name in ("P1", "P2", "P3", "P4")]
 
 
 @needs_rig

@@ -36,7 +36,7 @@ def judged(campaign: Campaign, *stated: int) -> tuple[Constants, Check]:
 @pytest.mark.parametrize(
     ("tests", "stated"),
     [
-        (("current_step", "torque_map"), RIGHT + 3),
+        pytest.param(("current_step", "torque_map"), RIGHT + 3, marks=pytest.mark.slow),
         (("lcr", "drive"), 2 * RIGHT),
     ],
 )
@@ -94,6 +94,7 @@ def test_pole_pairs_that_nothing_counts() -> None:
     assert "nothing recorded counts them" in flux.note
 
 
+@pytest.mark.slow
 def test_one_wrong_nameplate_of_many_is_named() -> None:
     campaign = recorded(tests=("current_step", "torque_map"))
     stated = [2 * RIGHT] + [RIGHT] * (len(campaign.captures) - 1)

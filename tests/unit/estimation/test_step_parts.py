@@ -470,7 +470,10 @@ def split(grid, parts):
     return np.repeat(segment, parts), edges[:-1].T.ravel(), edges[1:].T.ravel()
 
 
-@pytest.mark.parametrize("guess", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize(
+    "guess",
+    [pytest.param(0.3, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.slow), 3.0],
+)
 @pytest.mark.parametrize("powers", [(), (1,), (2,)])
 def test_a_current_under_which_l_halves_is_exact_to_a_part_in_five_thousand(
     guess: float, powers: tuple[int, ...]

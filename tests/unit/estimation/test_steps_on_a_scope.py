@@ -142,6 +142,7 @@ def test_a_supply_of_any_resistance(source: float) -> None:
 COARSE = [(8, 0.2), (8, 0.6), (10, 0.1), (14, 1.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("bits", "noise"),
     [(8, 0.05), *(pytest.param(*one, marks=pytest.mark.slow) for one in COARSE)],
@@ -228,7 +229,12 @@ def ramped_supply(t, l_ll, volts, source, edges):
 
 
 @pytest.mark.parametrize(
-    "shape", [rounded_step, sagging_capacitor, pytest.param(ramped_supply, marks=pytest.mark.slow)]
+    "shape",
+    [
+        pytest.param(rounded_step, marks=pytest.mark.slow),
+        sagging_capacitor,
+        pytest.param(ramped_supply, marks=pytest.mark.slow),
+    ],
 )
 def test_a_voltage_that_no_supply_makes_is_taken_as_it_was_measured(shape) -> None:
     """Sample by sample, along straight lines but for the edges, each placed by the current."""

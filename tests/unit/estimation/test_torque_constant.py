@@ -30,7 +30,7 @@ def test_torque_constant_and_reluctance() -> None:
     assert shares["current@sim-1"] == pytest.approx(-0.002, rel=1e-3)
 
 
-@pytest.mark.parametrize("effects", ["", "windage"])
+@pytest.mark.parametrize("effects", [pytest.param("", marks=pytest.mark.slow), "windage"])
 def test_drag_of_a_map_that_misses_its_line_has_the_freedom_of_the_speeds(effects: str) -> None:
     """Five speeds less two of drag and the transducer's zero: two, where windage bends the drag;
     that of the points where the line holds.
