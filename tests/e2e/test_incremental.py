@@ -176,6 +176,7 @@ def test_notes_are_not_believed_blindly(folder: Folder) -> None:
     assert folder.run("residual_test=true") == [LOOK, ONE, TWO]
 
 
+@pytest.mark.slow
 def test_a_changed_setting_is_a_change(folder: Folder) -> None:
     folder.run()
     assert folder.run("crosscheck.kt_vs_ke.allowance=0.5") == [ONE, TWO]

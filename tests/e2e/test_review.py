@@ -100,10 +100,10 @@ def drawn(told: dict[str, Any]) -> Iterator[str]:
     "name",
     [
         f"{HEALTHY}/{HEALTHY}/cogging_cw.mcap.rrd",
-        f"{FAULTY}/{FAULTY}/current_step_d_0.mcap.rrd",
-        f"{FAULTY}/{FAULTY}/lcr.csv.rrd",
+        pytest.param(f"{FAULTY}/{FAULTY}/current_step_d_0.mcap.rrd", marks=pytest.mark.slow),
+        pytest.param(f"{FAULTY}/{FAULTY}/lcr.csv.rrd", marks=pytest.mark.slow),
         f"motor-{FAULTY}.rrd",
-        f"ladder-{FAULTY}.rrd",
+        pytest.param(f"ladder-{FAULTY}.rrd", marks=pytest.mark.slow),
         lots_name(make_regression()),
     ],
 )

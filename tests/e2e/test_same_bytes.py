@@ -49,6 +49,8 @@ STILL = ("resistance", "current", "lcr")
 
 SHORT = ("cogging", "spin", "open", "hand", "heat")
 """Further ones in which a model is searched in seconds."""
+LEAST = ("cogging", "spin")
+"""Of them, enough for a search of a model."""
 ALL = (*SHORT, "drive", "flux", "holding", "torque")
 
 
@@ -69,7 +71,9 @@ def part_of(bench: Path, folder: Path, moving: tuple[str, ...]) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("moving", [SHORT, pytest.param(ALL, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "moving", [LEAST, *(pytest.param(more, marks=pytest.mark.slow) for more in (SHORT, ALL))]
+)
 def test_nothing_but_the_work_changes_the_bytes(
     bench: Path, tmp_path: Path, moving: tuple[str, ...]
 ) -> None:

@@ -123,6 +123,15 @@ def of_the_rig(draws: range, kinds: set[str] | None = None) -> Iterator[tuple[Ca
         yield replace(whole, captures=tuple(part)), true
 
 
+ONE = range(3, 4)
+"""A draw of ten captures of five tests, among them few that take long."""
+
+
+def test_intervals_of_a_subset_hold():
+    judged(of_the_simulator(ONE, QUICK), 10)
+
+
+@pytest.mark.slow
 def test_intervals_of_a_few_subsets_hold():
     judged(of_the_simulator(range(2), QUICK), 10)
 
@@ -186,6 +195,11 @@ def says_nothing_false(parts: Iterator[tuple[Campaign, Mapping[str, float]]]) ->
     return stood
 
 
+def test_a_diagnosis_and_a_plan_of_a_subset_say_nothing_false():
+    assert says_nothing_false(of_the_simulator(ONE, QUICK)) >= 1
+
+
+@pytest.mark.slow
 def test_diagnoses_and_plans_of_a_few_subsets_say_nothing_false():
     assert says_nothing_false(of_the_simulator(range(2), QUICK)) >= 1
 

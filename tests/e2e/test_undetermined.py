@@ -130,6 +130,7 @@ def test_viscous_friction_700_times_too_large_from_slow_turns_alone(tmp_path):
     assert holds(one, truths[first] + float(factor) * truths[name])
 
 
+@pytest.mark.slow
 def test_one_torque_beside_the_coasts_makes_all_of_it_known(tmp_path):
     document = made(
         recorded(tmp_path / "both", COASTS + SLOW), "compare", "model.effects=[cogging]"
@@ -161,6 +162,7 @@ def test_windage_of_coasts_alone_is_named_without_a_size(tmp_path, capsys):
     assert "windage.drag_nm/j_kgm2" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_cogging_of_coasts_is_named_over_the_inertia(tmp_path):
     """Coasts give no torque: the design's own cogging is known over the inertia alone."""
     document = made(recorded(tmp_path / "few", COASTS), "diagnose")

@@ -70,7 +70,16 @@ def test_a_bad_file_is_refused_and_the_rest_is_done(
     assert "\n" not in refusals[0].line()
 
 
-@pytest.mark.parametrize("campaign", ["P0", "P1", "P2", "P3", "P4"])
+@pytest.mark.parametrize(
+    "campaign",
+    [
+        "P0",
+        pytest.param("P1", marks=pytest.mark.slow),
+        pytest.param("P2", marks=pytest.mark.slow),
+        pytest.param("P3", marks=pytest.mark.slow),
+        "P4",
+    ],
+)
 def test_nothing_is_said_of_the_rig(campaign: str) -> None:
     """Not one warning on 23 captures of a bench that this project did not make, in any encoding."""
     folder = DATA / "rig" / campaign

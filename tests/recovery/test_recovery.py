@@ -12,7 +12,7 @@ from tests.recovery.table import cases
 MANY = 1000
 
 
-@pytest.mark.parametrize("share", [0.5, pytest.param(1.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("share", [0.25, pytest.param(1.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
 def test_few_seeds(case, share):
     """Nothing is broken beyond what so few seeds can tell."""

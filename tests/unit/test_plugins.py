@@ -144,10 +144,11 @@ def test_compare_holds_captures_against_an_equation_of_another_package(tmp_path:
     ("source", "said"),
     [
         ("EFFECT = 7", "is no Effect"),
-        ("import nothing_there", "ModuleNotFoundError"),
-        (
+        pytest.param("import nothing_there", "ModuleNotFoundError", marks=pytest.mark.slow),
+        pytest.param(
             "from pipeline.criticism.effects.cogging import EFFECT",
             "cogging is in pipeline.criticism.effects.cogging already",
+            marks=pytest.mark.slow,
         ),
     ],
 )

@@ -24,15 +24,30 @@ ROOT = Path(__file__).parents[3]
 DEMO = ROOT / "data" / "demo"
 MOTOR = "G52-0601"
 TESTS = ("cogging", "current_step", "lcr", "resistance", "spin_down")
-"""Tests of the motor that tell many of its constants, and an effect that the model lacks."""
+FILES = (
+    *("cogging_cw", "cogging_ccw", "current_step_d_0", "current_step_q_0", "lcr"),
+    *("resistance", "spin_down_forward"),
+)
+"""Captures that tell many constants of the motor, and an effect that the model lacks."""
 MODULES = ("recordings", "fits", "datasheets", "models", "simulated")
 LONG = "pipeline.api.models.diagnose"
 """The function whose example searches a model."""
 
 
 @pytest.fixture(scope="module")
-def recordings():
-    return pipeline.read(DEMO, motor=MOTOR).only(tests=TESTS)
+def captures(tmp_path_factory):
+    """A folder of the motor with a few of its captures."""
+    folder = tmp_path_factory.mktemp("captures")
+    (folder / MOTOR).mkdir()
+    for path in (DEMO / MOTOR).iterdir():
+        if path.name.startswith(FILES):
+            shutil.copy(path, folder / MOTOR)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def recordings(captures):
+    return pipeline.read(captures, motor=MOTOR).only(tests=TESTS)
 
 
 @pytest.fixture(scope="module")
@@ -89,13 +104,8 @@ def test_the_examples_in_docstrings_run(name, long, monkeypatch):
     assert runner.summarize().failed == 0
 
 
-def test_a_run_and_the_functions_give_the_same_datasheet(sheets, tmp_path):
+def test_a_run_and_the_functions_give_the_same_datasheet(sheets, captures, tmp_path):
     """To the byte: version, constants, checks and reasons."""
-    captures = tmp_path / "captures"
-    (captures / MOTOR).mkdir(parents=True)
-    for path in (DEMO / MOTOR).iterdir():
-        if path.name.startswith(TESTS):
-            shutil.copy(path, captures / MOTOR)
     sheet = sheets[MOTOR]
     output = tmp_path / "out"
     words = ["recordings=false", "report=false", "workers=1"]

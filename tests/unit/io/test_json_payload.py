@@ -38,7 +38,7 @@ row = st.fixed_dictionaries(
 
 
 @given(st.lists(row, min_size=1, max_size=10))
-@settings(max_examples=150)
+@settings(max_examples=50)
 def test_keys_that_come_and_go_are_missing_and_never_shifted(messages: list[Any]) -> None:
     got = rows_of(messages)
 

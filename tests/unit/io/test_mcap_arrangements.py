@@ -104,7 +104,15 @@ def arranged(arrangement: Any, write: Any, count: int) -> tuple[Message, ...]:
 
 @pytest.mark.parametrize("arrangement", [alone, between, growing, swapped])
 @pytest.mark.parametrize("encoding", WRITERS)
-@pytest.mark.parametrize("chunk_size", [3000, 1 << 16, LARGE, 1 << 24])
+@pytest.mark.parametrize(
+    "chunk_size",
+    [
+        3000,
+        pytest.param(1 << 16, marks=pytest.mark.slow),
+        LARGE,
+        pytest.param(1 << 24, marks=pytest.mark.slow),
+    ],
+)
 def test_every_arrangement_gives_the_samples_that_were_written(
     encoding: str, arrangement: Any, chunk_size: int
 ) -> None:
@@ -153,7 +161,10 @@ BROKEN = {
 @pytest.mark.parametrize("arrangement", [alone, between])
 @pytest.mark.parametrize("encoding", WRITERS)
 @pytest.mark.parametrize("chunk_size", [3000, 1 << 24])
-@pytest.mark.parametrize("number", [0, 1, 2345, N - 1])
+@pytest.mark.parametrize(
+    "number",
+    [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2345, marks=pytest.mark.slow), N - 1],
+)
 def test_a_refused_message_is_named_with_its_number_and_time(
     encoding: str, arrangement: Any, chunk_size: int, number: int
 ) -> None:

@@ -14,9 +14,10 @@ from pipeline.io.ingest.capture_reader import read_capture, survey
 from tests.unit.io.recordings import SHARED
 
 CAMPAIGNS = [
-    "P0",
-    *(pytest.param(name, marks=pytest.mark.slow) for name in ("P1", "P2", "P3", "P4")),
+    pytest.param("P0", 4, id="a quarter of P0"),
+    *(pytest.param(f"P{n}", 1, id=f"P{n}", marks=pytest.mark.slow) for n in range(5)),
 ]
+"""And of how many captures one is compared: the public library takes a message at a time."""
 
 
 def public_columns(path: Path) -> dict[str, np.ndarray]:
@@ -46,8 +47,8 @@ def public_columns(path: Path) -> dict[str, np.ndarray]:
     return {name: np.array(values) for name, values in found.items()}
 
 
-@pytest.mark.parametrize("campaign", CAMPAIGNS)
-def test_a_rig_campaign_equals_the_public_library_bit_for_bit(campaign: str) -> None:
+@pytest.mark.parametrize(("campaign", "every"), CAMPAIGNS)
+def test_a_rig_campaign_equals_the_public_library_bit_for_bit(campaign: str, every: int) -> None:
     folder = SHARED / "rig" / campaign
     if not folder.is_dir():
         pytest.skip(f"the rig captures are not there: {folder}")
@@ -55,7 +56,7 @@ def test_a_rig_campaign_equals_the_public_library_bit_for_bit(campaign: str) -> 
     assert len(found.entries) == 23
     assert found.findings == ()
     assert found.others == ("truth.json",)
-    for entry in found.entries:
+    for entry in found.entries[::every]:
         capture = read_capture(folder, entry)
         assert capture.integrity == "verified"
         (table,) = capture.tables

@@ -54,7 +54,7 @@ def violations(browser: Browser, path: Path, *, dark: bool) -> list[str]:
     return found
 
 
-DARK = ("sheet", "fleet", "comparison")
+DARK = ("sheet",)
 """Pages that the default run sees in the dark as well."""
 
 

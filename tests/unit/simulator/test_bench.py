@@ -15,7 +15,8 @@ from tests.simulated import QUIET, campaign_of, design
 
 DESIGNS = ("gimbal-5208", "servo-ipm", "drone-2306", "servo-15kw", "joint-11p")
 CAMPAIGNS = [
-    pytest.param(name, marks=pytest.mark.slow if name == "drone-2306" else ()) for name in DESIGNS
+    pytest.param(name, marks=pytest.mark.slow if name in ("drone-2306", "servo-15kw") else ())
+    for name in DESIGNS
 ]
 """That of a fast motor alone takes as long as those of the others together."""
 HOLDS = {

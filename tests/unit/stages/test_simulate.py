@@ -47,7 +47,7 @@ def test_one_motor_is_written_with_its_truth(tmp_path):
         assert path.read_bytes() == (again / path.name).read_bytes(), path.name
 
 
-@pytest.mark.parametrize("encoding", ["csv", "cdr_samples"])
+@pytest.mark.parametrize("encoding", ["csv", pytest.param("cdr_samples", marks=pytest.mark.slow)])
 def test_an_encoding_for_all(encoding, tmp_path):
     settings = SimulateSettings(output=str(tmp_path), encoding=encoding, exact=True)
     simulate.main(settings)
