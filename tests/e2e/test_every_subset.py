@@ -141,6 +141,7 @@ def test_every_set_of_columns_of_the_rig(rig, path, least):
     judged(fitted(recordings, of_columns(whole, path)), true, least)
 
 
+@pytest.mark.slow
 def test_every_test_alone_and_every_pair_of_columns():
     recordings = pipeline.simulate("gimbal-5208", exact=True)
     (whole,) = recordings.campaigns.values()

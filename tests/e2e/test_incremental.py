@@ -161,6 +161,7 @@ def test_results_that_are_not_whole_are_made_again(folder: Folder, kind: str) ->
     assert (folder.output / "registry" / "_delta_log").is_dir()
 
 
+@pytest.mark.slow
 def test_notes_are_not_believed_blindly(folder: Folder) -> None:
     """Every note replaced by another of its kind, or by noise: the work is done again."""
     folder.run("residual_test=true")

@@ -67,6 +67,7 @@ def test_of_two_that_tie_the_one_of_a_usual_size_is_named(rare, named):
     assert search(fitted(segments), library)[-1].added == (named,)
 
 
+@pytest.mark.slow
 def test_a_rival_is_told_whatever_size_it_comes_out_at():
     """That it would be too small to matter does not part it from what it is confused with."""
     twin = replace(asking_for(0.1)["windage"], name="brake")

@@ -50,6 +50,7 @@ def test_friction_of_any_form_over_speed_is_no_change(effects, stems):
     assert freed(recorded(with_effects(motor, effects) if effects else motor, stems)) is None
 
 
+@pytest.mark.slow
 def test_one_coast_does_not_tell_time_from_speed() -> None:
     assert freed(recorded(plain("gimbal-5208"), COASTS[:2], relaxing(1.8, 0.4))) is None
 

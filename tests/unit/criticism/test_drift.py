@@ -65,6 +65,7 @@ def test_a_walk_of_its_size_is_all_but_noise_once_it_is_known():
     assert np.median(known) < 10.0
 
 
+@pytest.mark.slow
 def test_wander_in_captures_of_two_tests_leaves_nothing():
     segments = (walked(5, "torque_map"), walked(6, "drive"))
     system, left = fitted(segments)

@@ -100,6 +100,7 @@ def test_a_larger_effect_is_parted_with_more_power():
         assert one.power > power[one.experiment]
 
 
+@pytest.mark.slow
 def test_a_choice_is_no_degree_of_freedom():
     """A power for three parameters would be told where one is fitted."""
     plain = ALL["windage"]

@@ -43,6 +43,7 @@ def astray(segments) -> Fit:
     return Fit(segments, STRIBECK, values, floors(segments, STRIBECK, values), values)
 
 
+@pytest.mark.slow
 def test_a_fit_begun_anew_forgets_its_constants_and_keeps_its_shapes(monkeypatch):
     segments = tuple(log(seed=n, noise=1.0) for n in (1, 2))
     lost = replace(astray(segments), tolerance=tuple(np.full(12, 1e-3) for _ in segments))

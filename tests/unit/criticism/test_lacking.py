@@ -101,6 +101,7 @@ def test_an_ohmmeter_lacks_no_column():
     assert all(capture.path in note for capture in readings)
 
 
+@pytest.mark.slow
 def test_an_open_circuit_of_one_line_is_not_used_and_said_so():
     few = only("open_circuit", "cogging", "resistance", "spin_down")
     campaign = without({"open_circuit": ("vbc_v", "vca_v")}, few)

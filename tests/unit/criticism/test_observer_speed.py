@@ -87,6 +87,7 @@ def test_the_observer_s_lag_is_known_to_the_second_order() -> None:
     assert values["j_kgm2"] == pytest.approx(J_KGM2, rel=0.005)
 
 
+@pytest.mark.slow
 def test_nothing_is_missing_where_nothing_is() -> None:
     found = diagnose(campaign(), ModelSpec(), Constants({}))
     assert found.missing == ()

@@ -89,6 +89,7 @@ def test_one_capture_alone_has_no_order():
     assert left(spinning(1, ((16, 3e-3),)), spinning(2)) == ()
 
 
+@pytest.mark.slow
 def test_what_nobody_would_act_on_is_no_order():
     """A two-thousandth of the machine's torque of 1.6 N·m, as an rms."""
     size = 5e-4 * 1.6 / float(np.sqrt(0.5 * np.mean(log(16_000).recorded["iq_a"] ** 2)))

@@ -102,6 +102,7 @@ def test_cross_saturation_is_named_after_saturation():
     assert result.ladder[-1].signals["psi_q_wb"] < 0.02
 
 
+@pytest.mark.slow
 def test_a_handful_of_orders_hold_the_rotor_and_all_below_160_are_a_trap():
     captures = campaign("laas_solo").of("holding_current")
     orders = holding_orders(captures, (12, 18), DEFAULT, 400)

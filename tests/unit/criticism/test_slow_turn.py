@@ -43,7 +43,7 @@ def slow_turn(
 @pytest.mark.parametrize(
     ("cogging_nm", "order", "missing"),
     [
-        (0.06, ORDER, ("cogging",)),
+        pytest.param(0.06, ORDER, ("cogging",), marks=pytest.mark.slow),
         pytest.param(0.06, 3 * SLOTS, ("cogging",), marks=pytest.mark.slow),
         (0.0, ORDER, ()),
     ],

@@ -96,6 +96,7 @@ def test_bristles_with_a_damping_are_named_with_their_sizes():
         assert last.fit.values[f"presliding.{name}"] == pytest.approx(value, rel=0.03)
 
 
+@pytest.mark.slow
 def test_choices_are_made_again_on_every_step_and_at_the_end_of_what_is_asked_for(monkeypatch):
     made = []
 
@@ -155,6 +156,7 @@ def test_what_a_small_effect_explains_is_not_named_after_another():
     assert shadowed.shortfall == "windage explains it as well, and is too small to matter"
 
 
+@pytest.mark.slow
 def test_an_effect_that_ties_with_one_too_small_to_matter_is_not_named():
     """The captures do not say which of the two it is, and one of them is nothing to act on."""
     segments = (with_drag(curved(0.1)), with_drag(curved(0.1), 6))

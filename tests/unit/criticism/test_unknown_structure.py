@@ -102,6 +102,7 @@ def _softening(seed, fall_h_k):
     )
 
 
+@pytest.mark.slow
 def test_an_inductance_that_goes_with_a_temperature_comes_out_as_one_term(tmp_path):
     fall = 2e-3 * BASE["lq_h"]
     segments = tuple(_softening(seed, fall) for seed in (5, 6))
@@ -167,6 +168,7 @@ def test_the_effect_file_computes_the_expression_it_tells(tmp_path):
     assert not np.any(none)
 
 
+@pytest.mark.slow
 def test_variables_that_run_along_with_each_other_are_all_told():
     """In these logs temperature rises with speed: either could be the cause, and both are named."""
     segments = (with_drag(brake), with_drag(brake, 6))

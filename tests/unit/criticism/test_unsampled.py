@@ -59,7 +59,11 @@ def inductance(folder: Path, text: str) -> ModelParameter:
 
 @pytest.mark.parametrize(
     ("bandwidth_hz", "in_step"),
-    [(30.0, False), pytest.param(100.0, False, marks=pytest.mark.slow), (600.0, True)],
+    [
+        (30.0, False),
+        pytest.param(100.0, False, marks=pytest.mark.slow),
+        pytest.param(600.0, True, marks=pytest.mark.slow),
+    ],
 )
 def test_q_inductance_holds_or_is_not_given(
     tmp_path: Path, bandwidth_hz: float, in_step: bool

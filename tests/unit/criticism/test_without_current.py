@@ -21,7 +21,7 @@ SPINS = tuple(step for step in CAMPAIGN if step[0].startswith("open_circuit"))
     ("hidden", "plan"),
     [
         pytest.param((), COASTS + SPINS, marks=pytest.mark.slow),
-        (("windage",), COASTS),
+        pytest.param(("windage",), COASTS, marks=pytest.mark.slow),
         (("bemf_harmonics",), SPINS),
     ],
 )

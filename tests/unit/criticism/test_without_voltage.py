@@ -89,6 +89,7 @@ def test_a_q_axis_log_has_its_winding_temperature_and_its_torque():
     assert not any("no temp_winding_degc" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_a_log_that_lacks_the_d_voltage_alone_has_its_d_current():
     keep = ("id_a", "iq_a", "vq_v", "theta_mech_rad", "torque_shaft_nm")
     told = compared(recorded(("drive", {}), keep=keep, **PAIRS)).parameters

@@ -107,6 +107,7 @@ def test_holding_current_sees_the_same_order() -> None:
     assert left < 0.2 * holding / (1.5 * motor.pole_pairs * motor.psi_pm_wb)
 
 
+@pytest.mark.slow
 def test_the_uncertainty_of_creep_friction_is_its_scatter() -> None:
     """A turn each way, 720 samples of white noise s: half the difference of two means has a
     standard deviation of s sqrt(2/720)/2. 300 motors show it to 4 %.

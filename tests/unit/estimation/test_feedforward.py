@@ -85,7 +85,10 @@ def test_a_step_from_one_row_to_the_next_was_anywhere_between_them(held: bool) -
     assert found.u == pytest.approx(2e-3 / np.sqrt(12.0), rel=0.05)
 
 
-@pytest.mark.parametrize(("seeds", "most"), [(7, 4), pytest.param(24, 9, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("seeds", "most"),
+    [pytest.param(7, 4, marks=pytest.mark.slow), pytest.param(24, 9, marks=pytest.mark.slow)],
+)
 def test_intervals_hold_over_seeds(seeds: int, most: int) -> None:
     """Of 4 x 24 intervals at 95 % more than nine misses come by chance once in 40 trials, of 4 x 7
     more than four once in 80.

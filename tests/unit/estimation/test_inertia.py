@@ -110,6 +110,7 @@ def with_currents(captures: Campaign, gain: float) -> Campaign:
     )
 
 
+@pytest.mark.slow
 def test_a_current_gain_enters_once_by_the_magnet_and_squared_by_reluctance() -> None:
     """Lq twice Ld, torque constants from elsewhere, a free shaft: u is half of what J moves between
     currents read high and low by their u, with the same columns; more than the gain by itself.

@@ -50,6 +50,11 @@ PLANS: dict[str, Plan] = {
     "drive_voltage": (("drive_0", "drive", {"voltage_timing": "held"}),),
     "inertia": DRIVES,
 }
+FEW = [
+    pytest.param(one, marks=pytest.mark.slow if one in ("current_step", "torque_map") else ())
+    for one in PLANS
+]
+"""For properties that hang on how captures are read; these two take as long as all others."""
 ESTIMATORS = {one.name: one for one in estimators()}
 U = 1e-3
 KEYS = ("u_rel_voltage", "u_rel_current", "u_rel_torque")
@@ -248,7 +253,7 @@ def test_a_budget_says_what_a_thermometer_does(name: str) -> None:
             assert other.number - one.number == pytest.approx(said, abs=room), one.name
 
 
-@pytest.mark.parametrize("name", PLANS)
+@pytest.mark.parametrize("name", FEW)
 def test_the_order_of_captures_changes_nothing(name: str) -> None:
     made = campaign(name)
     turned = Campaign(made.motor_id, made.captures[::-1])
@@ -282,7 +287,7 @@ def alike(one: Estimate, other: Estimate) -> None:
         assert other.u == pytest.approx(one.u, rel=1e-3), one.name
 
 
-@pytest.mark.parametrize("name", PLANS)
+@pytest.mark.parametrize("name", FEW)
 def test_no_result_depends_on_when_a_clock_began(name: str) -> None:
     """Two hours, which doubles hold to a part in 1e12 of a second."""
     made = campaign(name)

@@ -113,6 +113,7 @@ def test_a_saliency_ratio_at_z_of_9_because_only_the_gains_were_thought_to_be_of
     assert np.sqrt(np.mean(np.square(z))) < 1.6
 
 
+@pytest.mark.slow
 def test_gains_of_another_day_do_not_cancel_in_the_saliency_ratio() -> None:
     """D on one day, q on the next: half the variance of each gain is each day's own."""
     ratios = []
