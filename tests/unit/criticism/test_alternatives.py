@@ -83,12 +83,7 @@ def test_a_rival_is_told_whatever_size_it_comes_out_at():
     ("less", "named", "others"),
     [
         (0.05, {"constant_load"}, set()),
-        pytest.param(
-            0.02,
-            {"constant_load", "direction_friction"},
-            {"constant_load", "direction_friction"},
-            marks=pytest.mark.slow,
-        ),
+        (0.02, {"constant_load", "direction_friction"}, {"constant_load", "direction_friction"}),
     ],
 )
 def test_a_friction_that_would_drive_is_no_name(less, named, others):
@@ -115,7 +110,14 @@ def test_a_friction_that_would_drive_is_no_name(less, named, others):
     assert set(alternatives_to(found, last.system, offered)) == others - {found}
 
 
-@pytest.mark.parametrize("told", ["brake", pytest.param("windage", marks=pytest.mark.slow), None])
+@pytest.mark.parametrize(
+    "told",
+    [
+        "brake",
+        pytest.param("windage", marks=pytest.mark.slow),
+        pytest.param(None, marks=pytest.mark.slow),
+    ],
+)
 def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
     """Two forms that are one: the look's word counts, and without it each is the other's
     alternative.

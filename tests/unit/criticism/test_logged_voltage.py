@@ -98,7 +98,7 @@ HOLDS_A_SAMPLE = 5.0
     ("timing", "meter", "many", "chosen"),
     [
         ("instant", "gain_commanded", 1.0, 0.5),
-        ("instant", "gain_commanded", HOLDS_A_SAMPLE, 0.5),
+        pytest.param("instant", "gain_commanded", HOLDS_A_SAMPLE, 0.5, marks=pytest.mark.slow),
         ("centred", "gain_commanded", HOLDS_A_SAMPLE, 0.5),
         ("centred", "gain_commanded", 1.0, 0.0),
         ("instant", "gain_voltage", 1.0, 0.0),

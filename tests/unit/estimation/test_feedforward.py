@@ -135,7 +135,7 @@ def test_a_routine_of_slow_ramps_and_steps(delay_s: float) -> None:
         assert found[name].u < max(0.05 * value, 0.005), name
 
 
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_time_constant_between_two_samples_is_not_told(seed: int) -> None:
     """The speed follows within a millisecond, the log has ten: kS and kV stand, of kA and the
     delay only what both make together, to a fifth of a sample.

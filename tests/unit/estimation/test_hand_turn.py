@@ -63,7 +63,9 @@ def test_pole_pairs_from_every_start_angle(p, noise_v):
         assert abs(psi.number - PSI) < 4.0 * psi.u_a
 
 
-@pytest.mark.parametrize("p", [2, 7, 14])
+@pytest.mark.parametrize(
+    "p", [pytest.param(2, marks=pytest.mark.slow), 7, pytest.param(14, marks=pytest.mark.slow)]
+)
 def test_a_hand_that_never_quite_rests(p):
     runs = all_starts(p, rest_s=0.0)
     assert [run["pole_pairs"].value for run in runs] == [p] * STARTS

@@ -156,7 +156,15 @@ def with_short_drives(captures: Campaign, start_s: float, length_s: float) -> Ca
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("start_s", [0.1, 0.33, 0.6, 0.8])
+@pytest.mark.parametrize(
+    "start_s",
+    [
+        0.1,
+        pytest.param(0.33, marks=pytest.mark.slow),
+        pytest.param(0.6, marks=pytest.mark.slow),
+        0.8,
+    ],
+)
 def test_a_drive_of_a_few_windows_is_refused_with_the_experiment(start_s: float) -> None:
     """30 ms hold two windows: any column of its own would fit them without a residual."""
     known = chain(recorded(), SPIN_DOWN, TORQUE_MAP, COGGING)

@@ -77,7 +77,7 @@ def test_a_shaft_that_follows_its_current_runs_free() -> None:
         assert 0.0 < doubt < DEFAULT.drag.unexplained_share * one.number, name
 
 
-@pytest.mark.parametrize("load", [0.05, 0.1])
+@pytest.mark.parametrize("load", [0.05, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_a_small_load_that_no_drive_logs_leaves_the_inertia_with_a_larger_u(load: float) -> None:
     """What follows no current is in the inertia's u; friction is not parted from the load."""
     plan = tuple(

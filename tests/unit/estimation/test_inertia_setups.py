@@ -31,7 +31,7 @@ def constants(far: float) -> dict[str, Estimate]:
     return {name: one for name in GIVES for one in known.all_of(name) if one.method == "inertia"}
 
 
-@pytest.mark.parametrize("far", [0.6, 0.85])
+@pytest.mark.parametrize("far", [pytest.param(0.6, marks=pytest.mark.slow), 0.85])
 def test_friction_is_that_of_the_drives_where_a_coast_carries_more(far: float) -> None:
     """By the coast's deceleration and the rotor's inertia it would be a part of it only."""
     found = constants(far)

@@ -79,7 +79,9 @@ def test_derivatives_are_those_of_what_is_predicted() -> None:
     assert found == pytest.approx(central_jacobian(predict, parameters, width), abs=1e-7)
 
 
-@pytest.mark.parametrize(("name", "bits"), [("joint-11p", 11), ("servo-15kw", 10)])
+@pytest.mark.parametrize(
+    ("name", "bits"), [pytest.param("joint-11p", 11, marks=pytest.mark.slow), ("servo-15kw", 10)]
+)
 def test_friction_of_another_form_below_the_resolution_of_the_encoder(name: str, bits: int) -> None:
     """Stribeck's excess left less than a step of the encoder and moved B/J by 0.3 to 1 % at 6 u."""
     motor = replace(design(name), effects={}).having(stribeck=None)

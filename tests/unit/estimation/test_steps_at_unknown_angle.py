@@ -34,7 +34,12 @@ def fitted(captures: Campaign) -> dict[str, Estimate]:
 
 
 @pytest.mark.parametrize(
-    ("name", "theta_deg"), [("servo-ipm", 20.0), ("servo-ipm", 77.0), ("gimbal-5208", 110.0)]
+    ("name", "theta_deg"),
+    [
+        ("servo-ipm", 20.0),
+        pytest.param("servo-ipm", 77.0, marks=pytest.mark.slow),
+        ("gimbal-5208", 110.0),
+    ],
 )
 def test_three_pairs_give_both_axes_wherever_the_rotor_stands(name: str, theta_deg: float) -> None:
     found, motor = fitted(steps(name, theta_deg)), design(name)

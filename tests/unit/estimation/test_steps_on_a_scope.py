@@ -132,7 +132,12 @@ def test_gains_of_another_day_do_not_cancel_in_the_saliency_ratio() -> None:
 
 
 @pytest.mark.parametrize(
-    "source", [0.0, 5.0, *(pytest.param(ohm, marks=pytest.mark.slow) for ohm in (0.05, 1.0))]
+    "source",
+    [
+        pytest.param(0.0, marks=pytest.mark.slow),
+        5.0,
+        *(pytest.param(ohm, marks=pytest.mark.slow) for ohm in (0.05, 1.0)),
+    ],
 )
 def test_a_supply_of_any_resistance(source: float) -> None:
     found = found_in(3, source=source)

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.estimate import Estimate
-from tests.unit.estimation.test_scales import PLANS, by_source, campaign, fitted, plain_fit
+from tests.unit.estimation.test_scales import FEW, PLANS, by_source, campaign, fitted, plain_fit
 
 # In a mirror a motor turns the other way: phases b and c are exchanged, d stays and q turns round.
 EXCHANGED = {
@@ -83,7 +83,7 @@ def alike(one: Estimate, other: Estimate, sign: float = 1.0) -> None:
             assert abs(other.at[name]) == pytest.approx(abs(value), rel=1e-6), name
 
 
-@pytest.mark.parametrize("name", PLANS)
+@pytest.mark.parametrize("name", FEW)
 def test_a_motor_in_a_mirror_has_the_same_constants(name: str) -> None:
     made = campaign(name)
     shown = replace(made, captures=tuple(mirrored(c) for c in made.captures))

@@ -124,7 +124,9 @@ def test_a_map_without_motion_breaks_nothing() -> None:
     assert fit_all(captures, {})[2] == ()
 
 
-@pytest.mark.parametrize("seed", [0, 3, 4])
+@pytest.mark.parametrize(
+    "seed", [0, pytest.param(3, marks=pytest.mark.slow), pytest.param(4, marks=pytest.mark.slow)]
+)
 def test_a_drive_without_its_d_current(seed: int) -> None:
     """Its flux read as 2 % of Ke, 2 to 7 u, and its torque as 3 % of J."""
     steps = (("drive", "drive", {}),)
