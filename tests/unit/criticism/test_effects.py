@@ -359,7 +359,7 @@ def test_a_resistance_beside_the_magnetising_branch_is_the_iron_s_loss_in_both_e
 
 
 def test_eddy_currents_beside_an_open_winding_turn_its_voltage_to_the_d_axis():
-    """v = jω ψ(−v/R_fe) of open terminals: v_d is ω² L_q ψ / R_fe whichever way the shaft turns."""
+    """V = jω ψ(−v/R_fe) of open terminals: v_d is ω² L_q ψ / R_fe whichever way the shaft turns."""
     r_fe, p = 40.0, 7
     x = replace(operating(), inverter=False, iq_a=np.zeros(60), id_a=np.zeros(60))
     size = p * 1.5 * p * x.machine.scales["speed_rad_s"] * BASE["psi_wb"] ** 2 / r_fe

@@ -190,8 +190,8 @@ def test_floors_are_those_of_the_fit_and_not_of_a_rough_one_far_from_it(share: f
 
 
 def test_a_winding_is_not_given_up_for_what_a_drag_lacks() -> None:
-    """χ²/n of 300 windows of motion and of 32 of each voltage, at two ends of one fit: by likelihood
-    the second is better by 400.
+    """χ²/n of 300 windows of motion and of 32 of each voltage, at two ends of one fit: by
+    likelihood the second is better.
     """
     drag_lacks, winding_lost = (
         cast(

@@ -62,7 +62,6 @@ def test_most_inertia_behind_a_soft_shaft_is_found_with_its_size(
     assert found.ladder[-1].held_out < 0.1 * found.ladder[0].held_out
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "motor", [MOTORS[0], *(pytest.param(one, marks=pytest.mark.slow) for one in MOTORS[1:])]
 )

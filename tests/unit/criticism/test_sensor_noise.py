@@ -228,7 +228,8 @@ def test_a_rounded_angle_is_as_loud_in_each_window_as_its_pace_makes_it():
 @pytest.mark.parametrize("pace", [0.01, 1.43, 13.8])
 def test_noise_before_a_rounding_is_what_the_rounding_alone_does_not_make(pace, share):
     """Steps and sampling beat, so that the error of a rounding may pass for more noise than it is,
-    or for less."""
+    or for less.
+    """
     step, samples = 2.0 * np.pi / 2**14, np.arange(12000)
     moved = pace * samples + 3.0 * np.sin(samples / 400.0)
     noisy = moved + share * np.random.default_rng(5).standard_normal(samples.size)
@@ -238,7 +239,8 @@ def test_noise_before_a_rounding_is_what_the_rounding_alone_does_not_make(pace, 
 
 def test_noise_of_an_encoder_counts_beside_its_rounding():
     """Steps of 0.38 mrad and noise of half of one, at a pace of which the steps alone make little:
-    a hundredth of J θ″ of the whole."""
+    a hundredth of J θ″ of the whole.
+    """
     step, even = 2.0 * np.pi / 2**14, log()
     group, _, valid, groups = row_index(even)
     mine = group[valid] == groups.index(("torque_shaft_nm", 0))
