@@ -61,7 +61,7 @@ ARITHMETIC = {
     "validation/trajectories.py": {"_PAD", "_START_S", "_PROBE"},  # samples kept; differences
     "data/clocks.py": {"_REACH"},  # a cubic goes through four samples
     "data/segment.py": {"PAIR_RAD"},  # a turn
-    # the grid of a search for a step; rounding
+    # the grid of a search for a step; rounding; of a fixed point
     "data/sensor_noise.py": {
         "_LOOKED_AT",
         "_STEPS",
@@ -74,6 +74,8 @@ ARITHMETIC = {
         "_FLOATING",
         "_DIGITS",
         "_MOST_DECIMALS",
+        "_SHIFTS",
+        "_ROUNDS",
     },
     "data/machine_scale.py": {"_BINS_AN_ORDER", "_SAME_ANGLE"},  # twice Nyquist; rounding
     "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight

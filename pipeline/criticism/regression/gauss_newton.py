@@ -227,7 +227,7 @@ def first_fit(rough: Fit) -> LinearSystem:
     ends = [gauss_newton(begun)]
     if len(rough.segments) <= rough.policy.fit.short_programme:
         ends += [_one_side_first(begun, side) for side in _SIDES]
-    end = min(ends, key=misfit)
+    end = min(ends, key=summed_error)
     if rough.model.stated():
         end = gauss_newton(replace(end.fit, model=rough.model))
     if not floors_changed(end.fit):
@@ -236,7 +236,7 @@ def first_fit(rough: Fit) -> LinearSystem:
     return gauss_newton(replace(end.fit, sigma=own, near=end.fit.values), before=end)
 
 
-def misfit(system: LinearSystem) -> float:
+def summed_error(system: LinearSystem) -> float:
     """How far the equations are missed, each counted once.
 
     Parameters

@@ -27,7 +27,7 @@ from pipeline.criticism.data.segment import rows_where
 from pipeline.criticism.effect import Effect, LinearForm
 from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.fit import Fit, floors
-from pipeline.criticism.regression.gauss_newton import gauss_newton, misfit
+from pipeline.criticism.regression.gauss_newton import gauss_newton, summed_error
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.candidates import Candidate, first_of_each, searched
 from pipeline.criticism.selection.improvement import FitQuality, clears, fall_below_floor, share_of
@@ -68,7 +68,7 @@ def with_linear_start(
             continue
         begun = _fit_from_form(wide.fit, candidate.effect, form)
         if begun is not None:
-            end = min(map(_fitted, _by_choices(begun)), key=misfit)
+            end = min(map(_fitted, _by_choices(begun)), key=summed_error)
             so_far = with_better(so_far, _score_of(wide, candidate, end), offered)
     return tuple(so_far)
 

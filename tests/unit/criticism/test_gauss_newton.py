@@ -17,8 +17,8 @@ from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.gauss_newton import (
     first_fit,
     gauss_newton,
-    misfit,
     rough_anew,
+    summed_error,
 )
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.stepwise import _floored_anew
@@ -199,4 +199,4 @@ def test_a_winding_is_not_given_up_for_what_a_drag_lacks() -> None:
         )
         for q in ([60.0, 0.5, 0.01], [4.0, 6300.0, 13000.0])
     )
-    assert misfit(drag_lacks) < misfit(winding_lost)
+    assert summed_error(drag_lacks) < summed_error(winding_lost)
