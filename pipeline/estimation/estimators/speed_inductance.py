@@ -35,7 +35,7 @@ from pipeline.records.capture import Array, Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.pole_pairs import BY_VOLTAGE, CONTRADICTION_SIGMAS
-from pipeline.records.uncertainty import Contribution, propagate, standard_uncertainty
+from pipeline.records.uncertainty import Budget, Contribution, propagate, standard_uncertainty
 
 WORDS = "pole pairs by voltages at speed over inductances at standstill, no whole number"
 TERM = Term(BY_VOLTAGE, "1", WORDS, "constant", 0.0, 1e4)
@@ -154,9 +154,24 @@ def _spans(columns: Mapping[str, Array], axis: str) -> float:
     return own / other
 
 
-def _pole_pairs(axis: str, slope: Slope, still: Estimate) -> Estimate:
-    """Pole pairs by one axis."""
-    value = slope.value_h / still.number
+def slope_budget(method: Method, axis: str, slope: Slope) -> Budget:
+    """Uncertainty of a slope: its scatter, and the gains of voltage and current.
+
+    Parameters
+    ----------
+    method
+        In whose name its scatter counts.
+    axis
+        `d` or `q`: of the inductance.
+    slope
+        By `flux_slope`.
+
+    Returns
+    -------
+    tuple of Contribution
+        In H.
+
+    """
     captures = slope.rows.captures
     metas = [c.meta for c in captures]
 
@@ -166,8 +181,14 @@ def _pole_pairs(axis: str, slope: Slope, still: Estimate) -> Estimate:
         return np.array([slope.value_h * volts / amps])
 
     gains = contributions(scaled, instrument_uncertainties(captures, ("voltage", "current")))[0]
-    budget = [METHOD.scatter(axis, slope.u_h, slope.dof), *gains]
-    parts = propagate([(1.0 / still.number, tuple(budget)), (-value / still.number, still.budget)])
+    return (method.scatter(axis, slope.u_h, slope.dof), *gains)
+
+
+def _pole_pairs(axis: str, slope: Slope, still: Estimate) -> Estimate:
+    """Pole pairs by one axis."""
+    value = slope.value_h / still.number
+    budget = slope_budget(METHOD, axis, slope)
+    parts = propagate([(1.0 / still.number, budget), (-value / still.number, still.budget)])
     share = policy().pole_pairs.inductance_share
     iron = Contribution(f"assumed:inductance_at_speed:{axis}", value * share, "B")
     words = f"{value:.3g} by l{axis}_h of {still.method}"
@@ -175,7 +196,7 @@ def _pole_pairs(axis: str, slope: Slope, still: Estimate) -> Estimate:
         BY_VOLTAGE,
         value,
         [*parts, iron],
-        {*still.captures, *(c.path for c in captures)},
+        {*still.captures, *(c.path for c in slope.rows.captures)},
         None,
         words,
     )

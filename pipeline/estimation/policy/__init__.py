@@ -15,6 +15,7 @@ from typing import Any
 
 from pipeline.estimation.policy.electrical import (
     Aligned,
+    AtSpeed,
     BackEmf,
     FluxPairs,
     Inverter,
@@ -59,6 +60,7 @@ class Policy:
     points: Points = section(Points)
     flux_pairs: FluxPairs = section(FluxPairs)
     pole_pairs: PolePairs = section(PolePairs)
+    at_speed: AtSpeed = section(AtSpeed)
     self_heating: SelfHeating = section(SelfHeating)
     meter_table: MeterTable = section(MeterTable)
     inverter: Inverter = section(Inverter)

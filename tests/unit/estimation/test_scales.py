@@ -48,6 +48,7 @@ PLANS: dict[str, Plan] = {
     "cogging": TURNS,
     "holding_current": (("holding_current", "holding_current", {}),),
     "drive_voltage": (("drive_0", "drive", {"voltage_timing": "held"}),),
+    "q_inductance": (("drive_0", "drive", {"voltage_timing": "held"}),),
     "inertia": DRIVES,
 }
 FEW = [

@@ -1,0 +1,58 @@
+"""q inductance of a drive log, where no test at standstill gives it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pipeline.estimation.estimators.q_inductance import AT_SPEED, ESTIMATOR
+from pipeline.estimation.registry import fit_all
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate
+from tests.simulated import design
+from tests.unit.estimation.mechanical import recorded
+
+MOTOR = design("gimbal-5208")
+
+
+def of(campaign: Campaign) -> Estimate:
+    """What the drives or maps give."""
+    known: Constants = fit_all(campaign, {}, only=frozenset({"lq_h"}))[0]
+    return next(e for e in known.all_of("lq_h") if e.method == ESTIMATOR.name)
+
+
+def stating(campaign: Campaign, pole_pairs: int | None) -> Campaign:
+    captures = tuple(
+        replace(c, meta=replace(c.meta, pole_pairs=pole_pairs)) for c in campaign.captures
+    )
+    return replace(campaign, captures=captures)
+
+
+@pytest.mark.parametrize("test", ["drive", "torque_map"])
+def test_a_log_at_speed_gives_the_q_inductance_within_its_interval(test: str) -> None:
+    found = of(stating(recorded(tests=(test,)), MOTOR.pole_pairs))
+    assert found.status == "measured"
+    assert found.number == pytest.approx(MOTOR.lq_h, rel=0.03)
+    assert abs(found.number - MOTOR.lq_h) < 2.0 * found.u < 0.12 * MOTOR.lq_h
+    assert any(part.source == AT_SPEED for part in found.budget)
+
+
+def test_it_says_on_which_pole_pairs_it_rests_and_scales_with_them() -> None:
+    drive = recorded(tests=("drive",))
+    right, wrong = (of(stating(drive, n * MOTOR.pole_pairs)) for n in (1, 2))
+    assert f"rests on the {MOTOR.pole_pairs} pole pairs that the captures state" in right.note
+    assert wrong.number == pytest.approx(0.5 * right.number, rel=0.05)
+
+
+def test_without_pole_pairs_they_are_asked_for() -> None:
+    found = of(stating(recorded(tests=("drive",)), None))
+    assert found.status == "not_identifiable"
+    assert "state pole_pairs" in found.note
+
+
+def test_a_test_at_standstill_is_not_widened_by_a_rougher_value() -> None:
+    found = of(recorded(tests=("lcr", "drive")))
+    assert found.status == "not_identifiable"
+    assert "standstill" in found.note
