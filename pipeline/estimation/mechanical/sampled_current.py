@@ -27,17 +27,20 @@ def sampling_drag(
     Returns
     -------
     tuple of Contribution
-        Empty where no drive recorded the current, or its inductance is not known.
+        Empty where no log is in step with an inverter, or its inductance is not known.
 
     Notes
     -----
     A drive samples once a period, in the middle of its pulses as they are commanded. A dead time
     moves them, and over the time τ between the current goes on by p ω ψ τ/L_q. With K = 1.5 p ψ
-    that is a torque (K²/(1.5 L_q)) τ ω. Of coasts none is needed: they show drag without current.
+    that is a torque (K²/(1.5 L_q)) τ ω, whether the voltages of the log are commanded or measured:
+    a log of held voltages is in step with the inverter as well. Of coasts none is needed: they
+    show drag without current.
 
     """
     inductance = known.best("lq_h")
-    driven = any(c.meta.voltage_kind == "commanded" for c in captures)
+    metas = [capture.meta for capture in captures]
+    driven = any(m.voltage_kind == "commanded" or m.voltage_timing == "held" for m in metas)
     if inductance is None or not driven:
         return ()
     per_second = kt_nm_a**2 / (1.5 * inductance.number)

@@ -11,7 +11,8 @@ import pytest
 
 from pipeline.estimation.estimators.inertia import ESTIMATOR as INERTIA
 from pipeline.estimation.estimators.torque_map import ESTIMATOR as TORQUE_MAP
-from pipeline.records.capture import Campaign, Capture
+from pipeline.estimation.mechanical.sampled_current import sampling_drag
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import type_b
@@ -61,6 +62,22 @@ def test_a_coast_shows_viscous_friction_without_what_a_late_sample_adds() -> Non
     assert found.number == pytest.approx(TRUE[VISCOUS], abs=3.0 * found.u)
     assert found.u < 0.02 * found.number
     assert "sampled current" in found.note
+
+
+@pytest.mark.parametrize(
+    ("told", "counts"),
+    [
+        ({"voltage_kind": "commanded", "voltage_timing": "centred"}, True),
+        ({"voltage_kind": "measured", "voltage_timing": "held"}, True),
+        ({"voltage_kind": "measured", "voltage_timing": "instant"}, False),
+    ],
+)
+def test_a_log_in_step_with_an_inverter_has_that_doubt(told: dict[str, str], counts: bool) -> None:
+    """K²/(1.5 L_q) is 34.8 N·m·s/rad a second; half a microsecond of it."""
+    capture = Capture("d.csv", "1", "verified", CaptureMeta("m", "drive", **told), ())
+    inductance = Estimate("lq_h", 6.2e-4, "H", "measured", "lcr", type_b("lcr", 1e-6))
+    parts = sampling_drag([capture], 0.18, Constants((inductance,)))
+    assert [part.u for part in parts] == ([pytest.approx(1.742e-5, rel=1e-3)] if counts else [])
 
 
 @pytest.mark.parametrize("method", ["torque_map", "inertia"])
