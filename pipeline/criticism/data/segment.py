@@ -331,6 +331,26 @@ def segment_of(
     )
 
 
+def joins(segment: Segment) -> NDArray[np.int64]:
+    """Where the samples of a segment begin anew: it may be a selection of windows.
+
+    Parameters
+    ----------
+    segment
+        Any segment.
+
+    Returns
+    -------
+    array
+        Samples that do not follow the one before in time; nothing is even across them.
+
+    """
+    time = segment.recorded.get("t_s")
+    if time is None:
+        return np.empty(0, dtype=np.int64)
+    return np.flatnonzero(np.abs(np.diff(time) / segment.ts_s - 1.0) > 0.5) + 1
+
+
 def with_lines(segment: Segment, lines: Array) -> Segment:
     """A segment with other weak samples [K, C, W, M] of what may disturb it.
 

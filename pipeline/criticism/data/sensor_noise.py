@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -272,13 +273,13 @@ def scatter(signal: Array, step: float, policy: SensorNoise) -> float:
     return min(noise, alone) if noise <= policy.smooth_share * alone else noise
 
 
-def dither_of(angle: Array, step: float, policy: SensorNoise) -> float:
+def dither_of(stretches: Sequence[Array], step: float, policy: SensorNoise) -> float:
     """White noise of an angle before it was rounded.
 
     Parameters
     ----------
-    angle
-        As recorded [n, rad].
+    stretches
+        As recorded [rad], each without a gap.
     step
         Of the rounding [rad].
     policy
@@ -292,16 +293,35 @@ def dither_of(angle: Array, step: float, policy: SensorNoise) -> float:
         sampling beat.
 
     """
-    noise = sensor_noise(angle, policy, steady=True)
-    even = smoothed(angle, math.sqrt(12.0) * noise, policy) / step
-    normal = np.random.default_rng(even.size).normal(size=even.size)
+    noise = _of_differences(stretches, policy) / step
+    passing = step * max(math.sqrt(12.0) * noise, 1.0)
+    even = [smoothed(one, passing, policy) / step for one in stretches]
+    random = np.random.default_rng(len(even))
+    normal = [random.normal(size=one.size) for one in even]
     power = 0.0
     for _ in range(_ROUNDS):
-        noisy = even + math.sqrt(power) * normal
-        anew = [np.round(noisy + shift) for shift in _SHIFTS]
-        shown = [sensor_noise(one, policy, steady=True) for one in anew]
-        power = max(power + (noise / step) ** 2 - float(np.mean(np.square(shown))), 0.0)
+        sigma = math.sqrt(power)
+        noisy = [one + sigma * white for one, white in zip(even, normal, strict=True)]
+        shown = [
+            _of_differences([np.round(one + shift) for one in noisy], policy) for shift in _SHIFTS
+        ]
+        power = max(power + noise**2 - float(np.mean(np.square(shown))), 0.0)
     return step * math.sqrt(power)
+
+
+def _of_differences(stretches: Sequence[Array], policy: SensorNoise) -> float:
+    """Noise level of an angle by third differences of blocks, none of them across a gap.
+
+    Neighbouring ones of white noise σ² have the covariance −15 σ²; that of a motion is positive.
+    """
+    blocks = [
+        block
+        for one in stretches
+        for block in np.array_split(np.diff(one, 3), max(one.size // policy.block, 1))
+    ]
+    powers = [-float(np.mean(block[1:] * block[:-1])) for block in blocks if block.size > 1]
+    middle = float(np.quantile(powers, policy.steady[0])) if powers else 0.0
+    return math.sqrt(max(middle, 0.0) / 15.0)
 
 
 def rounding_error(even: Array, step: float, shift: Array | float) -> Array:

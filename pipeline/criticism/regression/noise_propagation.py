@@ -9,7 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import UNSMOOTHED, Segment, SpeedSensor, projected, row_index
+from pipeline.criticism.data.segment import (
+    UNSMOOTHED,
+    Segment,
+    SpeedSensor,
+    joins,
+    projected,
+    row_index,
+)
 from pipeline.criticism.data.sensor_noise import rounding_error, smoothed, unrounded
 from pipeline.criticism.data.traces import LINES_V, parabolas
 from pipeline.criticism.data.traces import smoothed as box_mean
@@ -304,7 +311,7 @@ def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
 
     def even_of(signal: Array, step: float, between: Array | None = None) -> Array:
         columns = np.stack([signal, signal if between is None else between])
-        parts = np.split(columns, _joins(segment), axis=1)
+        parts = np.split(columns, joins(segment), axis=1)
         return np.concatenate([smoothed(part[0], step, policy, part[1]) for part in parts])
 
     even = {}
@@ -323,16 +330,6 @@ def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:
         passing = math.hypot(sensors.angle_step_rad, math.sqrt(12.0) * sensors.dither_rad)
         even["theta_mech_rad"] = even_of(theta, passing) if rough else theta
     return even
-
-
-def _joins(segment: Segment) -> NDArray[np.int64]:
-    """Samples that do not follow the one before in time: a segment may be a selection of windows,
-    and nothing is even across two of them.
-    """
-    time = segment.recorded.get("t_s")
-    if time is None:
-        return np.empty(0, dtype=np.int64)
-    return np.flatnonzero(np.abs(np.diff(time) / segment.ts_s - 1.0) > 0.5) + 1
 
 
 def _smoothed(segment: Segment, name: str, normal: Array) -> Array:

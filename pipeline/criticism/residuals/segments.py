@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.instruments import gains_of
-from pipeline.criticism.data.segment import UNSMOOTHED, Cache, Segment, with_lines
+from pipeline.criticism.data.segment import UNSMOOTHED, Cache, Segment, joins, with_lines
 from pipeline.criticism.data.sensor_noise import dither_of, is_rounded, rounding_step
 from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.equation import Equation
@@ -190,7 +190,9 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
     if step > 0.0:
         readings = 12.0 * (segment.sensors.noise.get("theta_mech_rad", 0.0) / step) ** 2
     count = min(round(readings), policy.most_readings) if readings > _ALTERNATING else 1
-    dither = dither_of(theta, step, policy) if step > 0.0 and count == 1 else 0.0
+    dither = 0.0
+    if step > 0.0 and count == 1:
+        dither = dither_of(np.split(theta, joins(segment)), step, policy)
     sensors = replace(segment.sensors, angle_step_rad=step, readings=count, dither_rad=dither)
     return replace(segment, sensors=sensors)
 

@@ -233,8 +233,20 @@ def test_noise_before_a_rounding_is_what_the_rounding_alone_does_not_make(pace, 
     step, samples = 2.0 * np.pi / 2**14, np.arange(12000)
     moved = pace * samples + 3.0 * np.sin(samples / 400.0)
     noisy = moved + share * np.random.default_rng(5).standard_normal(samples.size)
-    dither = dither_of(step * np.round(noisy), step, SENSORS)
+    dither = dither_of([step * np.round(noisy)], step, SENSORS)
     assert dither / step == pytest.approx(share, abs=0.1)
+
+
+def test_a_motion_and_the_gaps_between_windows_are_no_noise_of_an_encoder():
+    """Windows of 60 samples of a shaft that swings by radians from one to the next."""
+    step, even = 2.0 * np.pi / 2**14, log()
+    sample = np.arange(even.size)
+    time = even.ts_s * (sample + 300 * (sample // 60))
+    swing = 2.0 * np.sin(2.0 * np.pi * 9.0 * time)
+    recorded = {**even.recorded, "t_s": time, "theta_mech_rad": step * np.round(swing / step)}
+    found = _by_encoder(replace(even, recorded=recorded), replace(machine(), encoder_rad=step))
+    assert found.sensors.angle_step_rad == step
+    assert found.sensors.dither_rad < 0.25 * step
 
 
 def test_noise_of_an_encoder_counts_beside_its_rounding():
