@@ -49,9 +49,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
     Notes
     -----
-    Without an angle the drive's own speed is integrated, and that is late by two nuisances. Where
-    there is a voltage, the speed serves `dq` or `q` alone: the noise of an observer is not white,
-    and would be taken for something that the machine lacks.
+    Without an angle the drive's own speed is integrated, and that is late by two nuisances. What
+    its filter or observer makes smooth of its noise is in the floors (`sensor_noise.slow_noise`).
 
     """
     log = None if capture.has(TORQUE) else drive_log(capture, machine)
