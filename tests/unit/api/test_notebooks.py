@@ -8,9 +8,15 @@ import pytest
 
 from tests.notebooks import notebooks, run, text_of
 
+FIRST, *OTHERS = notebooks()
 
-@pytest.mark.slow  # what they do, test_public.py and test_models.py do on fewer captures
-@pytest.mark.parametrize("path", notebooks(), ids=lambda path: path.stem)
+
+@pytest.mark.parametrize(
+    "path",
+    # what the second does, test_models.py does on fewer captures
+    [FIRST, *(pytest.param(path, marks=pytest.mark.slow) for path in OTHERS)],
+    ids=lambda path: path.stem,
+)
 def test_a_notebook_runs_and_its_texts_are_up_to_date(path):
     kept = json.loads(path.read_text(encoding="utf-8"))
     now = text_of(run(path))
