@@ -16,6 +16,7 @@ from pipeline.criticism.data.sensor_noise import (
     rounding_error,
     rounding_step,
     sensor_noise,
+    slow_noise,
     smoothed,
 )
 from pipeline.criticism.machine.model import Model
@@ -235,6 +236,20 @@ def test_noise_before_a_rounding_is_what_the_rounding_alone_does_not_make(pace, 
     noisy = moved + share * np.random.default_rng(5).standard_normal(samples.size)
     dither = dither_of([step * np.round(noisy)], step, SENSORS)
     assert dither / step == pytest.approx(share, abs=0.1)
+
+
+@pytest.mark.parametrize("turns", [0.0, 40.0])
+def test_noise_that_a_filter_made_smooth_is_found_beside_a_motion(turns):
+    """Of a filter with gain 1 a slow window sees the noise as it was before; samples do not."""
+    white = 0.02 * np.random.default_rng(6).standard_normal(40000)
+    speed, kept = np.zeros(white.size), 0.0
+    for n, one in enumerate(white):
+        kept += 0.2 * (one - kept)
+        speed[n] = kept
+    speed += turns * np.sin(np.arange(white.size) / 2000.0)
+    assert sensor_noise(speed, SENSORS) < 0.3 * 0.02
+    assert slow_noise(speed, 16.0, SENSORS) == pytest.approx(0.02, rel=0.25)
+    assert slow_noise(white, 16.0, SENSORS) == pytest.approx(0.02, rel=0.1)
 
 
 def test_a_motion_and_the_gaps_between_windows_are_no_noise_of_an_encoder():
