@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pipeline.estimation.electrical.operating_points import pole_pairs_of
-from pipeline.estimation.electrical.voltage_rows import voltage_rows
-from pipeline.estimation.estimators.speed_inductance import (
+from pipeline.estimation.electrical.flux_slope import (
     STANDSTILL,
     Slope,
     flux_slope,
     slope_budget,
 )
+from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.electrical.voltage_rows import voltage_rows
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit

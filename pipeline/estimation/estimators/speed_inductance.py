@@ -3,68 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.estimation.electrical.operating_points import pole_pairs_of
-from pipeline.estimation.electrical.voltage_rows import (
-    CROSS_FLUX,
-    D_DROP,
-    D_FLUX,
-    D_FLUX_BENT,
-    Q_FLUX_BENT,
-    Q_TURNED,
-    VoltageRows,
-    voltage_rows,
+from pipeline.estimation.electrical.flux_slope import (
+    COLUMNS,
+    STANDSTILL,
+    Slope,
+    flux_slope,
+    slope_budget,
 )
-from pipeline.estimation.electrical.voltage_turn import Q_FLUX, TURNED, V_D
+from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.electrical.voltage_rows import voltage_rows
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.uncertainty.instruments import (
-    contributions,
-    current_source,
-    instrument_uncertainties,
-    voltage_source,
-)
-from pipeline.numerics.clusters import cluster_covariance
-from pipeline.numerics.least_squares import linear_fit
 from pipeline.physics.glossary import Term
-from pipeline.records.capture import Array, Campaign
+from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.pole_pairs import BY_VOLTAGE, CONTRADICTION_SIGMAS
-from pipeline.records.uncertainty import Budget, Contribution, propagate, standard_uncertainty
+from pipeline.records.uncertainty import Contribution, propagate, standard_uncertainty
 
 WORDS = "pole pairs by voltages at speed over inductances at standstill, no whole number"
 TERM = Term(BY_VOLTAGE, "1", WORDS, "constant", 0.0, 1e4)
 METHOD = Method("speed_inductance", (TERM,))
-STANDSTILL = ("current_step", "lcr")
 EXPERIMENT = (
     "record current_step or lcr captures, and a drive or torque_map with vd_v, vq_v, id_a and "
     "iq_a in which currents change at speed; an open_circuit spin counts pole pairs better"
 )
-# What is looked for comes first; each nuisance counts where no column before it holds it.
-COLUMNS = {
-    "q": (
-        (Q_FLUX, "d current", "d inductive"),
-        ("q voltage", Q_TURNED, D_DROP, Q_FLUX_BENT, CROSS_FLUX, "zero"),
-    ),
-    "d": (
-        (D_FLUX, "speed", "current", "inductive"),
-        (V_D, TURNED, "drop", D_FLUX_BENT, "cross flux", "zero"),
-    ),
-}
-
-
-class Slope(NamedTuple):
-    """Pole pairs times an inductance [H], its scatter [H], degrees of freedom, and its rows."""
-
-    value_h: float
-    u_h: float
-    dof: int
-    rows: VoltageRows
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
@@ -91,97 +58,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if not found:
         return METHOD.nothing([BY_VOLTAGE], EXPERIMENT)
     return Fit((_joined(found),))
-
-
-def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
-    """Pole pairs times the inductance of one axis, by the voltage of the other one.
-
-    Parameters
-    ----------
-    rows
-        Window means of both voltages.
-    axis
-        `d` or `q`: of the inductance.
-
-    Returns
-    -------
-    Slope or None
-        At small current, where iron does not bend yet; None where the current of this axis does not
-        change, or goes together with something else.
-
-    Notes
-    -----
-    v_d = R i_d + L_d di_d/dt - p L_q ω i_q and v_q = R i_q + L_q di_q/dt + p L_d ω i_d + Ke ω, ω of
-    the shaft: nothing else in them knows p. A frame that is turned by δ + τ ω mixes δ + τ ω of the
-    other voltage into each.
-
-    References
-    ----------
-    IEEE Std 1812-2014 (dq equations).
-
-    """
-    columns = {
-        **rows.columns,
-        "speed": rows.speed_rad_s,
-        "current": rows.current_a,
-        "q voltage": rows.voltage_v,
-    }
-    if V_D not in columns or _spans(columns, axis) < policy().aligned.least_d_share:
-        return None
-    main, nuisances = ([columns[name] for name in names] for names in COLUMNS[axis])
-    chosen = [column for column in main if np.any(column)]
-    for column in nuisances:
-        beside = linear_fit(np.column_stack(chosen), column).residuals
-        if np.linalg.norm(beside) > policy().pole_pairs.least_own_share * np.linalg.norm(column):
-            chosen.append(column)
-    voltage = rows.voltage_v if axis == "d" else columns[V_D]
-    design = np.column_stack(chosen)
-    solution = linear_fit(design, voltage)
-    if not solution.full_rank or solution.dof < 1:
-        return None
-    sigma = np.ones(voltage.size)
-    covariance, dof = cluster_covariance(design, solution.residuals, sigma, rows.cluster)
-    sign = 1.0 if axis == "d" else -1.0
-    return Slope(sign * float(solution.coefficients[0]), float(covariance[0, 0] ** 0.5), dof, rows)
-
-
-def _spans(columns: Mapping[str, Array], axis: str) -> float:
-    """The span of this axis's current over that of the other one [1]."""
-    spans = {a: float(np.ptp(columns[n])) for a, n in (("d", "d current"), ("q", "current"))}
-    own, other = spans.pop(axis), sum(spans.values())
-    if other == 0.0:
-        return np.inf if own > 0.0 else 0.0
-    return own / other
-
-
-def slope_budget(method: Method, axis: str, slope: Slope) -> Budget:
-    """Uncertainty of a slope: its scatter, and the gains of voltage and current.
-
-    Parameters
-    ----------
-    method
-        In whose name its scatter counts.
-    axis
-        `d` or `q`: of the inductance.
-    slope
-        By `flux_slope`.
-
-    Returns
-    -------
-    tuple of Contribution
-        In H.
-
-    """
-    captures = slope.rows.captures
-    metas = [c.meta for c in captures]
-
-    def scaled(shift: Mapping[str, float]) -> Array:
-        volts = np.mean([1.0 + shift.get(voltage_source(m), 0.0) for m in metas])
-        amps = np.mean([1.0 + shift.get(current_source(m), 0.0) for m in metas])
-        return np.array([slope.value_h * volts / amps])
-
-    gains = contributions(scaled, instrument_uncertainties(captures, ("voltage", "current")))[0]
-    return (method.scatter(axis, slope.u_h, slope.dof), *gains)
 
 
 def _pole_pairs(axis: str, slope: Slope, still: Estimate) -> Estimate:
