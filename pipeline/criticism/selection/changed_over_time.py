@@ -9,8 +9,9 @@ one to one: a drag of another form over speed explains it as well, and then that
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import over_floor
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.residuals.channels import channel_of
+
+_EVEN_POWERS = 3
+"""Powers of the speed, from none, of a drag that either sense has alike."""
 
 
 def with_changing_friction(system: LinearSystem) -> LinearSystem | None:
@@ -79,22 +83,7 @@ def _by_speed(system: LinearSystem) -> float:
 def _curve(policy: Discovery, *, even: bool) -> Effect:
     """A drag of any form over speed: opposed to it, or that part which either sense has alike."""
     powers, widths = policy.friction_powers, policy.friction_widths
-    count = 3 if even else len(powers) + len(widths)
-
-    def torque(x: Operating, q: Values) -> Array:
-        share = np.abs(x.omega_rad_s) / x.machine.scales["speed_rad_s"]
-        if even:
-            parts = [share**n for n in range(count)]
-        else:
-            sense = np.sign(x.omega_rad_s)
-            parts = [sense * share**power for power in powers]
-            parts += [sense * np.exp(-share / width) for width in widths]
-        total = np.zeros(share.shape)
-        for part, weight in zip(parts, q.values(), strict=True):
-            if weight:
-                total = total + weight * part
-        return total
-
+    count = _EVEN_POWERS if even else len(powers) + len(widths)
     names = (f"c{n}" for n in range(count))
     bounds = (-math.inf, math.inf)
     parameters = tuple(Parameter(n, "N·m", 0.01, 0.0, "torque_nm", *bounds) for n in names)
@@ -107,8 +96,31 @@ def _curve(policy: Discovery, *, even: bool) -> Effect:
         experiment="",
         reference="",
         parameters=parameters,
-        torque=torque,
+        torque=_even_drag if even else partial(_odd_drag, powers, widths),
     )
+
+
+def _even_drag(x: Operating, q: Values) -> Array:
+    """Drag [n] [N·m] that either sense has alike: powers of the speed."""
+    share = np.abs(x.omega_rad_s) / x.machine.scales["speed_rad_s"]
+    return _weighted((share**n for n in range(_EVEN_POWERS)), q, share.shape)
+
+
+def _odd_drag(powers: Sequence[float], widths: Sequence[float], x: Operating, q: Values) -> Array:
+    """Drag [n] [N·m] opposed to the speed: its powers, and what dies out above each width."""
+    share = np.abs(x.omega_rad_s) / x.machine.scales["speed_rad_s"]
+    parts = [share**power for power in powers] + [np.exp(-share / width) for width in widths]
+    sense = np.sign(x.omega_rad_s)
+    return _weighted((sense * part for part in parts), q, share.shape)
+
+
+def _weighted(parts: Iterable[Array], q: Values, shape: tuple[int, ...]) -> Array:
+    """The sum of curves by their weights."""
+    total = np.zeros(shape)
+    for part, weight in zip(parts, q.values(), strict=True):
+        if weight:
+            total = total + weight * part
+    return total
 
 
 def changes(fit: Fit) -> bool:

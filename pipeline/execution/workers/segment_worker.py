@@ -1,7 +1,9 @@
 """A second process that holds the segments of a campaign and does half of the work on them.
 
 Much of the work is on arrays too small for numpy to release the interpreter lock, so two threads
-use 1.4 cores. Segments are sent once. A task is a few kilobytes, its result a few megabytes.
+use 1.4 cores. Segments are sent once. A task is a few kilobytes, its result a few megabytes. What a
+task is about may hold functions made on the way, such as a curve of a residual: cloudpickle sends
+them by value.
 """
 
 from __future__ import annotations
@@ -15,6 +17,8 @@ from functools import partial
 from multiprocessing import parent_process
 from multiprocessing.util import Finalize
 from typing import Any, TypeVar
+
+import cloudpickle
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.regression.parallel import Work, by_threads, in_order, mapped_by
@@ -31,8 +35,8 @@ _OWN: list[SegmentWorker] = []
 class SegmentWorker:
     """Shares work on segments with the process behind `executor`; None does all of it here.
 
-    Work that the process cannot do is done here: an effect whose hooks it cannot import, or
-    everything after the process has died.
+    Work that the process cannot do is done here, and everything after it: an effect whose module
+    it cannot import, or a process that has died.
     """
 
     def __init__(self, executor: Executor | None) -> None:
@@ -53,7 +57,7 @@ class SegmentWorker:
     def share(
         self, work: Work, segments: Sequence[Segment], arguments: Sequence[tuple[Any, ...]]
     ) -> tuple[Any, ...]:
-        """`work(segment, *arguments)` of every segment, in order; the worker does half of them.
+        """`work(segment, *arguments)` of every segment, in order; the worker does half of it.
 
         A segment stays with the process that it was first given to. A process keeps what it has
         computed of a segment, and the last bits of a result depend on what was kept. So they are
@@ -76,7 +80,8 @@ class SegmentWorker:
         local = [n for n in range(len(segments)) if n not in remote]
         keys, given = [id(segments[n]) for n in remote], [arguments[n] for n in remote]
         try:
-            future = self._executor.submit(_map, new, keys, work, given)
+            task = cloudpickle.dumps((keys, work, given))
+            future = self._executor.submit(_map, new, task)
             done = {n: work(segments[n], *arguments[n]) for n in local}
             done |= dict(zip(remote, future.result(), strict=True))
         except Exception as error:  # noqa: BLE001 - an error of the work itself is raised again here
@@ -121,12 +126,12 @@ class SegmentWorker:
     def _place(self, segments: Sequence[Segment]) -> dict[int, Segment]:
         """Gives new segments to either process, the largest first; those that the worker gets."""
         local, remote = self._placed
-        loads = [sum(segment.size for segment in one.values()) for one in self._placed]
+        loads = [sum(_load_of(segment) for segment in one.values()) for one in self._placed]
         new = [s for s in segments if id(s) not in local and id(s) not in remote]
         sent: dict[int, Segment] = {}
-        for segment in sorted(new, key=lambda one: -one.size):
+        for segment in sorted(new, key=_load_of, reverse=True):
             lighter = int(loads[1] < loads[0])
-            loads[lighter] += segment.size
+            loads[lighter] += _load_of(segment)
             (sent if lighter else local)[id(segment)] = segment
         remote.update(sent)
         return sent
@@ -173,6 +178,11 @@ def shared_or_in_order() -> AbstractContextManager[None]:
     return _OWN[0].campaign() if _OWN else mapped_by(in_order)
 
 
+def _load_of(segment: Segment) -> int:
+    """Samples that are predicted of a segment: what work on it takes goes with them."""
+    return segment.size * len(segment.channels)
+
+
 def _forget() -> None:
     _SEGMENTS.clear()
 
@@ -189,8 +199,7 @@ def _load(module: str) -> None:
     importlib.import_module(module)
 
 
-def _map(
-    new: dict[int, Segment], keys: list[int], work: Work, arguments: Sequence[tuple[Any, ...]]
-) -> list[Any]:
+def _map(new: dict[int, Segment], task: bytes) -> list[Any]:
     _SEGMENTS.update(new)
+    keys, work, arguments = cloudpickle.loads(task)
     return [work(_SEGMENTS[key], *given) for key, given in zip(keys, arguments, strict=True)]

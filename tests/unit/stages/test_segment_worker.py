@@ -104,6 +104,15 @@ def test_half_of_the_samples_are_the_workers(found, second) -> None:
 
 
 @workers
+def test_a_segment_of_more_signals_is_more_work(found, second) -> None:
+    (channel,) = found[3].channels
+    three = replace(found[3], channels=(channel,) * 3)
+    with second.campaign():
+        theirs = on_each(whose, [three, *found[:3]], [(0,)] * 4)
+    assert theirs == (theirs[0], *(not theirs[0],) * 3)
+
+
+@workers
 def test_a_segment_stays_with_its_process(found, second) -> None:
     """Whatever joins or leaves: a process keeps what it computed, and last bits depend on it."""
     with second.campaign():
@@ -128,11 +137,26 @@ def test_a_user_s_effect_from_a_folder_goes_along(found, tmp_path) -> None:
 
 
 @workers
-def test_an_effect_that_cannot_travel_is_worked_on_here(found, second) -> None:
-    lambdas = replace(
+def test_an_effect_made_on_the_way_is_worked_on_there(found, second) -> None:
+    """What a search draws of a residual is functions that no module has by name."""
+    made = replace(
         effects()["coulomb_friction"], torque=lambda x, q: q["torque_nm"] * x.omega_rad_s
     )
-    assert not _tolerances_shared(found, lambdas, second)
+    assert _tolerances_shared(found, made, second)
+
+
+@workers
+def test_an_effect_whose_module_the_worker_lacks_is_worked_on_here(
+    found, second, tmp_path
+) -> None:
+    (tmp_path / "later.py").write_text(
+        "from pipeline.criticism.effects.coulomb_friction import EFFECT as KNOWN\n"
+        "from dataclasses import replace\n"
+        "def torque(x, q):\n"
+        "    return 0.1 * q['torque_nm'] * x.omega_rad_s\n"
+        "EFFECT = replace(KNOWN, name='later', torque=torque)\n"
+    )
+    assert not _tolerances_shared(found, effects(str(tmp_path))["later"], second)
 
 
 def _tolerances_shared(found, effect: Effect, second: SegmentWorker) -> bool:
