@@ -104,27 +104,29 @@ def reach(period_s: float, policy: Torsion) -> int:
     Returns
     -------
     int
-        Six half means of `passed_on`, and a second difference before and behind them.
+        Six half means of `passed_on`, a second difference before and behind them, and the rate by
+        which a damper lags.
 
     """
-    return 3 * (_block(period_s, policy) - 1) + 2
+    return 3 * (_block(period_s, policy) - 1) + 3
 
 
 def linear_far_drag(x: Operating, q: Values) -> Array:
-    """`far_drag` of a spring without damping, in parameters that it is linear in.
+    """`far_drag` of a spring and damper, in parameters that it is linear in.
 
     Parameters
     ----------
     x
         State of the machine.
     q
-        `torque_s2` = f J/k and `angle_s2` = f J/k (1 − f) J/J0 [s²], with J0 of `inertia_scale`.
+        `torque_s2` = f J/k and `angle_s2` = f J/k (1 − f) J/J0 [s²], with J0 of `inertia_scale`;
+        `torque_s3` and `angle_s3` [s³] are c/k times these.
 
     Returns
     -------
     array [n·m, N·m]
-        −f J twist″ = −(torque_s2 T″ − angle_s2 J0 θ⁗); 0 of a shaft that no inverter drives,
-        and at the stator.
+        −f J twist″ = −(torque_s2 T″ − angle_s2 J0 θ⁗) + (torque_s3 T″ − angle_s3 J0 θ⁗)′; 0 of a
+        shaft that no inverter drives, and at the stator.
 
     Notes
     -----
@@ -136,8 +138,11 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
         return np.zeros(x.theta_rad.size)
     torque, theta = _sampled(x)
     bend = np.diff(theta, 2) / x.ts_s**2
-    bent = q["angle_s2"] * inertia_scale(x.machine)
-    twist = _smoothed(x, q["torque_s2"] * torque[1:-1] - bent * bend)
+    bend *= inertia_scale(x.machine)
+    twist = _smoothed(x, q["torque_s2"] * torque[1:-1] - q["angle_s2"] * bend)
+    if q["torque_s3"] or q["angle_s3"]:
+        late = _smoothed(x, q["torque_s3"] * torque[1:-1] - q["angle_s3"] * bend)
+        twist = twist - np.gradient(late) / x.ts_s
     return _at_points(x, -np.pad(np.diff(twist, 2), 1) / x.ts_s**2)
 
 
@@ -173,8 +178,8 @@ def spring_of(q: Values, base: Values, machine: Machine) -> Values | None:
     Returns
     -------
     mapping or None
-        `share` = f [1] and `twist_rad` = T/k [rad] at the machine's torque T, without damping, on a
-        dynamometer that gives way; None where no two masses have such parameters.
+        `share` = f [1], `twist_rad` = T/k [rad] at the machine's torque T and `damping_s` = c/k, on
+        a dynamometer that gives way; None where no two masses have such parameters.
 
     """
     soft, bent, j_kgm2 = q["torque_s2"], q["angle_s2"] * inertia_scale(machine), base["j_kgm2"]
@@ -182,13 +187,14 @@ def spring_of(q: Values, base: Values, machine: Machine) -> Values | None:
         return None
     share = 1.0 - bent / (soft * j_kgm2)
     twist_rad = machine.scales["torque_nm"] * soft / (share * j_kgm2)
-    return {"share": share, "twist_rad": twist_rad, "damping_s": 0.0, "between": -1.0}
+    late_s = max(q["torque_s3"] / soft, 0.0)
+    return {"share": share, "twist_rad": twist_rad, "damping_s": late_s, "between": -1.0}
 
 
 LINEAR_COUPLING = LinearForm(
     Effect(
         name="linear_coupling",
-        words="f J twist″ of a spring, linear in f J/k and f J (1 − f) J/k",
+        words="f J twist″ of a spring and damper, linear in f J/k, f J (1 − f) J/k and c/k of both",
         signature="a resonance after torque steps",
         tests=("drive", "torque_map"),
         experiment="torque steps",
@@ -196,6 +202,8 @@ LINEAR_COUPLING = LinearForm(
         parameters=(
             Parameter("torque_s2", "s²", 1e-5, 0.0),
             Parameter("angle_s2", "s²", 1e-5, 0.0),
+            Parameter("torque_s3", "s³", 1e-9, 0.0),
+            Parameter("angle_s3", "s³", 1e-9, 0.0),
         ),
         torque=linear_far_drag,
     ),

@@ -4,10 +4,10 @@ With most of the inertia behind a soft shaft the base fit ends with an inertia a
 are a tenth of the true ones, and no tangent leads from there to two masses. In the load that a
 transducer beyond the far part reads,
 
-    T_load = T − drags − J θ″ + (f J/k) T″ − (f J (1 − f) J/k) θ⁗,
+    T_load = T − drags − J θ″ + (f J/k) [T″ − (1 − f) J θ⁗] − (f J/k) (c/k) [T″ − (1 − f) J θ⁗]′,
 
-all is linear in J, the drags and two further parameters. So one rough fit gives the share f and
-the stiffness k, wherever the base fit ended, and the coupling is fitted from these. Any effect
+all is linear in J, the drags and four further parameters. So one rough fit gives the share f, the
+stiffness k and the damping c, wherever the base fit ended, and the coupling is fitted from these. Any effect
 with a `LinearForm` is tried so.
 
 Reference: Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control.

@@ -115,7 +115,7 @@ def test_a_state_of_more_points_a_sample_has_the_same_coupling():
     )
     fine = finer(x, 3)
     assert passed_on(fine, 0.4) == pytest.approx(passed_on(x, 0.4))
-    q = {"torque_s2": 1e-5, "angle_s2": 2e-5}
+    q = {"torque_s2": 1e-5, "angle_s2": 2e-5, "torque_s3": 1e-9, "angle_s3": 2e-9}
     assert linear_far_drag(fine, q)[::3] == pytest.approx(linear_far_drag(x, q))
     twist = 1e-4 * np.sin(350.0 * t)
     assert far_drag(fine, 0.4, 1.0, lambda: twist)[::3] == pytest.approx(
@@ -133,7 +133,8 @@ def test_a_drag_of_two_masses_reaches_so_far_and_no_farther(period_s):
         ts_s=period_s,
         shaft=ShaftState(alone=True),
     )
-    moved = np.flatnonzero(linear_far_drag(x, {"torque_s2": 1e-5, "angle_s2": 0.0}))
+    by_torque = {"torque_s2": 1e-5, "angle_s2": 0.0, "torque_s3": 1e-9, "angle_s3": 0.0}
+    moved = np.flatnonzero(linear_far_drag(x, by_torque))
     far = reach(period_s, x.machine.policy.torsion) - 1
     assert moved.min() == 100 - far
     assert moved.max() == 100 + far

@@ -71,13 +71,17 @@ def test_a_stiff_shaft_on_the_same_bench_is_quiet(motor):
 
 
 @pytest.mark.slow
-def test_a_far_end_that_a_stiff_dynamometer_holds_is_found_from_the_same_start():
-    """The linear form is that of a dynamometer that gives way; the transducer stands elsewhere."""
-    soft = softness("gimbal-5208", 60.0, 0.38)
-    found = ladder("gimbal-5208", 0.0, 3, compliance={"size": soft, "load_fraction": 0.38})
+@pytest.mark.parametrize(("name", "resonance_hz"), [("gimbal-5208", 60.0), ("joint-11p", 55.0)])
+def test_a_far_end_that_a_stiff_dynamometer_holds_is_found_from_the_same_start(name, resonance_hz):
+    """The linear form is that of a dynamometer that gives way; the transducer stands elsewhere.
+
+    The second coupling rings so long in a torque map that a spring without damping misses it.
+    """
+    soft = softness(name, resonance_hz, 0.38)
+    found = ladder(name, 0.0, 3, compliance={"size": soft, "load_fraction": 0.38})
     assert found.missing == ("compliance",)
     assert found.ladder[-1].parameters["compliance.share"][0] == pytest.approx(0.38, rel=0.02)
-    assert found.ladder[-1].held_out < 0.05 * found.ladder[0].held_out + 0.5
+    assert found.ladder[-1].held_out < 0.7 * found.ladder[0].held_out
 
 
 def test_a_start_is_tried_with_the_transducer_wherever_it_may_stand():
@@ -97,7 +101,8 @@ def ringing():
     return replace(operating(t.size), theta_rad=angle, torque_em_nm=torque)
 
 
-def test_the_linear_form_is_the_spring_and_gives_it_back():
+@pytest.mark.parametrize("late_s", [0.0, 2e-4])
+def test_the_linear_form_is_the_spring_and_its_damper_and_gives_them_back(late_s):
     x, share, stiffness = ringing(), 0.7, 6.0
     j, torque = BASE["j_kgm2"], x.machine.scales["torque_nm"]
     soft = share * j / stiffness
@@ -105,7 +110,8 @@ def test_the_linear_form_is_the_spring_and_gives_it_back():
         "torque_s2": soft,
         "angle_s2": soft * (1.0 - share) * j / inertia_scale(x.machine),
     }
-    spring = {"share": share, "twist_rad": torque / stiffness, "damping_s": 0.0}
+    linear |= {"torque_s3": late_s * linear["torque_s2"], "angle_s3": late_s * linear["angle_s2"]}
+    spring = {"share": share, "twist_rad": torque / stiffness, "damping_s": late_s}
     twist = spring_twist(x, spring, passed_on(x, share))
     both = far_drag(x, share, -1.0, lambda: twist), linear_far_drag(x, linear)
     inside = slice(60, -60)
@@ -113,11 +119,12 @@ def test_the_linear_form_is_the_spring_and_gives_it_back():
     assert np.abs(both[0][inside]).max() > 0.01
     found = spring_of(linear, {"j_kgm2": j}, x.machine)
     assert found == pytest.approx(
-        {"share": share, "twist_rad": torque / stiffness, "damping_s": 0.0, "between": -1.0}
+        {"share": share, "twist_rad": torque / stiffness, "damping_s": late_s, "between": -1.0}
     )
 
 
 @pytest.mark.parametrize(("soft", "bent"), [(-1e-6, 1e-6), (1e-6, -1e-6), (1e-6, 1.0)])
 def test_no_two_masses_have_such_parameters(soft, bent):
     x = operating(4)
-    assert spring_of({"torque_s2": soft, "angle_s2": bent}, BASE, x.machine) is None
+    undamped = {"torque_s3": 0.0, "angle_s3": 0.0}
+    assert spring_of({"torque_s2": soft, "angle_s2": bent, **undamped}, BASE, x.machine) is None
