@@ -26,9 +26,6 @@ from pipeline.criticism.regression.goodness import over_floor
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.residuals.channels import channel_of
 
-_EVEN_POWERS = 3
-"""Powers of the speed, from none, of a drag that either sense has alike."""
-
 
 def with_changing_friction(system: LinearSystem) -> LinearSystem | None:
     """The fit with a friction that changes with the time since a capture began.
@@ -83,7 +80,7 @@ def _by_speed(system: LinearSystem) -> float:
 def _curve(policy: Discovery, *, even: bool) -> Effect:
     """A drag of any form over speed: opposed to it, or that part which either sense has alike."""
     powers, widths = policy.friction_powers, policy.friction_widths
-    count = _EVEN_POWERS if even else len(powers) + len(widths)
+    count = 3 if even else len(powers) + len(widths)
     names = (f"c{n}" for n in range(count))
     bounds = (-math.inf, math.inf)
     parameters = tuple(Parameter(n, "N·m", 0.01, 0.0, "torque_nm", *bounds) for n in names)
@@ -101,9 +98,9 @@ def _curve(policy: Discovery, *, even: bool) -> Effect:
 
 
 def _even_drag(x: Operating, q: Values) -> Array:
-    """Drag [n] [N·m] that either sense has alike: powers of the speed."""
+    """Drag [n] [N·m] that either sense has alike: powers of the speed from 0 on."""
     share = np.abs(x.omega_rad_s) / x.machine.scales["speed_rad_s"]
-    return _weighted((share**n for n in range(_EVEN_POWERS)), q, share.shape)
+    return _weighted((share**n for n in range(len(q))), q, share.shape)
 
 
 def _odd_drag(powers: Sequence[float], widths: Sequence[float], x: Operating, q: Values) -> Array:

@@ -7,8 +7,8 @@ transducer beyond the far part reads,
     T_load = T − drags − J θ″ + (f J/k) [T″ − (1 − f) J θ⁗] − (f J/k) (c/k) [T″ − (1 − f) J θ⁗]′,
 
 all is linear in J, the drags and four further parameters. So one rough fit gives the share f, the
-stiffness k and the damping c, wherever the base fit ended, and the coupling is fitted from these. Any effect
-with a `LinearForm` is tried so.
+stiffness k and the damping c, wherever the base fit ended, and the coupling is fitted from these.
+Any effect with a `LinearForm` is tried so.
 
 Reference: Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control.
 """

@@ -146,9 +146,7 @@ def test_an_effect_made_on_the_way_is_worked_on_there(found, second) -> None:
 
 
 @workers
-def test_an_effect_whose_module_the_worker_lacks_is_worked_on_here(
-    found, second, tmp_path
-) -> None:
+def test_an_effect_whose_module_the_worker_lacks_is_worked_on_here(found, second, tmp_path) -> None:
     (tmp_path / "later.py").write_text(
         "from pipeline.criticism.effects.coulomb_friction import EFFECT as KNOWN\n"
         "from dataclasses import replace\n"
