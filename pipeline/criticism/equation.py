@@ -161,7 +161,8 @@ class Use:
     angle_maps
         Whether errors are mapped over the turn.
     whole_beside
-        Equations beside whose segments one of this is held out as a whole, and not in its blocks.
+        Equations beside whose segments one of this is held out as a whole, where these determine
+        all that it does, and not in its blocks.
     combinations
         What it determines of parameters that it does not determine one by one.
 

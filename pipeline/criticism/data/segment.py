@@ -202,6 +202,8 @@ class Segment:
     blocks
         Number of the part of a capture that each window [W] belongs to; parts are held out one by
         one where there is no other capture to predict it from.
+    whole
+        Whether it is held out as a whole where the other captures determine all that it does.
     cache
         Cache of what was computed of it.
 
@@ -220,6 +222,7 @@ class Segment:
     disturbances: Disturbances = Disturbances()
     unthinned: Unthinned = Unthinned()
     blocks: NDArray[np.int64] | None = None
+    whole: bool = False
     cache: Cache = field(default_factory=Cache, repr=False, compare=False)
 
     @property

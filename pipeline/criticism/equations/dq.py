@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.criticism.data.drive_log import in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
 from pipeline.criticism.data.sensors import TEMPERATURES, prepared
 from pipeline.criticism.data.shaft_angle import (
@@ -106,8 +107,17 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     log = whole_log(columns, period, policy)
     columns, starts = thinned(columns, keep, window, most)
     weak = projection(columns["theta_mech_rad"], starts, window, orders)
+    middle = np.rint(columns["t_s"][starts + window // 2] / period)
     segment = segment_of(
-        capture, "dq", "drive", period, columns, sensors, channels=channels, weak=weak
+        capture,
+        "dq",
+        "drive",
+        period,
+        columns,
+        sensors,
+        channels=channels,
+        weak=weak,
+        blocks=in_time(middle, size),
     )
     return replace(
         segment,
@@ -352,5 +362,6 @@ EQUATION = Equation(
         free_runs=("torque_map", "drive"),
         currents=("id_a", "iq_a"),
         angle_maps=True,
+        whole_beside=("dq",),
     ),
 )

@@ -36,7 +36,7 @@ class HeldOut:
     Attributes
     ----------
     residual
-        [R]; NaN in a capture that alone determines a constant, and so is always in the fit.
+        [R]; NaN in what alone determines a constant, and so is always in the fit.
     total
         Rms of the others over what may be expected of a prediction [1]; of the fit itself where
         there are none.
@@ -45,6 +45,8 @@ class HeldOut:
     widening
         Factor on the noise floor for what the other captures and the instruments leave open of a
         prediction [R].
+    divided
+        Captures of which each block is predicted from all else, as no other capture can.
 
     """
 
@@ -52,6 +54,7 @@ class HeldOut:
     total: float
     steps: Mapping[int, Array] = field(default_factory=dict)
     widening: Array | float = 1.0
+    divided: frozenset[str] = frozenset()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -62,7 +65,12 @@ class HeldOut:
 
     @classmethod
     def of(
-        cls, system: LinearSystem, residual: Array, steps: Mapping[int, Array], widening: Array
+        cls,
+        system: LinearSystem,
+        residual: Array,
+        steps: Mapping[int, Array],
+        widening: Array,
+        divided: frozenset[str] = frozenset(),
     ) -> HeldOut:
         """The held-out errors with their total.
 
@@ -76,6 +84,8 @@ class HeldOut:
             How far the parameters move without a capture, by its number.
         widening
             Factor on the noise floor [R].
+        divided
+            Captures that are predicted block by block.
 
         Returns
         -------
@@ -84,7 +94,7 @@ class HeldOut:
 
         """
         predicted = np.isfinite(residual)
-        errors_of_rows = cls(residual, 0.0, steps, widening)
+        errors_of_rows = cls(residual, 0.0, steps, widening, divided)
         errors = errors_of_rows.or_fit(system) / (system.noise_ratio * widening)
         errors = errors[predicted] if predicted.any() else errors
         return replace(errors_of_rows, total=math.sqrt(float((errors**2).mean())))
@@ -106,19 +116,21 @@ class HeldOut:
         return np.where(np.isfinite(self.residual), self.residual, system.residual)
 
 
-def leave_out(system: LinearSystem) -> HeldOut:
+def leave_out(system: LinearSystem, divided: frozenset[str] = frozenset()) -> HeldOut:
     """Predicts every capture from all the others, by one weighted step from the full fit.
 
     Parameters
     ----------
     system
         Around the full fit.
+    divided
+        Captures that are predicted block by block at any rate.
 
     Returns
     -------
     HeldOut
-        Of segments that are split in blocks, every block is predicted from all else. A capture
-        that alone determines a constant stays in the fit.
+        Of a capture that alone determines a constant every block is predicted from all else, as far
+        as it has blocks; what then still determines one stays in the fit.
 
     Notes
     -----
@@ -134,7 +146,7 @@ def leave_out(system: LinearSystem) -> HeldOut:
     places = np.flatnonzero(np.any(system.matrix[:, :own_size] != 0.0, axis=0))
     weight = system.weights(system.reduced_chi2(system.residual))
     matrix = system.matrix[:, places]
-    unit = _units(system)
+    unit = _units(system, divided)
     weighted = matrix * weight[:, None]
     normal = weighted.T @ matrix + np.diag(system.prior_precision[places])
     unweighted = matrix.T @ matrix + np.diag(system.prior_precision[places])
@@ -142,6 +154,7 @@ def leave_out(system: LinearSystem) -> HeldOut:
     spread = np.diag(np.linalg.pinv(unit_diagonal(normal), hermitian=True))
     residual, widening = np.full(system.size, np.nan), np.ones(system.size)
     steps: dict[int, Array] = {}
+    carrying: set[str] = set()
     for number in sorted(set(unit.tolist())):
         in_unit = unit == number
         remaining = normal - weighted[in_unit].T @ matrix[in_unit]
@@ -153,6 +166,8 @@ def leave_out(system: LinearSystem) -> HeldOut:
             or grown.max() > policy.carried_growth
             or _loses_information(remaining, normal, policy)
         ):
+            if number < len(system.segments) and system.segments[number].blocks is not None:
+                carrying.add(system.segments[number].capture)
             continue
         step = (
             -(inverse @ ((slope - weighted[in_unit].T @ system.residual[in_unit]) / scale)) / scale
@@ -163,7 +178,9 @@ def leave_out(system: LinearSystem) -> HeldOut:
         widening[in_unit] = np.sqrt(1.0 + np.einsum("rk,kl,rl->r", rows, covariance, rows))
         steps[number] = np.zeros(own_size)
         steps[number][places] = step
-    return HeldOut.of(system, residual, steps, widening)
+    if carrying:
+        return leave_out(system, divided | carrying)
+    return HeldOut.of(system, residual, steps, widening, divided)
 
 
 def in_common(fits: Sequence[LinearSystem], held_out: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
@@ -179,7 +196,8 @@ def in_common(fits: Sequence[LinearSystem], held_out: Sequence[HeldOut]) -> tupl
     Returns
     -------
     tuple of HeldOut
-        Rows that one of them could not hold out count in none.
+        Rows that one of them could not hold out count in none. A capture that one of them predicts
+        block by block, all do.
 
     Notes
     -----
@@ -188,10 +206,15 @@ def in_common(fits: Sequence[LinearSystem], held_out: Sequence[HeldOut]) -> tupl
     that leaves more open: of each row the surest prediction's widening counts in all.
 
     """
+    divided = frozenset[str]().union(*(h.divided for h in held_out))
+    held_out = [
+        h if h.divided == divided else leave_out(system, divided)
+        for system, h in zip(fits, held_out, strict=True)
+    ]
     shared = np.all([np.isfinite(h.residual) for h in held_out], axis=0)
     widening = np.minimum.reduce([np.broadcast_to(h.widening, shared.shape) for h in held_out])
     return tuple(
-        HeldOut.of(system, np.where(shared, h.residual, np.nan), h.steps, widening)
+        HeldOut.of(system, np.where(shared, h.residual, np.nan), h.steps, widening, divided)
         for system, h in zip(fits, held_out, strict=True)
     )
 
@@ -246,8 +269,8 @@ def floor_factors(tried: LinearSystem) -> Array:
     return np.where(tried.counts > 0, factors, 1.0)
 
 
-def _units(system: LinearSystem) -> NDArray[np.int64]:
-    """Number of what is held out together, of every row [R]: a capture or a block of one.
+def _units(system: LinearSystem, divided: frozenset[str]) -> NDArray[np.int64]:
+    """Number of what is held out together, of every row [R]: a segment, or a block of a capture.
 
     Segments of one capture that are split alike are held out together.
     """
@@ -256,7 +279,7 @@ def _units(system: LinearSystem) -> NDArray[np.int64]:
     names = [s.capture for s in system.segments]
     first = len(names)
     for number, one in enumerate(system.segments):
-        if one.blocks is not None:
+        if one.blocks is not None and not (one.whole and one.capture not in divided):
             in_segment = segment == number
             units[in_segment] = first + names.index(one.capture) * _MOST_BLOCKS
             units[in_segment] += one.blocks[system.window[in_segment]]

@@ -65,9 +65,9 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
             cut = (_by_encoder(s, machine) for s in _cut(capture, machine))
             cut_segments += [_by_instruments(segment, gain) for segment in cut]
     kinds = {segment.kind for segment in cut_segments}
-    # a table that other captures can predict is held out as a whole
-    undivided = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
-    cut_segments = [replace(s, blocks=None) if s.kind in undivided else s for s in cut_segments]
+    # what other captures can predict is held out as a whole
+    whole = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
+    cut_segments = [replace(s, whole=s.kind in whole) for s in cut_segments]
     return tuple(
         replace(s, fixed={**s.fixed, **_shares_of_repeats(s, cut_segments), **_early(s)})
         for s in cut_segments

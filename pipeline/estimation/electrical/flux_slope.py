@@ -68,10 +68,14 @@ def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
     -------
     Slope or None
         At small current, where iron does not bend yet; None where the current of this axis does not
-        change, or goes together with something else.
+        change, or goes together with something else, or a drive that turns freely logs no encoder's
+        angle.
 
     Notes
     -----
+    An observer's frame is behind by α/ω_n² as the shaft gathers speed. On a free shaft α goes with
+    the q current, so that reads as p ψ Kt/(J ω_n²) of inductance, and no remainder shows it.
+
     v_d = R i_d + L_d di_d/dt - p L_q ω i_q and v_q = R i_q + L_q di_q/dt + p L_d ω i_d + Ke ω, ω of
     the shaft: nothing else in them knows p. A frame that is turned by δ + τ ω mixes δ + τ ω of the
     other voltage into each.
@@ -81,6 +85,8 @@ def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
     IEEE Std 1812-2014 (dq equations).
 
     """
+    if any(c.meta.test == "drive" and not c.has("theta_mech_rad") for c in rows.captures):
+        return None
     columns = {
         **rows.columns,
         "speed": rows.speed_rad_s,

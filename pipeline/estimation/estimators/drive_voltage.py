@@ -221,7 +221,8 @@ def _estimates(
 
     gains = instrument_uncertainties(rows.captures, ("voltage", "current", "temperature"))
     type_b = contributions(values, gains)
-    instant = _of_instant(rows, fit, magnet, chosen)
+    apart_s = _apart_s(rows)
+    instant = _of_instant(rows, fit, magnet, chosen, apart_s)
     turned = [] if turn is None else _of_turn(rows, fit, magnet, chosen, turn)
     per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
     paths = sorted(c.path for c in rows.captures)
@@ -229,6 +230,7 @@ def _estimates(
         f"{rows.voltage_v.size} windows, {np.std(fit.residuals):.2g} V left",
         allowed_for(chosen),
         unstated_note(rows.captures, ("voltage", "current")),
+        _apart_note(apart_s) if np.any(instant) and apart_s > 0.1 * rows.period_s else "",
     ]
     estimates = []
     for i, name in enumerate(GIVES):
@@ -311,19 +313,50 @@ def _moved(
     return moved
 
 
-def _of_instant(rows: VoltageRows, fit: LinearFit, magnet: float, chosen: Sequence[str]) -> Array:
-    """Standard uncertainties of Ke and R [2] for the instant that a commanded voltage is of.
+def _of_instant(
+    rows: VoltageRows, fit: LinearFit, magnet: float, chosen: Sequence[str], apart_s: float
+) -> Array:
+    """Standard uncertainties of Ke and R [2] for the instant that a voltage is of.
 
     On a free shaft R i and Ke tau dw/dt are nearly one column. A label says where in its hold a
-    voltage is meant, and no label fits a log that keeps every n-th row: within half a hold either
-    way (rectangular, GUM 4.3.7).
+    commanded voltage is meant, and no label fits a log that keeps every n-th row: within half a
+    hold either way (rectangular, GUM 4.3.7). And where the currents stand `apart_s` from the motion
+    that they make, as those of a log do that averages its rows, the voltages may do so too.
     """
-    if LATE in chosen or all(c.meta.voltage_kind == "measured" for c in rows.captures):
+    if LATE in chosen:
         return np.zeros(len(GIVES))
     held_s = max(hold_s(c.meta, rows.period_s, 0.0) for c in rows.captures)
-    late_v_s = float(fit.coefficients[0]) * 0.5 * held_s / np.sqrt(3.0)
+    measured = all(c.meta.voltage_kind == "measured" for c in rows.captures)
+    labelled_s = 0.0 if measured else 0.5 * held_s / np.sqrt(3.0)
+    late_v_s = float(fit.coefficients[0]) * np.hypot(labelled_s, apart_s)
     along = linear_fit(q_voltage(rows, magnet, chosen, {}), rows.columns[LATE])
     return late_v_s * along.coefficients[: len(GIVES)]
+
+
+def _apart_s(rows: VoltageRows) -> float:
+    """How far currents stand from the motion that they make, before it or after it, more than
+    scatter says [s]; 0 where something else than they moves the shaft.
+
+    Kt i_q = J dw/dt + b w + T_c sign(w) + T_0, with i_q taken from another instant by its rate.
+    """
+    speed = rows.speed_rad_s
+    columns = rows.columns["inductive"], rows.columns[LATE], speed, np.sign(speed)
+    design = np.column_stack([*columns, np.ones(speed.size)])
+    free = linear_fit(design, rows.current_a)
+    explained = np.std(free.residuals) < policy().inverter.free_share * np.std(rows.current_a)
+    if not (explained and free.full_rank):
+        return 0.0
+    sigma = np.ones(speed.size)
+    covariance, _ = cluster_covariance(design, free.residuals, sigma, rows.cluster)
+    beyond = float(free.coefficients[0]) ** 2 - float(covariance[0, 0])
+    return float(np.sqrt(max(beyond, 0.0)))
+
+
+def _apart_note(apart_s: float) -> str:
+    return (
+        f"currents are {1e3 * apart_s:.2g} ms off the motion that they make; whether voltages are "
+        "so too is not known: log voltage, current and angle of one instant"
+    )
 
 
 def _turn(rows: VoltageRows, magnet: float) -> Turn | None:

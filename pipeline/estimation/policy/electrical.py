@@ -217,6 +217,10 @@ class Inverter:
         why="an inverter that loses 1 or 2 % loses about half of it in them: some milliohm of a "
         "drive of 24 V and 12 A; no capture parts them from the winding",
     )  # fmt: skip
+    free_share: float = chosen(
+        0.1, "1", "share of a drive's current that its motion leaves open on a free shaft, at most",
+        why="free drives of four simulators leave 0.002 to 0.06, drives under a load 0.5 to 0.8",
+    )  # fmt: skip
     slower_share: float = chosen(
         0.75, "sample periods", "PWM period below which a log is slower than the PWM",
         why="a log of every second period is at a half, one of every period at 1",

@@ -101,6 +101,59 @@ def test_a_column_that_one_capture_carries_predicts_nothing_better():
     assert np.array_equal(np.isfinite(after.residual), system.group != 4)
 
 
+def in_quarters(system: LinearSystem) -> LinearSystem:
+    """The same, every capture held out whole where that is possible, else in quarters."""
+    quarters = np.arange(ROWS) * 4 // ROWS
+    one_each = [
+        replace(log(), capture=f"{number}.mcap", blocks=quarters, whole=True)
+        for number in range(len(system.labels))
+    ]
+    return replace(system, fit=replace(system.fit, segments=tuple(one_each)))
+
+
+def test_what_no_other_capture_tells_is_predicted_by_the_rest_of_its_own():
+    """The last capture's step of its own at half of its time is in none of the others."""
+    system = in_quarters(captures([0.0, 0.0, 0.0]))
+    last, late = system.group == 2, system.window >= ROWS // 2
+    own = (1.0 * last * np.where(system.window % 2, 1.0, -1.0))[:, None]
+    wider = replace(
+        system,
+        residual=system.residual + np.where(last & late, 5.0, 0.0),
+        columns=(*system.columns, Column("psi_wb", 1.0)),
+        matrix=np.column_stack([system.matrix, own]),
+        prior_precision=np.zeros(2),
+        prior_gradient=np.zeros(2),
+        model_column_count=2,
+    )
+    held = leave_out(wider)
+    assert held.divided == {"2.mcap"}
+    assert np.isfinite(held.residual).all()
+    assert np.std(held.residual[last]) > 2.0
+    assert held.residual[~last] == pytest.approx(
+        leave_out(wider, frozenset({"2.mcap"})).residual[~last]
+    )
+
+
+def test_a_capture_that_one_fit_predicts_by_parts_all_do():
+    """By the others the last capture is 3 off, by the rest of its own it is not."""
+    system = in_quarters(captures([0.0, 0.0, 3.0]))
+    own = 1.0 * (system.group == 2)
+    wider = replace(
+        system,
+        columns=(*system.columns, Column("psi_wb", 1.0)),
+        matrix=np.column_stack([system.matrix, own]),
+        prior_precision=np.zeros(2),
+        prior_gradient=np.zeros(2),
+        model_column_count=2,
+    )
+    alone = leave_out(system), leave_out(wider)
+    assert alone[0].divided == frozenset()
+    before, after = in_common((system, wider), alone)
+    assert before.divided == after.divided == {"2.mcap"}
+    assert np.mean(before.residual[own > 0]) < np.mean(alone[0].residual[own > 0]) - 0.1
+    assert after.total == pytest.approx(1.0, abs=0.1)
+
+
 @pytest.mark.parametrize(("times", "carries"), [(4.0, False), (6.0, True)])
 def test_a_capture_without_which_a_variance_grows_fivefold_is_not_held_out(times, carries):
     """Of three captures the first has 2 (times − 1) the information of one of the others, so that

@@ -83,8 +83,8 @@ def test_state_and_transducer_are_in_the_prediction():
 def test_beside_a_drive_s_log_it_is_held_out_as_a_whole():
     plan = (("torque_table", "torque_table", {}), ("torque_map", "torque_map", {}))
     both = recorded(plan, 3, bench=EXACTLY)[0]
-    assert [s.blocks is None for s in segments_of(both) if s.kind == "torque_table"] == [True]
-    assert [s.blocks is None for s in segments_of(table())] == [False]
+    assert [s.whole for s in segments_of(both) if s.kind == "torque_table"] == [True]
+    assert [s.whole for s in segments_of(table())] == [False]
 
 
 def segments_of(campaign: Campaign):

@@ -270,6 +270,36 @@ def test_where_in_its_hold_a_voltage_is_meant_is_doubt_of_a_free_shafts_resistan
     assert sum(parts) == pytest.approx(expected, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("late_rows", "kind"), [(0.5, "commanded"), (-0.5, "measured"), (0.0, "measured")]
+)
+def test_rows_that_are_means_before_their_angle_are_doubt_of_a_free_shafts_resistance(
+    late_rows: float, kind: str
+) -> None:
+    """Their currents tell: torque is half a row before or behind the acceleration that it makes."""
+    fine_s, row = 2.5e-4, 40
+    t = np.arange(0.0, 24.0, fine_s)
+    speed = 60.0 * np.sin(3.9 * t) + 15.0 * np.sin(17.0 * t) + 8.0 * np.sin(27.0 * t + 1.0)
+    iq = 0.01 * np.gradient(speed, t)
+    means = [
+        np.convolve(one, np.ones(row) / row, mode="same") for one in (0.2 * speed + 0.9 * iq, iq)
+    ]
+    kept = np.arange(2 * row, t.size - 2 * row, row)
+    vq, iq = (one[kept - round(late_rows * row)] for one in means)
+    rng = np.random.default_rng(3)
+    vq, iq = (one + u * rng.standard_normal(kept.size) for one, u in ((vq, 0.2), (iq, 5e-3)))
+    angle = trapezoid(t, speed)[kept]
+    log = capture(
+        "drive", voltage_kind=kind, pwm_hz=8e3, t_s=t[kept], theta_mech_rad=angle, vq_v=vq, iq_a=iq
+    )
+    resistance = estimates(ESTIMATOR, log)["r_phase_ohm"]
+    parts = [p.u for p in resistance.budget if p.source == "assumed:voltage_instant"]
+    expected = 0.2 * abs(late_rows) * row * fine_s / 0.01
+    assert sum(map(abs, parts)) == pytest.approx(expected, rel=0.1, abs=0.005)
+    assert abs(resistance.number - 0.9) < 2.0 * resistance.u
+    assert ("off the motion that they make" in resistance.note) == (late_rows != 0.0)
+
+
 def _with_iron_current(log: Capture, motor: Motor, siemens: float) -> Capture:
     """A simulated map, at whose terminals the iron takes siemens times the flux's voltage."""
     (table,) = log.tables

@@ -52,6 +52,17 @@ def test_without_pole_pairs_they_are_asked_for() -> None:
     assert "state pole_pairs" in found.note
 
 
+def test_a_drive_without_an_encoder_is_asked_for_its_angle() -> None:
+    """An observer's lag under acceleration would read as inductance."""
+    drive = stating(recorded(tests=("drive",)), MOTOR.pole_pairs)
+    blind = tuple(
+        replace(c, tables=tuple(t.drop("theta_mech_rad") for t in c.tables)) for c in drive.captures
+    )
+    found = of(replace(drive, captures=blind))
+    assert found.status == "not_identifiable"
+    assert "theta_mech_rad" in found.note
+
+
 def test_a_test_at_standstill_is_not_widened_by_a_rougher_value() -> None:
     found = of(recorded(tests=("lcr", "drive")))
     assert found.status == "not_identifiable"
