@@ -14,7 +14,7 @@ from pipeline.criticism.machine.model import STATE, UNSAMPLED, Model, Pieces, va
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.true_current import drive_current
-from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
+from pipeline.criticism.signals.true_state import at_true_angle, hold_s, motion_of, operating
 from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage, unresolved
 from pipeline.numerics.projection import projection, window_starts
 from pipeline.records.capture import Capture
@@ -110,7 +110,8 @@ def predicted(
     -----
     v_q = Im(R i + drops + dψ/dt + j ω_e ψ), ω = dθ/dt. A sample of the voltage is of an instant: of
     what drives a change of flux within a row it may show nothing, or much more than the row's mean.
-    So that part of dψ/dt has a share of its own that is not known.
+    So that part of dψ/dt has a share of its own that is not known. A commanded voltage acts later
+    than it is logged (`command_lead`).
 
     """
     turn = x.machine.pole_pairs * x.omega_rad_s * segment.ts_s
@@ -118,6 +119,9 @@ def predicted(
     if share := values[UNSAMPLED]:
         change = share * central(pieces.psi_wb, segment.ts_s)
         voltage = voltage + unresolved(segment.recorded["iq_a"]) * change
+    if segment.instrument.meter == "gain_commanded" and (lead := values["command_lead"]):
+        lead_s = lead * hold_s(segment, x.omega_rad_s, x.machine)
+        voltage = voltage + lead_s / segment.ts_s * np.gradient(voltage)
     voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)
     rows = [voltage.imag]
     if SPEED in segment.channels:
@@ -146,7 +150,7 @@ EQUATION = Equation(
     measured=measured,
     predicted=predicted,
     observes=Observes(
-        ("r_ohm", "lead_ohm", "ld_h", "lq_h", "psi_wb", *STATE),
+        ("r_ohm", "lead_ohm", "ld_h", "lq_h", "psi_wb", "command_lead", *STATE),
         hooks=frozenset({"flux", "drop"}),
         sensors=frozenset({"angle", "current", "voltage", "clock"}),
         form="affine",
