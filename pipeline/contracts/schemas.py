@@ -15,6 +15,7 @@ import polars as pl
 
 from pipeline.contracts.protocol import with_time
 from pipeline.contracts.requirements import requirements
+from pipeline.contracts.rotor_frame import rotor_frame
 from pipeline.physics.glossary import COLUMNS, METADATA, TESTS, Term, has_clock
 from pipeline.records.capture import Capture, CaptureMeta
 from pipeline.records.errors import CaptureError, merged
@@ -219,14 +220,15 @@ def check_columns(capture: Capture) -> None:
         raise CaptureError(
             "missing_column",
             f"{test} needs {needs}; the file has {', '.join(sorted(filled)) or 'none'}{blank}",
-            _remedy(test, filled),
+            _remedy(capture, filled),
         )
     if has_clock(test, capture.columns):
         _every_table_has_a_clock(capture)
 
 
-def _remedy(test: str, filled: frozenset[str]) -> str:
+def _remedy(capture: Capture, filled: frozenset[str]) -> str:
     """How a capture that lacks a column may come to one."""
+    test = capture.meta.test
     if test == "drive" and "torque_shaft_nm" in filled and filled.intersection(_MOTION):
         return (
             "where the drive computes that torque from its current, map it to iq_a "
@@ -240,11 +242,14 @@ def _remedy(test: str, filled: frozenset[str]) -> str:
             "drag by the balance of power, or the phase current that the controller knows (iq_a)"
         )
     if test in ("drive", "torque_map") and len(filled & {"ia_a", "ib_a", "ic_a"}) >= 2:
+        frames = (rotor_frame(table, capture.meta.pole_pairs) for table in capture.tables)
+        reasons = "; ".join(dict.fromkeys(frame.words for frame in frames))
         return (
             "of line currents without an electrical angle follow their size and the electrical "
-            "speed, and nothing of the motor: log theta_elec_rad, 0 with the magnet on phase a, on "
-            "the same clock, or id_a and iq_a, which the drive knows, with theta_mech_rad or "
-            "omega_mech_rad_s; turned without current, line voltages alone give psi_pm_wb"
+            f"speed, and nothing of the motor ({reasons}): log theta_elec_rad, 0 with the magnet "
+            "on phase a, on the same clock, or id_a and iq_a, which the drive knows, with "
+            "theta_mech_rad or omega_mech_rad_s; turned without current, line voltages alone give "
+            "psi_pm_wb"
         )
     return "record what is missing, or map it in conf/source"
 

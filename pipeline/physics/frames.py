@@ -52,6 +52,39 @@ def space_vector(a: ArrayLike, b: ArrayLike, c: ArrayLike) -> Complex:
     )
 
 
+def vector_of_phases(phases: Mapping[str, Array]) -> Complex:
+    """Stator-frame vector of two or three phase quantities, amplitude-invariant.
+
+    Parameters
+    ----------
+    phases
+        Quantities [n each, any unit] whose names hold the phase as the second letter: ia_a, ib_a,
+        ic_a, or va_v, vb_v, vc_v, or two of them.
+
+    Returns
+    -------
+    array [n], complex
+        α + jβ in the same unit, α on phase a. A third quantity that is not there is minus the sum
+        of the others.
+
+    Raises
+    ------
+    KeyError
+        There are fewer than two.
+
+    Examples
+    --------
+    >>> vector_of_phases({"ib_a": np.array([-1.0]), "ic_a": np.array([-1.0])}).round(9).tolist()
+    [(2+0j)]
+
+    """
+    columns = {name[1]: values for name, values in phases.items()}
+    if len(columns) < 2:
+        raise KeyError("a vector needs two phases")
+    absent = -sum(columns.values(), np.zeros(next(iter(columns.values())).shape))
+    return space_vector(*(columns.get(letter, absent) for letter in "abc"))
+
+
 def vector_of_lines(lines: Mapping[str, Array]) -> Complex:
     """Stator-frame vector of two or three line voltages, amplitude-invariant.
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -89,3 +91,78 @@ def test_without_an_electrical_angle_the_refusal_asks_for_one() -> None:
 def test_a_test_that_holds_no_dq_is_left_alone() -> None:
     capture, _ = validate(log("ia_a", "ib_a", "ic_a", test="open_circuit"), {})
     assert not capture.has("vq_v")
+
+
+RATE_HZ, PAIRS, OFFSET_RAD = 5000.0, 5, 0.8
+
+
+def motor(
+    omega: Callable[[np.ndarray], np.ndarray], late_s: float = 0.0, **stated: int
+) -> tuple[Capture, dict[str, np.ndarray]]:
+    """Phases and the shaft's angle of a salient motor at a speed [rad/s] of time, the magnet off
+    the angle's zero, voltages `late_s`; and its true dq currents.
+    """
+    t = np.arange(20000) / RATE_HZ
+    speed = omega(t)
+    theta = np.cumsum(speed) / RATE_HZ
+    i_d, i_q = 1.5 * np.sin(2.3 * t), 6.0 * np.sin(1.7 * t) + np.sign(speed)
+    electrical = PAIRS * speed
+    rates = [np.gradient(i, t) for i in (i_d, i_q)]
+    v_d = 0.2 * i_d + 4e-4 * rates[0] - electrical * 7e-4 * i_q
+    v_q = 0.2 * i_q + 7e-4 * rates[1] + electrical * (4e-4 * i_d + 8e-3)
+    rng = np.random.default_rng(3)
+    axis = PAIRS * theta + OFFSET_RAD
+    turn = np.exp(1j * axis)
+    vectors = {
+        "i": (i_d + 1j * i_q) * turn,
+        "v": (v_d + 1j * v_q) * turn * np.exp(1j * electrical * late_s),
+    }
+    columns = {"t_s": t, "theta_mech_rad": theta + rng.normal(0.0, 1e-4, t.size)}
+    for kind, unit in (("i", "a"), ("v", "v")):
+        for k, letter in enumerate("abc"):
+            seen = np.real(vectors[kind] * np.exp(-1j * k * THIRD))
+            columns[f"{kind}{letter}_{unit}"] = seen + rng.normal(0.0, 0.02, t.size)
+    meta = CaptureMeta("m", "drive", **stated)
+    capture = Capture("log.csv", "0" * 64, "verified", meta, (pl.DataFrame(columns),))
+    return capture, {"id_a": i_d, "iq_a": i_q}
+
+
+def both_ways(t: np.ndarray) -> np.ndarray:
+    """A speed that swings through both senses."""
+    return 90.0 * np.sin(1.1 * t) + 20.0 * np.sin(3.7 * t)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 2e-4])
+@pytest.mark.parametrize("stated", [{}, {"pole_pairs": PAIRS}])
+def test_the_back_emf_shows_an_angle_that_is_not_logged(
+    late_s: float, stated: dict[str, int]
+) -> None:
+    capture, true = motor(both_ways, late_s, **stated)
+    capture, findings = validate(capture, {})
+    for name, current in true.items():
+        error = capture.arrays(name)[name] - current
+        assert np.sqrt(np.mean(error**2)) < 0.05, name
+    (said,) = [f for f in findings if f.code == "rotor_frame"]
+    count, _, zero = said.message.split("made of the phases by ")[1].split()[:3]
+    assert int(count) == PAIRS
+    assert float(zero) == pytest.approx(OFFSET_RAD, abs=3e-3)
+
+
+def test_stated_pole_pairs_that_the_voltages_contradict_are_named() -> None:
+    with pytest.raises(CaptureError, match=r"voltages turn 5 times .* pole_pairs states 4"):
+        validate(motor(both_ways, pole_pairs=4)[0], {})
+
+
+def test_exchanged_phases_are_named() -> None:
+    capture, _ = motor(lambda t: both_ways(-t))
+    table = capture.tables[0].rename(
+        {"va_v": "vb_v", "vb_v": "va_v", "ia_a": "ib_a", "ib_a": "ia_a"}
+    )
+    with pytest.raises(CaptureError, match="exchange two phases"):
+        validate(replace(capture, tables=(table,)), {})
+
+
+def test_one_speed_does_not_show_the_angle() -> None:
+    """The current's voltage and a delay's are not parted from the magnet's."""
+    with pytest.raises(CaptureError, match="turn in both senses, at changing speed"):
+        validate(motor(lambda t: 60.0 + 0.0 * t)[0], {})

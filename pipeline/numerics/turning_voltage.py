@@ -1,0 +1,154 @@
+"""How often a motor's voltage turns for a turn of its shaft, and where its magnet is.
+
+A rotor with magnets induces a voltage that turns p times a turn, whatever a drive assumes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
+from pipeline.numerics.weak_rows import smooth_speed
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+HIGHEST = 64
+"""Most pole pairs that are looked for."""
+CLEAR = 2.0
+"""The strongest count is at least so many times the next. What does not turn with the shaft gives
+every count an amplitude by chance (Rayleigh); the largest of N of them is sqrt(2 ln N) of its unit,
+and twice that has a chance of N^-4. A part of a turn, which leaves neighbours alike, fails too.
+"""
+MOST_ROWS = 100_000
+"""Rows that a count is taken of; each has its angle, so that none is needed between them."""
+BLOCKS = 2000
+"""Most means that a recording is cut into; a few thousand say all, and take no time."""
+SPEED_WINDOW_S = 0.005
+"""Over which an angle's slope is taken: short against a motion, long against an encoder's steps."""
+
+
+class TurningVoltage(NamedTuple):
+    """Turns of the voltage for a turn of the shaft (below zero: against it), None where no count
+    is clear; and how much stronger it is than the next one.
+    """
+
+    pairs: int | None
+    strongest: int
+    lead: float
+
+
+class MagnetAngle(NamedTuple):
+    """Electrical angle of the magnet at the shaft's zero and its standard uncertainty [rad]."""
+
+    offset_rad: float
+    u_rad: float
+
+
+def speed_of(t_s: Array, theta_mech_rad: Array) -> Array:
+    """Speed [n, rad/s] of an angle [n, rad] at instants [n, s]."""
+    period = float(np.median(np.diff(t_s)))
+    return smooth_speed(t_s, theta_mech_rad, max(SPEED_WINDOW_S, 10.0 * period))
+
+
+def turning_voltage(volts: Complex, theta_mech_rad: Array, omega_rad_s: Array) -> TurningVoltage:
+    """The count at which a voltage turns with the shaft.
+
+    Parameters
+    ----------
+    volts : array [n, V], complex
+        Space vector in the stator's frame.
+    theta_mech_rad, omega_rad_s : array [n]
+        Angle and speed of the shaft.
+
+    Notes
+    -----
+    The back-EMF is jω p ψ e^{j(pθ + φ)}, so that |Σ v ω e^{−jkθ}| is largest at k = p. Counts of
+    either sense up to `HIGHEST` are compared; over less than a turn neighbours are not apart.
+
+    """
+    every = -(-volts.size // MOST_ROWS)
+    volts, omega, theta = volts[::every], omega_rad_s[::every], theta_mech_rad[::every]
+    weighted, back = volts * omega, np.exp(-1j * theta)
+    sizes: dict[int, float] = {}
+    for sense, step in ((1, back), (-1, back.conj())):
+        turned = weighted.copy()
+        for count in range(1, HIGHEST + 1):
+            turned *= step
+            sizes[sense * count] = abs(complex(np.mean(turned)))
+    first, second = sorted(sizes, key=lambda k: -sizes[k])[:2]
+    lead = sizes[first] / sizes[second] if sizes[second] > 0.0 else math.inf
+    known = sizes[first] > 0.0 and lead >= CLEAR
+    return TurningVoltage(first if known else None, first, lead)
+
+
+def magnet_angle(
+    volts: Complex,
+    current: Complex,
+    theta_mech_rad: Array,
+    omega_rad_s: Array,
+    pairs: int,
+) -> MagnetAngle:
+    """Where the back-EMF puts the magnet, against pole pairs times the shaft's angle.
+
+    Parameters
+    ----------
+    volts, current : array [n], complex
+        Space vectors in the stator's frame [V, A].
+    theta_mech_rad, omega_rad_s : array [n]
+        Angle and speed of the shaft.
+    pairs
+        Pole pairs.
+
+    Returns
+    -------
+    MagnetAngle
+        Its uncertainty is infinite where the recording does not part the back-EMF from what
+        currents and a delay make.
+
+    Notes
+    -----
+    In the frame that turns with pθ, v' = jω k e^{jφ} + z i' + ω (a i' + b i'*) + c ω² + d i'/|i'|,
+    with complex z (R and cross talk), a and b (mean inductance and saliency), c (a delay τ turns
+    the back-EMF by pωτ, which is even in ω, where φ is odd) and d (dead time). Means over blocks
+    are fitted, whose changes of current are slow. Rows of one sense of rotation and one speed leave
+    φ open, and u says so. What is left counts with its correlation.
+
+    """
+    size = max(1, volts.size // BLOCKS)
+    rows = volts.size // size * size
+
+    def means(values: NDArray[Any]) -> Complex:
+        blocks: Complex = values[:rows].reshape(-1, size).mean(axis=1)
+        return blocks
+
+    back = np.exp(-1j * pairs * theta_mech_rad)
+    i, omega = current * back, omega_rad_s
+    modulus = np.abs(i)
+    noise = 0.02 * float(modulus.max(initial=0.0)) + 1e-300
+    model = (
+        1j * omega,
+        i,
+        omega * i,
+        omega * i.conj(),
+        omega**2 + 0j,
+        i / np.hypot(modulus, noise),
+    )
+    columns = np.column_stack([means(column) for column in model])
+    y = means(volts * back)
+    design = np.block([[columns.real, -columns.imag], [columns.imag, columns.real]])
+    fit = linear_fit(design, np.concatenate([y.real, y.imag]))
+    width = len(model)
+    flux = complex(fit.coefficients[0], fit.coefficients[width])
+    if flux == 0.0 or not (math.isfinite(fit.u(0)) and math.isfinite(fit.u(width))):
+        return MagnetAngle(0.0, math.inf)
+    # the angle is the flux across its own direction, over its size
+    across = np.zeros(2 * width)
+    across[[0, width]] = -flux.imag / abs(flux) ** 2, flux.real / abs(flux) ** 2
+    variance = float(across @ fit.covariance @ across)
+    alike = max(autocorrelation_time(part) for part in np.split(fit.residuals, 2))
+    return MagnetAngle(float(np.angle(flux)), math.sqrt(max(variance * alike, 0.0)))
