@@ -13,7 +13,10 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.pole_pairs import BY_VOLTAGE, contradicts, voltages_say
 
 NAME = "pole_pairs_nameplate"
-NEEDS = "needs pole_pairs in the metadata and an open_circuit spin"
+NEEDS = (
+    "needs pole_pairs in the metadata, and an open_circuit spin or a log of theta_mech_rad with "
+    "theta_elec_rad or voltages of two phases"
+)
 
 
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
@@ -23,9 +26,9 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     counted = constants.best("pole_pairs")
     stated = sorted({c.meta.pole_pairs for c in campaign.captures if c.meta.pole_pairs})
     if counted is None and stated:
-        return _by_voltage(constants.best(BY_VOLTAGE), stated, campaign)
+        return _by_voltage(constants, stated, campaign)
     if counted is None or not stated:
-        return not_evaluated(NAME, NEEDS)
+        return not_evaluated(NAME, _needs(constants, campaign))
     wrong = [plate for plate in stated if plate != round(counted.number)]
     plates = ", ".join(str(plate) for plate in stated)
     words = f"{counted.number:g} electrical cycles a turn against a nameplate of {plates}"
@@ -35,13 +38,21 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     return Check(NAME, "fail", words, difference, 0.0, "1", _suspect(counted, wrong, campaign))
 
 
-def _by_voltage(seen: Estimate | None, stated: list[int], campaign: Campaign) -> Check:
+def _needs(constants: Constants, campaign: Campaign) -> str:
+    """What a count needs, and what is wrong with a capture that might have counted."""
+    paths = tuple(f"{c.path}: " for c in campaign.captures)
+    notes = [e.note for e in constants.all_of("pole_pairs") if e.note.startswith(paths)]
+    return "; ".join([NEEDS, *notes])
+
+
+def _by_voltage(constants: Constants, stated: list[int], campaign: Campaign) -> Check:
     """What voltages at speed say of the nameplate: they pass it where they exclude its neighbours.
 
     They tell pole pairs times an inductance, so an inductance that is off may be what is wrong.
     """
+    seen, needs = constants.best(BY_VOLTAGE), _needs(constants, campaign)
     if seen is None:
-        return not_evaluated(NAME, NEEDS)
+        return not_evaluated(NAME, needs)
     wrong = [plate for plate in stated if contradicts(seen, plate)]
     plates = ", ".join(str(plate) for plate in stated)
     words = f"a nameplate of {plates}; {voltages_say(seen)}"
@@ -55,7 +66,7 @@ def _by_voltage(seen: Estimate | None, stated: list[int], campaign: Campaign) ->
         return Check(NAME, "fail", words, seen.number - wrong[0], 0.0, "1", suspect)
     neighbours = {plate + step for plate in stated for step in (-1, 1)} - {0}
     if not all(contradicts(seen, plate) for plate in neighbours):
-        return not_evaluated(NAME, f"{words}, which holds for its neighbours too; {NEEDS}")
+        return not_evaluated(NAME, f"{words}, which holds for its neighbours too; {needs}")
     return Check(NAME, "pass", words, seen.number - stated[0], seen.u, "1")
 
 
