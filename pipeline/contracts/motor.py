@@ -22,6 +22,9 @@ CONSEQUENCE = {
     "winding": "the wye equivalent is published, which holds for both",
 }
 
+# Way back over way there, of all captures of a motor.
+RETURN_SHARE = 0.5
+
 # Saliency and iron's bend part the time constants of one rotor by far less.
 SETTLING_RATIO = 100.0
 
@@ -42,7 +45,11 @@ def agree(campaign: Campaign) -> tuple[Finding, ...]:
 
     """
     findings = [finding for key in NAMEPLATE for finding in _contradictions(campaign, key)]
-    for look in (_statements, _one_test_only, _cogging_directions, _torque_signs, _step_clocks):
+    looks = (
+        _statements, _one_test_only, _cogging_directions, _holding_directions, _torque_signs,
+        _step_clocks,
+    )  # fmt: skip
+    for look in looks:
         findings += look(campaign)
     return tuple(findings)
 
@@ -114,6 +121,21 @@ def _cogging_directions(campaign: Campaign) -> Iterator[Finding]:
             "direction_coverage",
             "the slow turn goes one way only: friction cannot be separated from cogging",
             "record the same turn the other way",
+        )
+
+
+def _holding_directions(campaign: Campaign) -> Iterator[Finding]:
+    captures = campaign.of("holding_current")
+    steps = [np.diff(angle[:: max(1, angle.size // 500)]) for angle in map(_angle, captures)]
+    forth = sum(float(step[step > 0.0].sum()) for step in steps)
+    back = sum(float(-step[step < 0.0].sum()) for step in steps)
+    if min(back, forth) < RETURN_SHARE * max(back, forth):
+        yield warning(
+            captures[0],
+            "direction_coverage",
+            "angles were held on the way in one direction only: friction cannot be separated from "
+            "cogging",
+            "hold the same angles on the way back as well",
         )
 
 

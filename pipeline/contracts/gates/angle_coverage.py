@@ -24,7 +24,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     By the test, with the options in brackets:
 
     - cogging and hand turn: travel of the shaft [turns]; less refuses.
-    - holding current: the same; one way only, less than `return_share` [1] back, warns.
+    - holding current: the same, between the outermost angles.
     - open circuit: electrical cycles of the back-EMF [`cycles`]; fewer refuse.
     - LCR table: different rotor angles modulo 180° electrical [`rotor_angles`], for
       L(θ) = mean + amplitude cos(2θ + phase) has three unknowns; fewer warn, one alone refuses,
@@ -45,19 +45,6 @@ def _whole_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
         f"the shaft passes {turned / TURN_RAD:.2f} of a turn",
         "record at least one mechanical turn",
     )
-
-
-def _both_directions(capture: Capture, options: Mapping[str, float]) -> Passed:
-    passed = _whole_turn(capture, options)
-    angle = _angles(capture)
-    angle = angle[np.isfinite(angle)]
-    travel = np.diff(angle[:: max(1, angle.size // 500)])
-    back, forth = -travel[travel < 0.0].sum(), travel[travel > 0.0].sum()
-    if min(back, forth) >= options["return_share"] * max(back, forth):
-        return passed
-    words = "angles were passed in one direction only: friction cannot be separated from cogging"
-    remedy = "hold the same angles on the way back as well"
-    return Passed(findings=(*passed.findings, warning(capture, CODE, words, remedy)))
 
 
 def _angles(capture: Capture) -> np.ndarray:
@@ -118,7 +105,7 @@ def _locked_angles(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 LOOKS: dict[str, Callable[[Capture, Mapping[str, float]], Passed]] = {
     "cogging": _whole_turn,
-    "holding_current": _both_directions,
+    "holding_current": _whole_turn,
     "hand_turn": _hand_turn,
     "open_circuit": _electrical_turn,
     "lcr": _locked_angles,
@@ -135,8 +122,6 @@ GATE = Gate(
         "cycles": 1.0,
         # L(theta) = mean + amplitude cos(2 theta + phase): three unknowns.
         "rotor_angles": 3.0,
-        # Way back over way there.
-        "return_share": 0.5,
     },
     follows=("stuck_channel", "wrapped_angle"),
 )

@@ -45,14 +45,6 @@ def test_nineteen_twentieths_of_a_turn(test: str, turns: float, expected: str) -
     assert said("angle_coverage", capture(test, theta_mech_rad=angle, iq_a=1.0)) == expected
 
 
-@pytest.mark.parametrize(("share", "expected"), [(0.48, "warned"), (0.52, "")])
-def test_half_of_the_way_back(share: float, expected: str) -> None:
-    there = np.linspace(0.0, 2.0 * TURN, 300)
-    back = np.linspace(there[-1], there[-1] - share * 2.0 * TURN, 150)
-    for angle in (np.concatenate([there, back]), -np.concatenate([there, back])):
-        assert said("angle_coverage", capture("holding_current", theta_mech_rad=angle)) == expected
-
-
 def test_a_slow_hand_turn_of_a_small_motor_has_a_back_emf() -> None:
     """Tens of millivolts are a voltage; none at all is none."""
     angle = np.linspace(0.0, 1.1 * TURN, 2000)

@@ -85,7 +85,6 @@ FAULTS: list[tuple[str, Capture, str]] = [
                             torque_shaft_nm=-np.sin(ROWS * 0.01)), "refused"),
     ("power_sign", capture("resistance", vab_v=1.0, ia_a=-np.ones(1000)), "refused"),
     ("angle_coverage", capture("cogging", theta_mech_rad=ROWS * 0.001), "refused"),
-    ("angle_coverage", capture("holding_current", theta_mech_rad=ROWS * 0.01, iq_a=1.0), "warned"),
     ("sampling_rate", capture("open_circuit", theta_mech_rad=ROWS * 0.4,
                               **three(VOLTS, 2.0 * ROWS)), "warned"),
     ("current_coverage", capture("heat_run", iq_a=5.0, id_a=0.0,

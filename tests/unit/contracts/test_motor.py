@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from pipeline.contracts import motor
-from pipeline.records.capture import Campaign
+from pipeline.records.capture import Campaign, Capture
 from tests.unit.contracts.test_gate_limits import capture
 
 
@@ -39,3 +40,25 @@ def test_what_captures_state_differently_is_named() -> None:
     assert [f.file for f in found] == ["c.csv"]
     assert "stated as 0.7, but as 0.5" in found[0].message
     assert "in b.csv and 1 more" in found[0].message
+
+
+def held(path: str, *ends: float) -> Capture:
+    """Angles held from one end to the next [turns]."""
+    ways = [np.linspace(a, b, 200) for a, b in pairwise(ends)]
+    return capture(
+        "holding_current", path=path, theta_mech_rad=2.0 * np.pi * np.concatenate(ways), iq_a=1.0
+    )
+
+
+def directions(*captures: Capture) -> list[str]:
+    found = motor.agree(Campaign("m", captures))
+    return [f.file for f in found if f.code == "direction_coverage"]
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_both_senses_of_holding_may_be_in_one_capture_or_in_two(sense: float) -> None:
+    """Less than half of the way back, over all captures of the motor, is one sense alone."""
+    assert directions(held("a", 0.0, sense), held("b", sense, 0.0)) == []
+    assert directions(held("a", 0.0, sense, 0.48 * sense)) == []
+    assert directions(held("a", 0.0, sense, 0.52 * sense)) == ["a"]
+    assert directions(held("a", 0.0, sense), held("b", 0.0, sense)) == ["a"]
