@@ -251,7 +251,7 @@ def _friction(
         note = "the shaft torque drives the motion; check the sign of torque_shaft_nm"
         return METHOD.missing(name, note)
     zero = float(backward.mean() + forward.mean()) / 2.0
-    speed = _speed(captures)
+    speed = mean_speed_rad_s(captures)
     share, words = _viscous_share(speed, known)
     value, u = value * (1.0 - share), u * (1.0 - share)
     note = (
@@ -294,11 +294,20 @@ def _variance_of_mean(
     return predicted, dof
 
 
-def _speed(captures: Sequence[Capture]) -> float | None:
-    """Mean speed of the slow turns [rad/s], either sense; None where no angle gives it.
+def mean_speed_rad_s(captures: Sequence[Capture]) -> float | None:
+    """Mean speed of slow turns, either sense; None where no angle gives it.
 
-    Rows without an angle are left out. The path is summed over a few hundred points, so that the
-    angle's noise does not lengthen it.
+    Parameters
+    ----------
+    captures
+        With or without `t_s` and `theta_mech_rad`; rows without an angle are left out.
+
+    Returns
+    -------
+    float or None
+        [rad/s]. The path is summed over a few hundred points, so that the angle's noise does not
+        lengthen it.
+
     """
     speeds = []
     for capture in captures:

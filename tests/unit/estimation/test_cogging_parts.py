@@ -87,13 +87,13 @@ def test_a_torque_that_drives_the_motion_is_no_friction() -> None:
 
 def test_the_speed_of_a_slow_turn_is_its_path_over_its_time() -> None:
     """Two captures of 0.5 and 0.7 rad/s; there and back counts as path; noise does not lengthen."""
-    assert cogging._speed([creeping(0.5), creeping(-0.7)]) == pytest.approx(0.6)
+    assert cogging.mean_speed_rad_s([creeping(0.5), creeping(-0.7)]) == pytest.approx(0.6)
     t = np.arange(5000) * 0.01
     noisy = 0.5 * t + 1e-4 * (-1.0) ** np.arange(5000)
     made = capture("cogging", t_s=t, theta_mech_rad=noisy, torque_shaft_nm=t)
-    assert cogging._speed([made]) == pytest.approx(0.5, rel=1e-3)
+    assert cogging.mean_speed_rad_s([made]) == pytest.approx(0.5, rel=1e-3)
     blind = capture("cogging", t_s=t, torque_shaft_nm=t)
-    assert cogging._speed([blind]) is None
+    assert cogging.mean_speed_rad_s([blind]) is None
 
 
 def line(order, amplitude=1.0, p=1e-9):
