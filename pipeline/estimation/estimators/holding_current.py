@@ -74,7 +74,9 @@ GIVES = (*COGGING, *BY_SENSE, RESIDUAL.name)
 METHOD = Method("holding_current", TERMS)
 AT_REST = "assumed:friction_at_rest"
 ONE_SIGMA = 0.6827
-"""Share of a normal distribution within one standard deviation."""
+"""Share of a normal distribution within one standard deviation: a single row where the motion turns
+does not count for all.
+"""
 EXPERIMENT = (
     "hold the rotor at many angles over a whole turn, once forward and once backward, "
     "logging theta_mech_rad and iq_a"
@@ -105,8 +107,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     positions = even_positions(turns)
     residuals = held_out_residual(turns, [line.order for line in [*lines, *slow]])
     rms_a = None if residuals is None else float(np.sqrt(np.mean(residuals**2)))
-    usual_a = None if residuals is None else float(np.quantile(np.abs(residuals), ONE_SIGMA))
-    waves = _Waves(captures, spec, lines, positions, rms_a, usual_a)
+    waves = _Waves(captures, spec, lines, positions, rms_a)
     estimates = _cogging(waves, known, campaign)
     if residuals is None or rms_a is None:
         note = f"angles do not cover the turn densely enough to hold sectors out; {EXPERIMENT}"
@@ -117,19 +118,22 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         parts = [METHOD.scatter(RESIDUAL.name, _u_rms(residuals)), *_gains(captures, rms_a)]
         notes = (note, unstated_note(captures, ("current",)))
         residual = METHOD.measured(RESIDUAL.name, rms_a, parts, captures, notes=notes)
-    friction = _friction(waves, turns, [*lines, *slow], known)
+    friction = _friction(captures, turns, spec, [*lines, *slow], known)
     return Fit((*estimates, *friction, residual), _evidence(turns, spec, lines))
 
 
 def _friction(
-    waves: _Waves, turns: Sequence[Turn], lines: Sequence[OrderLine], known: Constants
+    captures: Sequence[Capture],
+    turns: Sequence[Turn],
+    spec: Spectrum,
+    lines: Sequence[OrderLine],
+    known: Constants,
 ) -> tuple[Estimate, ...]:
     """What the mean current of whole turns is by sense: friction, and what does not turn with it.
 
     i = ±T_f/Kt + T_0/Kt + i_0. Of friction that differs by sense and of a constant load both senses
     show the same sum, so that half of the difference and the mean are all there is to know.
     """
-    captures, spec = waves.captures, waves.spectrum
     if len(set(spec.senses.tolist())) < 2:
         note = f"turns of one sense alone; {EXPERIMENT}"
         return tuple(METHOD.missing(name, note) for name in BY_SENSE)
@@ -152,31 +156,30 @@ def _friction(
         return friction, *torques, offset
     parts = propagate([(half, kt.budget), (kt.number, read)])
     torque = METHOD.measured(FRICTION_NM.name, half * kt.number, parts, captures, notes=notes)
-    return friction, torque, _coulomb(waves, torque, kt.number), offset
+    left = np.concatenate([_left(turns, spec, lines, n) for n in range(len(turns))])
+    scatter_nm = abs(kt.number) * float(np.quantile(np.abs(left), ONE_SIGMA))
+    return friction, torque, _coulomb(captures, torque, scatter_nm), offset
 
 
-def _coulomb(waves: _Waves, torque: Estimate, kt_nm_a: float) -> Estimate:
+def _coulomb(captures: Sequence[Capture], torque: Estimate, scatter_nm: float) -> Estimate:
     """Dry friction, by the `torque` of slow motion that both senses of arrival differ by.
 
     What a rotor at rest leans on is at most the friction of its motion. What it leans on less, by
     the chance of each arrival, shows as scatter from angle to angle, which is in the uncertainty
     whole; what it leans on less at every angle alike does not show, and the note says so.
     """
-    if waves.usual_a is None:
-        note = f"how friction repeats from angle to angle is not known; {EXPERIMENT}"
-        return METHOD.missing(COULOMB, note)
     if torque.number < -3.0 * torque.u:
         note = "the current is against the motion; check its sign, or that of theta_mech_rad"
         return METHOD.missing(COULOMB, note)
-    at_rest = Contribution(AT_REST, abs(kt_nm_a) * waves.usual_a, "B")
+    at_rest = Contribution(AT_REST, scatter_nm, "B")
     words = (
         "friction of slow motion, with Stribeck's excess in it; less than that if the rotor came "
         "to rest at every angle with a part of it unused"
     )
     notes = (words, torque.note)
     parts = [*torque.budget, at_rest]
-    drag = METHOD.measured(COULOMB, torque.number, parts, waves.captures, notes=notes)
-    speed = mean_speed_rad_s(waves.captures)
+    drag = METHOD.measured(COULOMB, torque.number, parts, captures, notes=notes)
+    speed = mean_speed_rad_s(captures)
     return drag if not speed else replace(drag, at={"omega_mech_rad_s": speed})
 
 
@@ -191,12 +194,17 @@ def _mean_of(
     places = [n for n, turn in enumerate(turns) if turn.sense == sense]
     means, within = spec.means[places], []
     for n in places:
-        residuals = turns[n].value - spec.means[n] - waveform(lines, turns[n].theta_rad)
+        residuals = _left(turns, spec, lines, n)
         within.append(float(np.var(residuals)) * autocorrelation_time(residuals) / residuals.size)
     u = float(np.sqrt(np.sum(within))) / len(places)
     if len(places) > 1:
         u = max(u, float(np.std(means, ddof=1)) / float(np.sqrt(len(places))))
     return float(np.mean(means)), u
+
+
+def _left(turns: Sequence[Turn], spec: Spectrum, lines: Sequence[OrderLine], n: int) -> Array:
+    """What the orders leave of the n-th turn's current [A]."""
+    return turns[n].value - spec.means[n] - waveform(lines, turns[n].theta_rad)
 
 
 def _gains(captures: Sequence[Capture], amps: float) -> tuple[Contribution, ...]:
@@ -257,8 +265,7 @@ def held_out_residual(turns: Sequence[Turn], orders: Sequence[int]) -> Array | N
 @dataclass(frozen=True, slots=True)
 class _Waves:
     """The q current over angle: its spectrum, the orders that stand out, the number of even
-    `positions` that it was held at, and what is left in held-out sectors [A]: rms, and as of two
-    thirds of the rows, so that the row where the motion turns does not count for all.
+    `positions` that it was held at, and what is left in held-out sectors [A rms].
     """
 
     captures: Sequence[Capture]
@@ -266,7 +273,6 @@ class _Waves:
     lines: Sequence[OrderLine]
     positions: int | None
     rms_a: float | None
-    usual_a: float | None
 
 
 def _cogging(waves: _Waves, known: Constants, campaign: Campaign) -> tuple[Estimate, ...]:
