@@ -28,8 +28,10 @@ from pipeline.estimation.uncertainty.instruments import (
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.records.capture import Array
-from pipeline.records.uncertainty import Budget
+from pipeline.records.uncertainty import Budget, Contribution
 
+WARM_FLUX, WARM_DROP, DRIFT = "warm speed", "warm current", "flux that drifts"
+UNMODELLED = "assumed:unmodelled_voltage"
 STANDSTILL = ("current_step", "lcr")
 """Methods that give inductances at standstill."""
 # What is looked for comes first; each nuisance counts where no column before it holds it.
@@ -40,18 +42,38 @@ COLUMNS = {
     ),
     "d": (
         (D_FLUX, "speed", "current", "inductive"),
-        (V_D, TURNED, "drop", D_FLUX_BENT, "cross flux", "zero"),
+        (V_D, TURNED, "drop", D_FLUX_BENT, "cross flux", "zero", WARM_FLUX, WARM_DROP, DRIFT),
     ),
 }
 
 
 class Slope(NamedTuple):
-    """Pole pairs times an inductance [H], its scatter [H], degrees of freedom, and its rows."""
+    """Pole pairs times an inductance, as voltages at speed have it.
+
+    Attributes
+    ----------
+    value_h, u_h, dof
+        Value and scatter [H], and degrees of freedom.
+    rows
+        What it is from.
+    share
+        Of the voltage, rms, that this inductance alone explains [1].
+
+    """
 
     value_h: float
     u_h: float
     dof: int
     rows: VoltageRows
+    share: float = np.inf
+
+    @property
+    def unmodelled(self) -> float:
+        """What effects that are not modelled make of it [1]: those of the voltage over its share.
+
+        Of the q inductance none: its voltage is most of the d voltage.
+        """
+        return policy().at_speed.unmodelled / self.share if self.share > 0.0 else np.inf
 
 
 def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
@@ -78,7 +100,8 @@ def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
 
     v_d = R i_d + L_d di_d/dt - p L_q ω i_q and v_q = R i_q + L_q di_q/dt + p L_d ω i_d + Ke ω, ω of
     the shaft: nothing else in them knows p. A frame that is turned by δ + τ ω mixes δ + τ ω of the
-    other voltage into each.
+    other voltage into each. Beside L_d the flux of the magnet makes most of v_q, and it changes
+    with temperature, which may not be logged: its drift with time is fitted beside.
 
     References
     ----------
@@ -92,6 +115,9 @@ def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
         "speed": rows.speed_rad_s,
         "current": rows.current_a,
         "q voltage": rows.voltage_v,
+        WARM_FLUX: rows.warm_speed_k_rad_s,
+        WARM_DROP: rows.warm_current_k_a,
+        DRIFT: rows.speed_rad_s * (rows.time_s - np.mean(rows.time_s)),
     }
     if V_D not in columns or _spans(columns, axis) < policy().aligned.least_d_share:
         return None
@@ -108,8 +134,12 @@ def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
         return None
     sigma = np.ones(voltage.size)
     covariance, dof = cluster_covariance(design, solution.residuals, sigma, rows.cluster)
-    sign = 1.0 if axis == "d" else -1.0
-    return Slope(sign * float(solution.coefficients[0]), float(covariance[0, 0] ** 0.5), dof, rows)
+    value = (1.0 if axis == "d" else -1.0) * float(solution.coefficients[0])
+    share = np.inf
+    if axis == "d":
+        alone = linear_fit(design[:, 1:], design[:, 0]).residuals
+        share = abs(value) * float(np.linalg.norm(alone) / np.linalg.norm(voltage))
+    return Slope(value, float(covariance[0, 0] ** 0.5), dof, rows, share)
 
 
 def _spans(columns: Mapping[str, Array], axis: str) -> float:
@@ -122,7 +152,7 @@ def _spans(columns: Mapping[str, Array], axis: str) -> float:
 
 
 def slope_budget(method: Method, axis: str, slope: Slope) -> Budget:
-    """Uncertainty of a slope: its scatter, and the gains of voltage and current.
+    """Uncertainty of a slope: its scatter, gains of voltage and current, and unmodelled effects.
 
     Parameters
     ----------
@@ -148,4 +178,6 @@ def slope_budget(method: Method, axis: str, slope: Slope) -> Budget:
         return np.array([slope.value_h * volts / amps])
 
     gains = contributions(scaled, instrument_uncertainties(captures, ("voltage", "current")))[0]
-    return (method.scatter(axis, slope.u_h, slope.dof), *gains)
+    other = abs(slope.value_h) * slope.unmodelled
+    unmodelled = (Contribution(f"{UNMODELLED}:{axis}", other, "B"),) if other > 0.0 else ()
+    return (method.scatter(axis, slope.u_h, slope.dof), *gains, *unmodelled)

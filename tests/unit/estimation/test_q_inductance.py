@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.estimation.estimators.q_inductance import AT_SPEED, ESTIMATOR
+from pipeline.estimation.estimators.q_inductance import ESTIMATOR
 from pipeline.estimation.registry import fit_all
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
@@ -36,7 +36,7 @@ def test_a_log_at_speed_gives_the_q_inductance_within_its_interval(test: str) ->
     assert found.status == "measured"
     assert found.number == pytest.approx(MOTOR.lq_h, rel=0.03)
     assert abs(found.number - MOTOR.lq_h) < 2.0 * found.u < 0.12 * MOTOR.lq_h
-    assert any(part.source == AT_SPEED for part in found.budget)
+    assert any(part.source == "assumed:lq_h_at_speed" for part in found.budget)
 
 
 def test_it_says_on_which_pole_pairs_it_rests_and_scales_with_them() -> None:
