@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.estimation.method import Method
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.turning_voltage import Complex, speed_of, turning_voltage
@@ -21,10 +22,6 @@ from pipeline.records.constants import Constants
 METHOD = Method("electrical_turns")
 SHAFT, ANGLE = "theta_mech_rad", "theta_elec_rad"
 PHASES, LINES = ("va_v", "vb_v", "vc_v"), ("vab_v", "vbc_v", "vca_v")
-COMPUTED_RAD = 1e-5
-"""Two angles that follow each other closer than this are one reading: an encoder of 18 bit has a
-step of 2e-5 rad.
-"""
 LEAST_ROWS = 100
 EXPERIMENT = (
     "record a drive with theta_mech_rad and theta_elec_rad, or with theta_mech_rad and voltages of "
@@ -174,7 +171,7 @@ def _words(seen: Sequence[Turns]) -> str:
             "no voltage in the stator's frame shows that the magnet does so too: of an angle that "
             "the drive computes, this is the number that it was set to"
         )
-    if any(t.apart_rad < COMPUTED_RAD for t in angles):
+    if any(t.apart_rad < policy().pole_pairs.one_reading_rad for t in angles):
         words.append(
             f"the two angles are one reading: where {SHAFT} was made of the electrical one, the "
             "count is the number that the drive was set to"

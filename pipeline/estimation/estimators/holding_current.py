@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -73,10 +74,6 @@ BY_SENSE = (FRICTION.name, FRICTION_NM.name, COULOMB, OFFSET.name)
 GIVES = (*COGGING, *BY_SENSE, RESIDUAL.name)
 METHOD = Method("holding_current", TERMS)
 AT_REST = "assumed:friction_at_rest"
-ONE_SIGMA = 0.6827
-"""Share of a normal distribution within one standard deviation: a single row where the motion turns
-does not count for all.
-"""
 EXPERIMENT = (
     "hold the rotor at many angles over a whole turn, once forward and once backward, "
     "logging theta_mech_rad and iq_a"
@@ -157,7 +154,9 @@ def _friction(
     parts = propagate([(half, kt.budget), (kt.number, read)])
     torque = METHOD.measured(FRICTION_NM.name, half * kt.number, parts, captures, notes=notes)
     left = np.concatenate([_left(turns, spec, lines, n) for n in range(len(turns))])
-    scatter_nm = abs(kt.number) * float(np.quantile(np.abs(left), ONE_SIGMA))
+    # as of one standard deviation: a single row where the motion turns does not count for all
+    within = math.erf(math.sqrt(0.5))
+    scatter_nm = abs(kt.number) * float(np.quantile(np.abs(left), within))
     return friction, torque, _coulomb(captures, torque, scatter_nm), offset
 
 

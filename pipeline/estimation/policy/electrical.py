@@ -162,6 +162,10 @@ class PolePairs:
         0.05, "1", "part of a nuisance that no column before it holds, to count",
         why="below it the nuisance is known by noise alone, and so would be what it is beside",
     )  # fmt: skip
+    one_reading_rad: float = chosen(
+        1e-5, "rad", "rms of two angles apart beside a slope, below which they are one reading",
+        why="an encoder of 18 bit has a step of 2e-5 rad, so that two sensors differ by more",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
