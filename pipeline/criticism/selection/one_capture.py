@@ -58,7 +58,10 @@ def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None
 
     Notes
     -----
-    What an effect moves is its part of the residual that the other parameters do not absorb.
+    What an effect moves is its part of the residual that the other parameters do not absorb, in
+    units of what is left there without it. So a capture that the effect explains wholly shows at
+    most its number of windows of it, and none beside the nuisance that the effect stands for. A
+    capture whose own deviance falls by more than a `tie` where the effect acts is moved by it, too.
 
     """
     fit = tried.fit
@@ -83,7 +86,8 @@ def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None
     moved[~acts[tried.group]] = 0.0
     power = np.bincount(of_group[tried.group], moved**2, len(names))
     gain = np.bincount(of_group[acts], (was - now)[acts], len(names))
-    could = power > fit.policy.selection.tie
+    tie = fit.policy.selection.tie
+    could = (power > tie) | (gain > tie)
     most = int(np.argmax(gain))
     could[most] = False
     alone = bool(could.any()) and float(gain[could].sum()) <= 0.0

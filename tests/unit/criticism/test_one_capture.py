@@ -64,6 +64,17 @@ def test_what_another_parameter_absorbs_moves_nothing():
     assert only_capture(system([3.0, 1.5, 1.5, 0.0], absorbed=True), LARGE, after) is None
 
 
+def test_a_capture_that_gains_by_itself_confirms_it():
+    """An encoder's zero in two logs that miss by thousands of floors, and in an open winding.
+
+    Beside the nuisance that it stands for it moves neither log, and the winding gains nothing.
+    """
+    made = system([3.0, 3.0, 1.5, 0.0])
+    made.matrix[:, 0] = np.where(made.group < 2, made.matrix[:, 1], 0.0)
+    before, after = np.array([9e3, 5e3, 1.0, 1.0]), np.array([1.0, 1.0, 2.0, 1.0])
+    assert only_capture(made, before, after) is None
+
+
 def test_a_capture_that_another_parameter_alone_moves_can_show_nothing():
     """A winding's resistance moves with a clock; its capture knows no time.
 
