@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from pipeline.estimation.electrical.voltage_rows import (
     Q_FLUX_BENT,
     Q_TURNED,
     VoltageRows,
+    voltage_rows,
 )
 from pipeline.estimation.electrical.voltage_turn import Q_FLUX, TURNED, V_D
 from pipeline.estimation.method import Method
@@ -27,7 +28,7 @@ from pipeline.estimation.uncertainty.instruments import (
 )
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import linear_fit
-from pipeline.records.capture import Array
+from pipeline.records.capture import Array, Capture
 from pipeline.records.uncertainty import Budget, Contribution
 
 WARM_FLUX, WARM_DROP, DRIFT = "warm speed", "warm current", "flux that drifts"
@@ -76,6 +77,33 @@ class Slope(NamedTuple):
         return policy().at_speed.unmodelled / self.share if self.share > 0.0 else np.inf
 
 
+def rows_of_slope(captures: Sequence[Capture], pole_pairs: int | None) -> VoltageRows | None:
+    """The window means of the captures that `flux_slope` can use.
+
+    Parameters
+    ----------
+    captures
+        Drives or torque maps.
+    pole_pairs
+        As `voltage_rows` has them.
+
+    Returns
+    -------
+    VoltageRows or None
+        Of captures with both axes, of drives those with an encoder's angle alone.
+
+    Notes
+    -----
+    An observer's frame is behind by α/ω_n² as the shaft gathers speed. On a free shaft α goes with
+    the q current, so that reads as p ψ Kt/(J ω_n²) of inductance, and no remainder shows it.
+
+    """
+    both = [c for c in captures if c.has("vd_v", "id_a")]
+    return voltage_rows(
+        [c for c in both if c.meta.test != "drive" or c.has("theta_mech_rad")], pole_pairs
+    )
+
+
 def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
     """Pole pairs times the inductance of one axis, by the voltage of the other one.
 
@@ -90,14 +118,10 @@ def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
     -------
     Slope or None
         At small current, where iron does not bend yet; None where the current of this axis does not
-        change, or goes together with something else, or a drive that turns freely logs no encoder's
-        angle.
+        change, or goes together with something else.
 
     Notes
     -----
-    An observer's frame is behind by α/ω_n² as the shaft gathers speed. On a free shaft α goes with
-    the q current, so that reads as p ψ Kt/(J ω_n²) of inductance, and no remainder shows it.
-
     v_d = R i_d + L_d di_d/dt - p L_q ω i_q and v_q = R i_q + L_q di_q/dt + p L_d ω i_d + Ke ω, ω of
     the shaft: nothing else in them knows p. A frame that is turned by δ + τ ω mixes δ + τ ω of the
     other voltage into each. Beside L_d the flux of the magnet makes most of v_q, and it changes
@@ -108,8 +132,6 @@ def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
     IEEE Std 1812-2014 (dq equations).
 
     """
-    if any(c.meta.test == "drive" and not c.has("theta_mech_rad") for c in rows.captures):
-        return None
     columns = {
         **rows.columns,
         "speed": rows.speed_rad_s,

@@ -6,10 +6,10 @@ from pipeline.estimation.electrical.flux_slope import (
     STANDSTILL,
     Slope,
     flux_slope,
+    rows_of_slope,
     slope_budget,
 )
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
-from pipeline.estimation.electrical.voltage_rows import voltage_rows
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Fit
@@ -68,7 +68,7 @@ def _slopes(campaign: Campaign, axis: str, pole_pairs: int) -> list[Slope]:
     """Of the drives and of the torque maps, where a current of this axis changes."""
     slopes = []
     for test in TESTS:
-        rows = voltage_rows([c for c in campaign.of(test) if c.has("vd_v", "id_a")], pole_pairs)
+        rows = rows_of_slope(campaign.of(test), pole_pairs)
         slope = flux_slope(rows, axis) if rows else None
         if slope is not None and slope.value_h > 0.0:
             slopes.append(slope)

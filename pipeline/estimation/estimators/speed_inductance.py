@@ -11,10 +11,10 @@ from pipeline.estimation.electrical.flux_slope import (
     STANDSTILL,
     Slope,
     flux_slope,
+    rows_of_slope,
     slope_budget,
 )
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
-from pipeline.estimation.electrical.voltage_rows import voltage_rows
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -42,10 +42,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     """
     del options
     stated = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
-    logs = [
-        voltage_rows([c for c in campaign.of(test) if c.has("vd_v", "id_a")], stated)
-        for test in ("drive", "torque_map")
-    ]
+    logs = [rows_of_slope(campaign.of(test), stated) for test in ("drive", "torque_map")]
     found = []
     for axis in COLUMNS:
         inductances = [known.by(method, f"l{axis}_h") for method in STANDSTILL]
