@@ -111,7 +111,7 @@ def predicted(
     v_q = Im(R i + drops + dψ/dt + j ω_e ψ), ω = dθ/dt. A sample of the voltage is of an instant: of
     what drives a change of flux within a row it may show nothing, or much more than the row's mean.
     So that part of dψ/dt has a share of its own that is not known. A commanded voltage acts later
-    than it is logged (`command_lead`).
+    than it is logged (`command_lead`), unless it is stated to be that of the row's middle.
 
     """
     turn = x.machine.pole_pairs * x.omega_rad_s * segment.ts_s
@@ -119,7 +119,8 @@ def predicted(
     if share := values[UNSAMPLED]:
         change = share * central(pieces.psi_wb, segment.ts_s)
         voltage = voltage + unresolved(segment.recorded["iq_a"]) * change
-    if segment.instrument.meter == "gain_commanded" and (lead := values["command_lead"]):
+    commanded = segment.instrument.meter == "gain_commanded"
+    if commanded and segment.instrument.timing != "centred" and (lead := values["command_lead"]):
         lead_s = lead * hold_s(segment, x.omega_rad_s, x.machine)
         voltage = voltage + lead_s / segment.ts_s * np.gradient(voltage)
     voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)

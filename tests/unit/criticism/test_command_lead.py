@@ -15,7 +15,7 @@ from tests.unit.criticism.machines import BASE, machine
 ROW_S, PWM_S, LEAD = 1e-3, 1e-4, 1.5
 
 
-def segment(kind: str):
+def segment(kind: str, timing: str):
     t = ROW_S * np.arange(4000)
     columns = {
         "t_s": t,
@@ -23,14 +23,14 @@ def segment(kind: str):
         "iq_a": 2.0 * np.sin(40.0 * t) + np.cos(200.0 * t),
         "vq_v": np.zeros(t.size),
     }
-    meta = CaptureMeta("m", "drive", voltage_kind=kind, pwm_hz=1.0 / PWM_S)
+    meta = CaptureMeta("m", "drive", voltage_kind=kind, voltage_timing=timing, pwm_hz=1.0 / PWM_S)
     one = cut(Capture("a.mcap", "0", "verified", meta, (pl.DataFrame(columns),)), machine())
     assert one is not None
     return one
 
 
-def voltage(kind: str, lead: float):
-    one, values = segment(kind), {**BASE, "command_lead": lead}
+def voltage(kind: str, lead: float, timing: str = "instant"):
+    one, values = segment(kind, timing), {**BASE, "command_lead": lead}
     model = Model(machine(), ())
     x = operate(one, one.recorded, model, values)
     return EQUATION.predicted(one, x, evaluate(model, x, values), model, values)[0]
@@ -45,8 +45,9 @@ def test_what_is_logged_acts_a_period_and_a_half_later():
     assert np.abs(moved).max() > 1e-3
 
 
-def test_a_measured_voltage_is_that_of_its_instant():
-    assert voltage("measured", LEAD) == pytest.approx(voltage("measured", 0.0))
+@pytest.mark.parametrize(("kind", "timing"), [("measured", "instant"), ("commanded", "centred")])
+def test_a_measured_voltage_is_that_of_its_instant_and_a_mean_that_of_its_middle(kind, timing):
+    assert voltage(kind, LEAD, timing) == pytest.approx(voltage(kind, 0.0, timing))
 
 
 def test_the_fit_leaves_it_free():
