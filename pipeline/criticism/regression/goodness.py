@@ -279,7 +279,7 @@ def _units(system: LinearSystem, divided: frozenset[str]) -> NDArray[np.int64]:
     names = [s.capture for s in system.segments]
     first = len(names)
     for number, one in enumerate(system.segments):
-        if one.blocks is not None and not (one.whole and one.capture not in divided):
+        if one.blocks is not None and (not one.whole or one.capture in divided):
             in_segment = segment == number
             units[in_segment] = first + names.index(one.capture) * _MOST_BLOCKS
             units[in_segment] += one.blocks[system.window[in_segment]]

@@ -230,7 +230,7 @@ def _estimates(
         f"{rows.voltage_v.size} windows, {np.std(fit.residuals):.2g} V left",
         allowed_for(chosen),
         unstated_note(rows.captures, ("voltage", "current")),
-        _apart_note(apart_s) if np.any(instant) and apart_s > 0.1 * rows.period_s else "",
+        _apart_note(apart_s, rows.period_s) if np.any(instant) else "",
     ]
     estimates = []
     for i, name in enumerate(GIVES):
@@ -352,7 +352,10 @@ def _apart_s(rows: VoltageRows) -> float:
     return float(np.sqrt(max(beyond, 0.0)))
 
 
-def _apart_note(apart_s: float) -> str:
+def _apart_note(apart_s: float, period_s: float) -> str:
+    """The note on `_apart_s`; empty for a small part of a row."""
+    if apart_s < policy().inverter.least_apart_rows * period_s:
+        return ""
     return (
         f"currents are {1e3 * apart_s:.2g} ms off the motion that they make; whether voltages are "
         "so too is not known: log voltage, current and angle of one instant"

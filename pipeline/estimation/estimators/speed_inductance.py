@@ -29,8 +29,9 @@ WORDS = "pole pairs by voltages at speed over inductances at standstill, no whol
 TERM = Term(BY_VOLTAGE, "1", WORDS, "constant", 0.0, 1e4)
 METHOD = Method("speed_inductance", (TERM,))
 EXPERIMENT = (
-    "record current_step or lcr captures, and a drive or torque_map with vd_v, vq_v, id_a and "
-    "iq_a in which currents change at speed; an open_circuit spin counts pole pairs better"
+    "record current_step or lcr captures, and a torque_map with vd_v, vq_v, id_a and iq_a, or a "
+    "drive with theta_mech_rad too, in which currents change at speed; an open_circuit spin counts "
+    "pole pairs better"
 )
 
 

@@ -239,6 +239,10 @@ class Inverter:
         why="seven free drives of three simulators left 0.002 to 0.056, three drives under a load "
         "0.52 to 0.79",
     )  # fmt: skip
+    least_apart_rows: float = chosen(
+        0.1, "rows", "distance of currents from the motion that they make, to be in a note",
+        why="less is in the uncertainty as well, and no reader would act on it",
+    )  # fmt: skip
     slower_share: float = chosen(
         0.75, "sample periods", "PWM period below which a log is slower than the PWM",
         why="a log of every second period is at a half, one of every period at 1",

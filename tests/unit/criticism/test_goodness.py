@@ -52,6 +52,18 @@ def captures(levels: list[float], seed: int = 4) -> LinearSystem:
     )
 
 
+def with_column(system: LinearSystem, column) -> LinearSystem:
+    """The same with a second constant, of a column [R] of its own."""
+    return replace(
+        system,
+        columns=(*system.columns, Column("psi_wb", 1.0)),
+        matrix=np.column_stack([system.matrix, column]),
+        prior_precision=np.zeros(2),
+        prior_gradient=np.zeros(2),
+        model_column_count=2,
+    )
+
+
 def u(system: LinearSystem) -> float:
     return float(known_by(system, leave_out(system), np.ones(1)).u[0])
 
@@ -85,14 +97,7 @@ def test_a_column_that_one_capture_carries_predicts_nothing_better():
     """It keeps the worst capture in the fit, which is no prediction: rows count in both or none."""
     system = captures([0.0, 0.0, 0.0, 0.0, 3.0])
     own = np.random.default_rng(9).standard_normal(system.size) * (system.group == 4)
-    wider = replace(
-        system,
-        columns=(*system.columns, Column("psi_wb", 1.0)),
-        matrix=np.column_stack([system.matrix, own]),
-        prior_precision=np.zeros(2),
-        prior_gradient=np.zeros(2),
-        model_column_count=2,
-    )
+    wider = with_column(system, own)
     alone = leave_out(system), leave_out(wider)
     assert alone[1].total < 0.9 * alone[0].total
     before, after = in_common((system, wider), alone)
@@ -116,15 +121,8 @@ def test_what_no_other_capture_tells_is_predicted_by_the_rest_of_its_own():
     system = in_quarters(captures([0.0, 0.0, 0.0]))
     last, late = system.group == 2, system.window >= ROWS // 2
     own = (1.0 * last * np.where(system.window % 2, 1.0, -1.0))[:, None]
-    wider = replace(
-        system,
-        residual=system.residual + np.where(last & late, 5.0, 0.0),
-        columns=(*system.columns, Column("psi_wb", 1.0)),
-        matrix=np.column_stack([system.matrix, own]),
-        prior_precision=np.zeros(2),
-        prior_gradient=np.zeros(2),
-        model_column_count=2,
-    )
+    stepped = replace(system, residual=system.residual + np.where(last & late, 5.0, 0.0))
+    wider = with_column(stepped, own)
     held = leave_out(wider)
     assert held.divided == {"2.mcap"}
     assert np.isfinite(held.residual).all()
@@ -138,14 +136,7 @@ def test_a_capture_that_one_fit_predicts_by_parts_all_do():
     """By the others the last capture is 3 off, by the rest of its own it is not."""
     system = in_quarters(captures([0.0, 0.0, 3.0]))
     own = 1.0 * (system.group == 2)
-    wider = replace(
-        system,
-        columns=(*system.columns, Column("psi_wb", 1.0)),
-        matrix=np.column_stack([system.matrix, own]),
-        prior_precision=np.zeros(2),
-        prior_gradient=np.zeros(2),
-        model_column_count=2,
-    )
+    wider = with_column(system, own)
     alone = leave_out(system), leave_out(wider)
     assert alone[0].divided == frozenset()
     before, after = in_common((system, wider), alone)
