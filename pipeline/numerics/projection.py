@@ -199,5 +199,7 @@ def projection(
             functions.append(window * wave)
             valid.append(enough)
     stacked = np.stack(functions, axis=1)
-    stacked /= np.sqrt((stacked**2).sum(axis=2, keepdims=True))
+    norm = np.sqrt((stacked**2).sum(axis=2, keepdims=True))
+    # the sine of an angle that stays at zero
+    stacked = np.divide(stacked, norm, out=np.zeros(stacked.shape), where=norm > 0.0)
     return Projection(starts, stacked, np.array(tags), np.stack(valid, axis=1))

@@ -58,7 +58,8 @@ def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> fl
     -----
     Third differences of white noise have the variance 20 σ². Their mean square is taken in blocks,
     and a low quantile over the blocks keeps steps and bursts out, a higher one for a `steady`
-    signal; what a quantile of chi-square is below its mean is made up for.
+    signal; what a quantile of chi-square is below its mean is made up for. Where shorter blocks
+    have far less, the signal steps in most of the longer ones.
 
     References
     ----------
@@ -72,14 +73,24 @@ def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> fl
     if third.size == 0:
         return 0.0
     width = min(policy.block, max(third.size // policy.blocks, policy.shortest_block), third.size)
+    quantile = policy.steady if steady else policy.quiet
+    level = _of_blocks(third, width, quantile)
+    if not steady:
+        shorter = range(1, (width // policy.shortest_block).bit_length())
+        clean = min((_of_blocks(third, width >> n, quantile) for n in shorter), default=level)
+        level = clean if clean * policy.steps_growth < level else level
+    return max(level, _rounding(third) / math.sqrt(12.0))
+
+
+def _of_blocks(third: Array, width: int, quantile: tuple[float, ...]) -> float:
+    """Standard deviation of white noise whose third differences [n] have the mean square that a
+    share of all blocks stays below.
+    """
     blocks = third[: third.size // width * width].reshape(-1, width)
     # Wilson and Hilferty's quantile of chi-square with the samples that third differences leave
-    spread = 2.0 / (9.0 * width / 2.2)
-    quantile, deviate = policy.steady if steady else policy.quiet
-    share = (1.0 - spread + deviate * math.sqrt(spread)) ** 3
-    power = float(np.quantile((blocks**2).mean(axis=1), quantile))
-    level = math.sqrt(power / (20.0 * share))
-    return max(level, _rounding(third) / math.sqrt(12.0))
+    spread, (share, deviate) = 2.0 / (9.0 * width / 2.2), quantile
+    below = (1.0 - spread + deviate * math.sqrt(spread)) ** 3
+    return math.sqrt(float(np.quantile((blocks**2).mean(axis=1), share)) / (20.0 * below))
 
 
 def slow_noise(signal: Array, longest: float, policy: SensorNoise) -> float:

@@ -27,6 +27,11 @@ class SensorNoise:
         (0.3, -0.5244), "1", "quantile over the blocks, and the normal variable's value there",
         why="a low one, since steps and bursts only add",
     )  # fmt: skip
+    steps_growth: float = chosen(
+        1.5, "1", "noise of longer blocks over that of shorter ones from which on they have steps",
+        why="of white noise both are the same to a few percent; levels of fifty rows made it ten "
+        "to forty",
+    )  # fmt: skip
     motion_growth: float = derived(
         4.0, "1", "growth of a noise with means of twice the length that no noise has",
         source="a loop of second order falls by 40 dB a decade; a smooth motion grows by eleven",

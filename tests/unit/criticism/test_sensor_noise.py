@@ -377,3 +377,18 @@ def test_a_rounding_counts_by_the_inertia_that_it_goes_through():
     group, _, valid, groups = row_index(segment)
     torque = group[valid] == groups.index(("torque_shaft_nm", 0))
     assert current_floors_grown(fit)[0][torque] == pytest.approx(0.5, rel=0.02)
+
+
+@pytest.mark.parametrize("rows", [24, 50, 75])
+def test_steps_in_every_block_are_no_noise(rows):
+    """A rig that holds each level for fifty rows: no block of 48 differences is free of steps."""
+    rng = np.random.default_rng(rows)
+    levels = np.repeat(rng.normal(0.0, 10.0, 6000 // rows), rows)
+    found = sensor_noise(levels + rng.normal(0.0, 0.1, levels.size), DEFAULT.sensor_noise)
+    assert 0.09 < found < 0.14
+
+
+def test_white_noise_is_as_loud_in_short_blocks():
+    rng = np.random.default_rng(3)
+    found = [sensor_noise(rng.normal(0.0, 1.0, 300), DEFAULT.sensor_noise) for _ in range(200)]
+    assert np.mean(found) == pytest.approx(1.0, abs=0.05)
