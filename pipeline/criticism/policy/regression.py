@@ -74,6 +74,10 @@ class GaussNewton:
         "computed anew",
         why="a stale column costs steps and no accuracy",
     )  # fmt: skip
+    inertia_step: float = chosen(
+        0.5, "1", "share of the inertia beyond which a step that lowers it may be in 1/J",
+        why="the tangent in J reaches zero at twice the inertia that is sought",
+    )  # fmt: skip
     least_inertia: float = chosen(
         1e-3, "machine scales", "least inertia",
         why="far below any motor's; at zero a coasting shaft's equation divides by nothing",

@@ -131,6 +131,37 @@ class Fit:
         moves = zip(columns, step.tolist(), strict=True)
         return self.at({c.name: self.values[c.name] + change for c, change in moves})
 
+    def moved_over_inertia(self, columns: Sequence[Column], step: Array) -> Fit | None:
+        """The fit after a step that is taken in 1/J and in drags over J.
+
+        Parameters
+        ----------
+        columns
+            Parameters that move.
+        step
+            Change of each, as for `moved`.
+
+        Returns
+        -------
+        Fit or None
+            None of a step that takes no large share of J: both ways lead to the same.
+
+        Notes
+        -----
+        A free shaft's acceleration is linear in these. From beyond twice the inertia that is sought
+        the tangent in J leads below zero.
+
+        """
+        moves = {c.name: change for c, change in zip(columns, step.tolist(), strict=True)}
+        inertia = self.values["j_kgm2"]
+        shrinks = -moves.get("j_kgm2", 0.0) / inertia
+        if shrinks <= self.policy.fit.inertia_step:
+            return None
+        moved = {name: self.values[name] + change for name, change in moves.items()}
+        of_drags = [c.name for c in columns if _is_drag(c)]
+        moved |= {n: (moved[n] + shrinks * self.values[n]) / (1.0 + shrinks) for n in of_drags}
+        return self.at({**moved, "j_kgm2": inertia / (1.0 + shrinks)})
+
     @property
     def alone(self) -> Fit:
         """The model and its values without segments and floors, as a segment's work takes it."""
@@ -141,6 +172,15 @@ class Fit:
         """What the rows of every segment are held against."""
         pairs = zip(self.sigma, self.tolerance or [None] * len(self.sigma), strict=True)
         return tuple(Floor(sigma, self.near, tolerance) for sigma, tolerance in pairs)
+
+
+def _is_drag(column: Column) -> bool:
+    """Whether a parameter is in the shaft's equation over the inertia."""
+    if column.effect is None:
+        return column.name == "b_nm_s_rad"
+    parameters = {p.name: p for p in column.effect.parameters}
+    parameter = parameters.get(column.name.partition(".")[2])
+    return column.effect.torque is not None and (parameter is None or parameter.amplitude)
 
 
 def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Array, ...]:

@@ -48,6 +48,9 @@ class Score:
     clears
         Whether it removes most of what would be reported as a remainder, and so matters at any
         size; never for a coupling, which noise of an encoder in a speed loop looks like.
+    other_inertia
+        Whether it asks for an inertia so far from the fit's that the noise floors, made with that
+        one, do not tell its share; its refit does.
     confounder
         An effect that explains the same better, but is too small to matter.
     policy
@@ -64,6 +67,7 @@ class Score:
     size: float
     below_floor: float = 0.0
     clears: bool = False
+    other_inertia: bool = False
     confounder: str | None = None
     policy: Selection = field(kw_only=True)
 
@@ -83,7 +87,7 @@ class Score:
         """
         effect = self.candidate.effect
         below = self._below_floor and effect.hook != "sensor" and effect.discriminator is None
-        helps = self.share >= self.policy.least_share or below
+        helps = self.share >= self.policy.least_share or below or self.other_inertia
         return self.fall > self.penalty and self.matters and helps and self.confounder is None
 
     @property
@@ -221,18 +225,21 @@ class _Scoring:
             if parameters[name].negligible > 0
         ]
         after = FitQuality.of(system, np.concatenate([self.model_columns, live]), end)
-        names = self._names(self.model_columns)
+        moves = end.step[: self.model_columns.size].tolist()
+        of_model = dict(zip(self._names(self.model_columns), moves, strict=True))
+        inertia = system.fit.values["j_kgm2"]
         return Score(
             candidate,
             self.before.deviance - after.deviance,
             0.0,
             step,
-            dict(zip(names, end.step[: self.model_columns.size].tolist(), strict=True)),
+            of_model,
             share_of(system, candidate.effect, self.before, after),
             max(sizes, default=math.inf),
             fall_below_floor(system, self.before.reduced_chi2, after.reduced_chi2),
             candidate.effect.discriminator is None
             and clears(system, self.significant, self.before.reduced_chi2, after.reduced_chi2),
+            abs(of_model.get("j_kgm2", 0.0)) > system.policy.fit.inertia_step * inertia,
             policy=system.policy.selection,
         )
 

@@ -13,6 +13,7 @@ import pytest
 from pipeline.criticism.diagnosis import base_fit
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.columns import base_columns, effect_columns
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.gauss_newton import (
     first_fit,
@@ -200,3 +201,23 @@ def test_a_winding_is_not_given_up_for_what_a_drag_lacks() -> None:
         for q in ([60.0, 0.5, 0.01], [4.0, 6300.0, 13000.0])
     )
     assert summed_error(drag_lacks) < summed_error(winding_lost)
+
+
+def test_a_step_from_far_too_large_an_inertia_is_one_of_its_reciprocal():
+    """The acceleration of a free shaft is linear in 1/J, b/J and Tc/J: one such step is exact."""
+    model = Model(machine(), (effects()["coulomb_friction"],))
+    names = ("j_kgm2", "b_nm_s_rad", "coulomb_friction.torque_nm")
+    wanted, begun = np.array([4e-5, 2e-5, 8e-3]), np.array([9e-4, 1e-4, 1e-3])
+    fit = Fit((), model, {**BASE, **dict(zip(names, begun, strict=True))}, (), BASE)
+    columns = [c for c in base_columns(fit.machine, {}) if c.name in names]
+    columns += effect_columns(model.effects[0], model)
+    over = np.concatenate([[1.0 / wanted[0]], wanted[1:] / wanted[0]])
+    before = np.concatenate([[1.0 / begun[0]], begun[1:] / begun[0]])
+    shrinks = -(begun[0] ** 2) * (over[0] - before[0])
+    drags = begun[0] * (over - before)[1:] + begun[1:] * shrinks / begun[0]
+    step = dict(zip(names, [shrinks, *drags], strict=True))
+    moved = fit.moved_over_inertia(columns, np.array([step[c.name] for c in columns]))
+    assert moved is not None
+    assert [moved.values[name] for name in names] == pytest.approx(wanted.tolist())
+    small = np.array([0.1 * step[c.name] / 10.0 for c in columns])
+    assert fit.moved_over_inertia(columns, small) is None

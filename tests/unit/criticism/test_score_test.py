@@ -40,6 +40,10 @@ from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, ma
             {"below_floor": 40.0, "effect": "compliance"},
             "what it would explain lies below the noise floor",
         ),
+        (
+            {"other_inertia": True},
+            "refitted, it does not hold on captures held out, or may be zero",
+        ),
     ],
 )
 def test_what_an_effect_lacks_is_said(what, told):
