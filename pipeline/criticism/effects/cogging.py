@@ -6,6 +6,8 @@ import numpy as np
 
 from pipeline.criticism.effect import Array, Effect, Machine, Operating, Parameter, Values
 
+_PHASES = 3
+
 
 def _torque(x: Operating, q: Values) -> Array:
     drag = np.zeros(x.omega_rad_s.shape)
@@ -48,9 +50,11 @@ def _unverified_orders(machine: Machine) -> set[int]:
 
 
 def _is_multiple(order: float, machine: Machine) -> bool:
-    """Whether an order [1/turn] is a multiple of the pole pairs or the slots; once is unbalance."""
-    bases = machine.pole_pairs, machine.slots
-    return order > 1 and any(base and order % base == 0 for base in bases)
+    """Whether an order [1/turn] is a multiple of the pole pairs or the slots; once is unbalance.
+    Slots that are not stated are some multiple of the three phases.
+    """
+    bases = machine.pole_pairs, machine.slots or _PHASES
+    return order > 1 and any(order % base == 0 for base in bases)
 
 
 def _expand(machine: Machine) -> tuple[Parameter, ...]:

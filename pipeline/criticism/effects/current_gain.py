@@ -47,8 +47,8 @@ EFFECT = Effect(
     parameters=(
         Parameter("cosine", "1", 0.01, 0.001, low=-0.3, high=0.3),
         Parameter("sine", "1", 0.01, 0.001, low=-0.3, high=0.3),
-        # of itself it would be the gain of all sensors alike
-        Parameter("mean", "1", 0.01, 0.0, low=-0.3, high=0.3),
+        # of itself it would be the gain of all sensors alike, which are within some percent
+        Parameter("mean", "1", 0.01, 0.0, low=-0.3, high=0.3, usual=(0.0, 0.03)),
         choice("shunts", (0.0, 1.0, 2.0, 3.0)),
         choice("bench", (0.0, 1.0)),
     ),

@@ -29,8 +29,8 @@ from pipeline.criticism.machine.coenergy import (
 from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import Array, Complex, Noted, Operating, Values
 from pipeline.criticism.parameter import WARMING, Machine, Parameter
-from pipeline.criticism.policy.captures import Priors
 from pipeline.criticism.policy.policy import Policy
+from pipeline.criticism.policy.priors import Priors
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +103,7 @@ BASE: tuple[Constant, ...] = (
     Constant("zero_beta_a", "A", "β offset of the shunts", 0.0, "state", "current_a", "zero_a"),
     Constant("zero_angle_rad", "rad", "electrical zero of the drive's encoder", hook="state"),
     Constant("late_angle_s", "s", "drive's encoder behind its currents", 0.0, "state", "period_s"),
+    Constant("bend_angle_s2", "s²", "drive's frame behind the shaft by acceleration", hook="state"),
     _gain("gain_current", words="gain of the drive's current sensors"),
     _gain("gain_current_bench", words="gain of the bench's ammeter"),
     _gain("gain_voltage", words="gain of the bench's voltmeters"),

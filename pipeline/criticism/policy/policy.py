@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.criticism.policy.captures import Cutting, Priors, Tables
+from pipeline.criticism.policy.captures import Cutting, Tables
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.policy.discovery import Discovery
 from pipeline.criticism.policy.machine import Ripple, Torsion
+from pipeline.criticism.policy.priors import Priors
 from pipeline.criticism.policy.regression import GaussNewton, Goodness, MainsHum, NoiseFloors
 from pipeline.criticism.policy.selection import OrderScan, Selection
 from pipeline.criticism.policy.sensors import SensorNoise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -52,8 +53,13 @@ def base_columns(machine: Machine, scales: Mapping[str, float]) -> list[Column]:
         Orders of magnitude by name.
 
     """
-    sizes = {c.name: machine.scales.get(c.scale, 1.0) for c in base_of(machine)}
-    return [Column(name, 1e-3 * scales.get(name, size)) for name, size in sizes.items()]
+    columns = []
+    for constant in base_of(machine):
+        size = scales.get(constant.name, machine.scales.get(constant.scale, 1.0))
+        # a nuisance may be usual at far less than a thousandth of its scale
+        usual = constant.u(machine.policy.priors) or math.inf
+        columns.append(Column(constant.name, min(1e-3, usual) * size))
+    return columns
 
 
 def effect_columns(

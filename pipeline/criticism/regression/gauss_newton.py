@@ -25,6 +25,7 @@ from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.noise_floors import rough_floor
 from pipeline.criticism.residuals.segments import sparse
+from pipeline.criticism.signals.angle_sensor import both_axes
 
 _SIDES = (
     ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),
@@ -92,7 +93,7 @@ def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
             tried, promised = _tried(system, step, halvings)
             gain = system.deviance - tried.deviance
             if fresh and gain < policy.kept_share * promised:
-                tried = _over_the_ridge(system, step, tried)
+                tried = _over_the_ridge(system, step, _over_inertia(system, step, tried))
                 gain = system.deviance - tried.deviance
             if gain > 0:
                 system = tried
@@ -118,6 +119,16 @@ def _tried(system: LinearSystem, step: Array, halvings: int) -> tuple[LinearSyst
             break
         step = policy.shortening * step
     return tried, promised
+
+
+def _over_inertia(system: LinearSystem, step: Array, shortened: LinearSystem) -> LinearSystem:
+    """The system after a step in 1/J, if that is better than the shortened one: from an inertia
+    that is many times too large no short step in J leads back.
+    """
+    moved = system.fit.moved_over_inertia(system.columns, step)
+    if moved is None:
+        return shortened
+    return min(shortened, linear_system(moved, before=system), key=lambda one: one.deviance)
 
 
 def _over_the_ridge(system: LinearSystem, step: Array, shortened: LinearSystem) -> LinearSystem:
@@ -191,14 +202,18 @@ def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = 
 
 
 def _pinned(model: Model) -> Model:
-    """The model with stated constants all but fixed, until the others are near.
+    """The model with stated constants and the lag of a drive's frame all but fixed, until the
+    others are near.
 
     From orders of magnitude a step moves an inertia that nothing but its prior determines, and the
-    way back is a narrow curve of friction over inertia.
+    way back is a narrow curve of friction over inertia. On a free shaft a lag by acceleration is
+    next to an inductance, which it would drive to its bound.
     """
-    share = model.policy.fit.pinned
+    share, priors = model.policy.fit.pinned, model.policy.priors
     stated = {n: (value, share * u) for n, (value, u) in model.machine.stated.items()}
-    return replace(model, machine=replace(model.machine, stated=stated))
+    priors = replace(priors, bend_angle_s2=share * priors.bend_angle_s2)
+    policy = replace(model.policy, priors=priors)
+    return replace(model, machine=replace(model.machine, stated=stated, policy=policy))
 
 
 def first_fit(rough: Fit) -> LinearSystem:
@@ -228,7 +243,7 @@ def first_fit(rough: Fit) -> LinearSystem:
     if len(rough.segments) <= rough.policy.fit.short_programme:
         ends += [_one_side_first(begun, side) for side in _SIDES]
     end = min(ends, key=summed_error)
-    if rough.model.stated():
+    if rough.model.stated() or any(both_axes(segment) for segment in rough.segments):
         end = gauss_newton(replace(end.fit, model=rough.model))
     if not floors_changed(end.fit):
         return end

@@ -259,15 +259,14 @@ def _of_pulses(segment: Segment, model: Model, values: Values, x: Operating) -> 
 
     Pulses make the current ripple about the zero vectors, where a drive samples it. Without
     resistance the mean of the ripple there is none. Its drop makes one, of up to R T² v/(96 L²):
-    a tenth of the friction current where a period is a quarter of L/R. A log may hold means. Where
-    no PWM is stated, nothing is known of pulses.
+    a tenth of the friction current where a period is a quarter of L/R. A log may hold means.
     """
-    weak, l_q = segment.weak, values["lq_h"]
-    if weak is None or not l_q or not x.supply.pwm_s:
+    weak, l_q, pwm_s = segment.weak, values["lq_h"], x.supply.pwm_s or x.supply.hold_s
+    if weak is None or not l_q or not pwm_s:
         return np.zeros(segment.size if weak is None else weak.starts.size)
     pairs, finer = model.machine.pole_pairs, x.theta_rad.size // segment.size
     emf_v = pairs * values["psi_wb"] * x.omega_rad_s[::finer]
-    share = model.policy.noise_floors.pulses * (x.supply.pwm_s / l_q) ** 2 * values["r_ohm"]
+    share = model.policy.noise_floors.pulses * (pwm_s / l_q) ** 2 * values["r_ohm"]
     torque = 1.5 * pairs * values["psi_wb"] * share * emf_v
     return np.abs(weak.project(torque[None])[0, :, 0])
 

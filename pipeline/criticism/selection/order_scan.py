@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.operating import Array, Complex
 from pipeline.criticism.policy.selection import OrderScan
 from pipeline.criticism.regression.fit import Fit
@@ -51,9 +50,9 @@ def orders_left(system: LinearSystem) -> tuple[float, ...]:
 
     Notes
     -----
-    An order counts that two captures have over what is beside it and in a size that matters. What
-    the machine itself does comes back after a turn, so that its orders are whole; a bearing, a gear
-    or a belt has others.
+    An order counts that two captures have over what is beside it and in a size that matters, or
+    both halves of the only log. What the machine itself does comes back after a turn, so that its
+    orders are whole; a bearing, a gear or a belt has others.
 
     References
     ----------
@@ -67,11 +66,17 @@ def orders_left(system: LinearSystem) -> tuple[float, ...]:
     arguments = [(system.fit.alone,)] * len(system.segments)
     lines = [line for lines in on_each(_lines_in, system.segments, arguments) for line in lines]
     lines.sort(key=lambda line: line[0])
+    only = len({s.capture for s in system.segments if _has_waves(s)}) < policy.captures
     orders = []
     for cluster in _clustered(lines, policy):
         logs = [log for _, log in cluster]
-        if len({log.capture for log in logs}) >= policy.captures:
-            order = _common(float(np.median([order for order, _ in cluster])), logs, policy)
+        seen = {log.capture for log in logs}
+        if len(seen) >= policy.captures or (only and _in_all_parts(cluster, policy)):
+            found = {order for order, _ in cluster}
+            # one that all logs have at a whole number, stronger lines taken out of each, is that
+            order = found.pop() if len(found) == 1 else float(np.median([*found]))
+            if not (order.is_integer() and not found):
+                order = _common(order, logs, policy)
             orders.append(int(order) if order.is_integer() else order)
     return tuple(dict.fromkeys(orders))
 
@@ -214,9 +219,39 @@ class Log:
     least: float
     looked_at: frozenset[float]
 
+    def divided(self, count: int) -> list[Log]:
+        """The log in some parts of its time, as if each were a capture.
+
+        Parameters
+        ----------
+        count
+            How many.
+
+        Returns
+        -------
+        list of Log
+            One where there are fewer parts of a few turns than that.
+
+        """
+        edges = np.linspace(0.0, len(self.parts), count + 1).round().astype(int)
+        if len(self.parts) < count:
+            return []
+        return [replace(self, parts=self.parts[a:b]) for a, b in pairwise(edges.tolist())]
+
 
 Line = tuple[float, Log]
 """An order that stands out of a log."""
+
+
+def _in_all_parts(cluster: Sequence[Line], policy: OrderScan) -> bool:
+    """Whether each part of the time of the only log has the order of a cluster."""
+    return any(
+        all(
+            any(abs(order - other) <= policy.apart for other in _lines(part, policy))
+            for part in log.divided(policy.captures)
+        )
+        for order, log in cluster
+    )
 
 
 def _lines_in(segment: Segment, fit: Fit) -> list[Line]:
@@ -231,9 +266,7 @@ def _lines_in(segment: Segment, fit: Fit) -> list[Line]:
 
 def _logs(segment: Segment, fit: Fit) -> Iterator[Log]:
     weak, theta = segment.weak, segment.recorded.get("theta_mech_rad")
-    if not equation_of(segment).use.currents or weak is None or theta is None:
-        return
-    if not (weak.orders > 0).any():
+    if weak is None or theta is None or not _has_waves(segment):
         return
     weight = _weight(weak, segment.size)
     rows = list(_parts(theta, weight, fit.policy.order_scan))
@@ -247,6 +280,11 @@ def _logs(segment: Segment, fit: Fit) -> Iterator[Log]:
         whole = Part(one, theta, weight, current)
         least = material_size(segment, channel, fit)
         yield Log(segment.capture, channel, whole, parts, least, looked_at)
+
+
+def _has_waves(segment: Segment) -> bool:
+    """Whether a segment is a log under load whose equation looks at orders of the angle."""
+    return segment.weak is not None and {"theta_mech_rad", "iq_a"} <= set(segment.recorded)
 
 
 def _weight(weak: Projection, size: int) -> Array:

@@ -30,7 +30,7 @@ from pipeline.criticism.operating import (
 )
 from pipeline.criticism.parameter import UNLOGGED, WARMING, Machine
 from pipeline.criticism.policy.captures import Cutting
-from pipeline.criticism.signals.angle_sensor import angle_error, frame_turn, zero_angle
+from pipeline.criticism.signals.angle_sensor import angle_error, frame_angle, frame_turn, zero_angle
 
 Number = TypeVar("Number", np.float64, np.int64)
 
@@ -262,16 +262,17 @@ def hold_s(segment: Segment, omega_rad_s: Array, machine: Machine) -> float:
     Returns
     -------
     float
-        The PWM period, or the sample period of a log as fast [s]; zero for a log in whose sample
-        the rotor turns further than under one vector of any inverter: it is slower than a PWM that
-        is not stated.
+        The PWM period, or the sample period of a log as fast [s]. Where no PWM is stated, a log is
+        slower than that if no inverter is as slow, or if the rotor turns further in a sample than
+        under one vector of any: then the period that the policy takes for one.
 
     """
     policy, pwm_s = machine.policy.cutting, segment.fixed.get("pwm_s")
     if pwm_s is not None:
         return pwm_s if pwm_s < policy.slower_share * segment.ts_s else segment.ts_s
     turn = machine.pole_pairs * segment.ts_s * float(np.max(np.abs(omega_rad_s), initial=0.0))
-    return segment.ts_s if turn < policy.held_turn_rad else 0.0
+    fast = segment.ts_s <= policy.slowest_pwm_s and turn < policy.held_turn_rad
+    return segment.ts_s if fast else policy.unstated_pwm_s
 
 
 def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) -> Operating:
@@ -297,23 +298,27 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
     late, bend = (segment.fixed.get(name, 0.0) * values[name] for name in (LATE_SPEED, BEND_SPEED))
     if late or bend:
         x = _in_time(segment, x, late, bend)
-    zero = zero_angle(segment, x, values)
+    none = np.zeros(x.omega_rad_s.shape)
+    zero, frame = zero_angle(segment, x, values), frame_angle(segment, x, values)
     if not any(effect.angle is not None for effect in model.effects):
         turn = frame_turn(segment, x, model, values)
-        return x if zero is None or turn is None else _turned_back(x, zero, turn)
-    zero, policy = np.zeros(x.omega_rad_s.shape) if zero is None else zero, model.policy.cutting
-    error = zero
+        if frame is None or turn is None:
+            return x
+        return _turned_back(x, none if zero is None else zero, frame, turn)
+    policy = model.policy.cutting
+    error = zero = none if zero is None else zero
     for _ in range(policy.angle_rounds):
         nearer = replace(x, theta_rad=x.theta_rad - error / model.machine.pole_pairs)
         error = zero + angle_error(nearer, model, values)
     turned, finer = error / model.machine.pole_pairs, x.theta_rad.size // segment.size
     slower = x.omega_rad_s - _speed(turned, segment.ts_s, finer, policy)
-    return replace(_turned_back(x, error, np.exp(1j * error)), omega_rad_s=slower)
+    whole = error if frame is None else error + (frame - zero)
+    return replace(_turned_back(x, error, whole, np.exp(1j * whole)), omega_rad_s=slower)
 
 
-def _turned_back(x: Operating, error: Array, ahead: Complex) -> Operating:
-    """The state less an error [n, rad] of its electrical angle, which is `ahead` as a unit vector
-    [n]; the speed stays.
+def _turned_back(x: Operating, error: Array, frame: Array, ahead: Complex) -> Operating:
+    """The state less an error [n, rad] of its electrical angle, and that of its frame, which is
+    `ahead` as a unit vector [n]; the speed stays.
     """
     current, volts = x.i_a * ahead, x.supply.volts_v
     return replace(
@@ -321,7 +326,7 @@ def _turned_back(x: Operating, error: Array, ahead: Complex) -> Operating:
         id_a=current.real,
         iq_a=current.imag,
         supply=x.supply if volts is None else replace(x.supply, volts_v=volts * ahead),
-        eps_rad=x.eps_rad - error,
+        eps_rad=x.eps_rad - frame,
         theta_rad=x.theta_rad - error / x.machine.pole_pairs,
     )
 

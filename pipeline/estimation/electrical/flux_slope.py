@@ -9,9 +9,11 @@ import numpy as np
 
 from pipeline.estimation.electrical.voltage_rows import (
     CROSS_FLUX,
+    D_BEHIND,
     D_DROP,
     D_FLUX,
     D_FLUX_BENT,
+    Q_BEHIND,
     Q_FLUX_BENT,
     Q_TURNED,
     VoltageRows,
@@ -59,6 +61,9 @@ class Slope(NamedTuple):
         What it is from.
     share
         Of the voltage, rms, that this inductance alone explains [1].
+    behind_h_s2
+        What a frame makes of it that is behind by an electrical angle over the acceleration of the
+        shaft [H/s²].
 
     """
 
@@ -67,6 +72,7 @@ class Slope(NamedTuple):
     dof: int
     rows: VoltageRows
     share: float = np.inf
+    behind_h_s2: float = 0.0
 
     @property
     def unmodelled(self) -> float:
@@ -157,11 +163,12 @@ def flux_slope(rows: VoltageRows, axis: str) -> Slope | None:
     sigma = np.ones(voltage.size)
     covariance, dof = cluster_covariance(design, solution.residuals, sigma, rows.cluster)
     value = (1.0 if axis == "d" else -1.0) * float(solution.coefficients[0])
+    behind = linear_fit(design, columns[Q_BEHIND if axis == "q" else D_BEHIND]).coefficients[0]
     share = np.inf
     if axis == "d":
         alone = linear_fit(design[:, 1:], design[:, 0]).residuals
         share = abs(value) * float(np.linalg.norm(alone) / np.linalg.norm(voltage))
-    return Slope(value, float(covariance[0, 0] ** 0.5), dof, rows, share)
+    return Slope(value, float(covariance[0, 0] ** 0.5), dof, rows, share, abs(float(behind)))
 
 
 def _spans(columns: Mapping[str, Array], axis: str) -> float:

@@ -26,7 +26,9 @@ def inductance_at_speed(
 ) -> Fit:
     """L = (p L) / p, p L by `flux_slope` of the drives, else of the torque maps.
 
-    A test at standstill knows it better; with one, nothing is published.
+    A test at standstill knows it better; with one, nothing is published. A drive may turn its frame
+    by a loop that is behind as the shaft gathers speed. Where the current makes that acceleration,
+    on a free shaft, no regression separates the two: it is in the uncertainty.
 
     Parameters
     ----------
@@ -55,13 +57,16 @@ def inductance_at_speed(
         return method.nothing((name,), "; ".join([*doubts[:1], experiment]))
     value = slope.value_h / pole_pairs
     parts = propagate([(1.0 / pole_pairs, slope_budget(method, axis, slope))])
-    iron = Contribution(f"assumed:{name}_at_speed", value * policy().at_speed.share, "B")
+    limits = policy().at_speed
+    iron = Contribution(f"assumed:{name}_at_speed", value * limits.share, "B")
+    # p of the angle, and one over p of the inductance
+    behind = Contribution(f"assumed:{name}_frame", limits.behind_s2 * slope.behind_h_s2, "B")
     captures = slope.rows.captures
     counted = known.best("pole_pairs") is not None
     rests = "" if counted else f"rests on the {pole_pairs} pole pairs that the captures state"
     notes = [rests, unstated_note(captures, ("voltage", "current"))]
     paths = [capture.path for capture in captures]
-    return Fit((method.measured(name, value, [*parts, iron], paths, None, notes),))
+    return Fit((method.measured(name, value, [*parts, iron, behind], paths, None, notes),))
 
 
 def _slopes(campaign: Campaign, axis: str, pole_pairs: int) -> list[Slope]:

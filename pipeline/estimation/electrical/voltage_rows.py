@@ -25,6 +25,8 @@ from pipeline.records.capture import Array, Capture
 D_FLUX = "d flux"
 LATE = "acceleration"
 Q_TURNED = "speed times q voltage"
+D_BEHIND, Q_BEHIND = "acceleration times d voltage", "acceleration times q voltage"
+"""What a frame that is behind by acceleration has of each voltage."""
 Q_FLUX_BENT = "q flux of high current"
 D_FLUX_BENT = "d flux of high current"
 CROSS_FLUX = "q flux of d current"
@@ -119,6 +121,9 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
         columns[TURNED] = weak.integral(speed * v_d)
         columns[V_D] = weak.integral(v_d)
         columns[Q_TURNED] = weak.integral(speed * v_q)
+        gathers = np.gradient(speed, t)
+        columns[D_BEHIND] = weak.integral(gathers * v_d)
+        columns[Q_BEHIND] = weak.integral(gathers * v_q)
     return columns
 
 

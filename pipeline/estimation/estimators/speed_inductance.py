@@ -65,11 +65,13 @@ def _pole_pairs(axis: str, slope: Slope, still: Estimate) -> Estimate:
     parts = propagate([(1.0 / still.number, budget), (-value / still.number, still.budget)])
     share = policy().pole_pairs.inductance_share
     iron = Contribution(f"assumed:inductance_at_speed:{axis}", value * share, "B")
+    late = policy().at_speed.behind_s2 * value * slope.behind_h_s2 / still.number
+    behind = Contribution(f"assumed:frame:{axis}", late, "B")
     words = f"{value:.3g} by l{axis}_h of {still.method}"
     return METHOD.measured(
         BY_VOLTAGE,
         value,
-        [*parts, iron],
+        [*parts, iron, behind],
         {*still.captures, *(c.path for c in slope.rows.captures)},
         None,
         words,

@@ -178,6 +178,10 @@ class AtSpeed:
         on="138 drive logs of four foreign simulators with a scatter below 3 %, most with a hidden "
         "effect: 2.6 % rms, 95 % within 5.9 %, the largest 12 %",
     )  # fmt: skip
+    behind_s2: float = chosen(
+        1e-6, "s²", "angle by which a drive's frame is behind, over the acceleration of the shaft",
+        why="the criticism's `priors.bend_angle_s2`: one over the square of a loop's bandwidth",
+    )  # fmt: skip
     most_scatter: float = chosen(
         0.05, "1", "largest scatter of an inductance that is published",
         why="beyond it other effects of a log decide it",

@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline import Recordings, diagnose
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.errors import UsageError
 from tests.benchmark.command import main, options
@@ -18,7 +19,7 @@ from tests.benchmark.worlds.programmes import PROGRAMMES, PWM_HZ, Campaigner, Hi
 from tests.benchmark.worlds.rivals import _chosen
 from tests.benchmark.worlds.sindy import weak_sindy
 from tests.benchmark.worlds.table import beside, by_programme, cases, table
-from tests.benchmark.worlds.with_maker import _telemetry
+from tests.benchmark.worlds.with_maker import _telemetry, campaign
 
 NULL = WorldCase("motulator", "laboratory", 1)
 COGGING = WorldCase("motulator", "laboratory", 1, {"cogging": 1.0})
@@ -107,6 +108,15 @@ def test_a_maker_logs_the_mean_about_a_row_or_the_vector_there(timing: str, held
     assert slow["vq_v"][1:-1] == pytest.approx(slow["id_a"][1:-1], abs=0.6)
     assert slow["vd_v"][2:-2:2] == pytest.approx(held or 1.0 / 20.0)
     assert slow["vd_v"][3:-2:2] == pytest.approx(0.0)
+
+
+def test_the_gain_of_a_phase_is_named_though_nothing_knows_the_gain_of_all() -> None:
+    """By drives, one resistance and a coast, all sensors alike, R and the magnet are one scale.
+    A fit that is free along it began far off, and the name was lost.
+    """
+    recorded = campaign(WorldCase("maker", "maker", 34, {"current_gain": 1.0}))
+    found = diagnose(Recordings({recorded.motor_id: recorded}))[recorded.motor_id]
+    assert (found.verdict, found.missing) == ("missing", ("current_gain",))
 
 
 def test_cases_of_a_maker_are_drawn_as_those_of_other_worlds() -> None:

@@ -32,6 +32,7 @@ BASE = {
     "ripple_edge": 0.0,
     "ripple_shift": 0.0,
     "frame_lag_s": 0.0,
+    "bend_angle_s2": 0.0,
     "command_lead": 0.0,
     "ripple_torque": 0.0,
     "ripple_held": 0.0,

@@ -59,7 +59,8 @@ def test_orders_are_those_that_magnets_and_slots_make():
     assert cogging.orders(replace(unknown, torque_orders=())) == (7, 14, 42, 84)
     logs = {"torque_orders": (), "load_orders": (8.5, 10, 36, 126)}
     assert cogging.orders(replace(known, **logs)) == (7, 12, 14, 36, 84, 126, 168)
-    assert cogging.orders(replace(unknown, **logs)) == (7, 14, 42, 84, 126)
+    # slots that nobody states are a multiple of three
+    assert cogging.orders(replace(unknown, **logs)) == (7, 14, 36, 42, 84, 126)
     assert cogging.orders(replace(unknown, torque_orders=(28,), load_orders=(126,))) == (28,)
     assert cogging.orders(replace(machine(1, None), torque_orders=())) == (2, 6, 12)
     optional = {p.optional for p in cogging.EFFECT.parameters_of(replace(known, torque_orders=()))}

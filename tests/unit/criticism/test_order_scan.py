@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.segment import row_index
+from pipeline.criticism.data.segment import Unthinned, row_index
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.linear_system import linear_system
@@ -87,6 +87,31 @@ def test_what_the_equations_look_at_is_theirs():
 
 def test_one_capture_alone_has_no_order():
     assert left(spinning(1, ((16, 3e-3),)), spinning(2)) == ()
+
+
+def test_of_a_single_log_both_halves_have_an_order():
+    """A programme of one drive: nothing else could show it."""
+    whole = spinning(1, ((16, 3e-3),))
+    assert left(whole) == (16,)
+    plain, torque = spinning(1).recorded[TORQUE], whole.recorded[TORQUE].copy()
+    # the shaft gathers speed: more than half of its turns are in the last third of the time
+    torque[: torque.size * 7 // 8] = plain[: torque.size * 7 // 8]
+    assert left(replace(whole, recorded={**whole.recorded, TORQUE: torque})) == ()
+
+
+def test_a_free_shaft_shows_orders_as_well():
+    """Its current is logged and its torque is not: the acceleration has them."""
+    one = log(16_000, 1, 1.0)
+    t = np.arange(one.size) * one.ts_s
+    tau_s = BASE["j_kgm2"] / BASE["b_nm_s_rad"]
+    theta = 100.0 * tau_s * (1.0 - np.exp(-t / tau_s))
+    theta += 1e-4 * np.cos(16.0 * theta)
+    noise = np.random.default_rng(2).normal(0.0, 0.01, (2, t.size))
+    current = dict(zip(("id_a", "iq_a"), noise, strict=True))
+    kinds = {"kind": "motion", "channels": (TORQUE,), "unthinned": Unthinned()}
+    free = replace(one, recorded={**one.recorded, **current, "theta_mech_rad": theta}, **kinds)
+    weak = projection(theta, one.weak.starts, one.weak.length, ())
+    assert left(replace(free, weak=weak)) == (16,)
 
 
 @pytest.mark.slow
