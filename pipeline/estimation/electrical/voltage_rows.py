@@ -42,7 +42,7 @@ class VoltageRows:
     `speed_rad_s` and `current_a` come with their products with temperature above 25 degC;
     `columns` holds the nuisances; `period_s` is that of the samples; `hold_doubt` is what
     it may matter that an inverter holds its voltage still over a centred period while the rotor
-    turns (relative, of the back-EMF).
+    turns (relative, of the back-EMF); `has_drop` is whether its drop is to be fitted.
     """
 
     captures: tuple[Capture, ...]
@@ -57,6 +57,7 @@ class VoltageRows:
     columns: Mapping[str, Array]
     period_s: float
     hold_doubt: float
+    has_drop: bool = True
 
 
 def voltage_rows(captures: Sequence[Capture], pole_pairs: int | None) -> VoltageRows | None:

@@ -65,6 +65,7 @@ EXPERIMENT = (
     "better an open_circuit and a resistance test"
 )
 HOLD = "assumed:voltage_hold"
+DROP = "drop"
 CANDIDATES = ("zero", LATE, TURNED, "cross flux", NEAR_ZERO)
 
 
@@ -86,6 +87,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     turn = None if campaign.of("drive") else _turn(rows, magnet)
     if turn is not None:
         rows = _turned_back(rows, turn)
+    rows, drop_v = _plausible_drop(rows, magnet)
     chosen = _chosen(rows, magnet, options["level"])
     design = q_voltage(rows, magnet, chosen, {})
     solution = linear_fit(design, rows.voltage_v)
@@ -101,7 +103,43 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     estimates = _estimates(
         rows, solution, (scatter, dof), (magnet, magnet_parts), chosen, (moved, doubts), turn
     )
+    if drop_v:
+        estimates = _without_drop(estimates, rows, linear_fit(design, rows.columns[DROP]), drop_v)
     return Fit(estimates, _evidence(rows, solution))
+
+
+def _plausible_drop(rows: VoltageRows, magnet: float) -> tuple[VoltageRows, float]:
+    """The rows, and 0; or, where a fit gives the inverter a drop that none has, the rows to be
+    fitted without one, and its standard uncertainty [V].
+
+    Where the size of the current is the same throughout, as with a d current of one size, V_0 and R
+    are one column but for what any other error of the model follows.
+    """
+    first = linear_fit(q_voltage(rows, magnet, [], {}), rows.voltage_v)
+    most = policy().inverter.most_drop * max(link_voltage_v(c) for c in rows.captures)
+    if abs(float(first.coefficients[3])) <= most:
+        return rows, 0.0
+    return replace(rows, has_drop=False), most / np.sqrt(3.0)
+
+
+def _without_drop(
+    estimates: tuple[Estimate, ...], rows: VoltageRows, along: LinearFit, drop_v: float
+) -> tuple[Estimate, ...]:
+    """The estimates with what a drop that was not fitted may make of Ke and R; R is given up where
+    that is as large as itself.
+    """
+    words = f"the current has one size, and a drop of the inverter's is taken as 0 ± {drop_v:.2g} V"
+    widened = []
+    for one, slope in zip(estimates, along.coefficients.tolist(), strict=False):
+        part = Contribution("assumed:inverter_drop", abs(slope) * drop_v, "B")
+        if one.known and one.number <= 2.0 * part.u:
+            note = f"{one.number:.3g} ± {part.u:.2g} {METHOD.unit(one.name)}, for {words}"
+            widened.append(METHOD.missing(one.name, f"{note}; {EXPERIMENT}"))
+        elif one.known:
+            widened.append(replace(one, budget=(*one.budget, part), note=f"{one.note}; {words}"))
+        else:
+            widened.append(one)
+    return tuple(widened)
 
 
 def _partitions(rows: VoltageRows, information: Array) -> list[Partition]:
@@ -145,8 +183,8 @@ def q_voltage(
     Returns
     -------
     array [w, 4 or more]
-        Columns of Ke [rad/s], R at 25 degC [A], L_q [A/s], V_0 [1], then L_d where i_d was logged
-        and parts from the speed, then the chosen ones.
+        Columns of Ke [rad/s], R at 25 degC [A], L_q [A/s], V_0 [1] if the rows have a drop, then
+        L_d where i_d was logged and parts from the speed, then the chosen ones.
 
     Notes
     -----
@@ -167,7 +205,8 @@ def q_voltage(
     )
     speed = rows.speed_rad_s * (1.0 + magnet * warmer) + magnet * rows.warm_speed_k_rad_s
     extra = [rows.columns[name] for name in chosen]
-    columns = [speed, cold * current, rows.columns["inductive"] * current, rows.columns["drop"]]
+    columns = [speed, cold * current, rows.columns["inductive"] * current]
+    columns += [rows.columns[DROP]] if rows.has_drop else []
     flux = rows.columns.get(D_FLUX)
     if flux is not None and linear_fit(np.column_stack([*columns, flux]), flux).full_rank:
         columns.append(flux)
@@ -182,7 +221,8 @@ def _chosen(rows: VoltageRows, magnet: float, level: float) -> list[str]:
     sure = [LATE] if any(not c.has("theta_mech_rad") for c in rows.captures) else []
     base = q_voltage(rows, magnet, sure, {})
     candidates = {name: rows.columns[name] for name in CANDIDATES if name in rows.columns}
-    candidates = {name: column for name, column in candidates.items() if name not in sure}
+    taken = {*sure} if rows.has_drop else {*sure, NEAR_ZERO}
+    candidates = {name: column for name, column in candidates.items() if name not in taken}
     candidates = {n: c for n, c in candidates.items() if n == "zero" or float(np.ptp(c)) > 0.0}
     sigma = np.ones(rows.voltage_v.size)
     rich = np.column_stack([base, *candidates.values()])

@@ -76,6 +76,8 @@ NUISANCES = (
 )  # fmt: skip
 
 
+OF_CURRENT = ("torque", "load", "current", "d current", "q current", "d q current", "d squared")
+"""How the names of columns begin that the current makes."""
 RELUCTANCE = "d q current"
 """What reluctance adds to the torque, where nothing shows how much."""
 
@@ -198,6 +200,7 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
     y, driving = rows.acceleration_rad_s2, driving_torque(rows, torque, {})
     if float(np.ptp(driving)) == 0.0:
         return METHOD.nothing(GIVES, f"the drive log holds no torque; {EXPERIMENT}")
+    nuisances = [name for name in nuisances if _is_apart(rows, driving, name)]
     if short := too_short(rows):
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
     drag = drag_of(rows, acceleration(rows, driving), nuisances, options["level"])
@@ -274,8 +277,22 @@ def _load_logged(rows: ShaftRows) -> bool:
     return not any(_loadless(capture) for capture in rows.captures)
 
 
+def _is_apart(rows: ShaftRows, driving_nm: Array, name: str) -> bool:
+    """Whether a nuisance of the current is another column than the torque. Where the d current has
+    one size, its square times the q current is not: it would take the torque's place, and J with
+    it.
+    """
+    if not name.startswith(OF_CURRENT) or name not in rows.columns:
+        return True
+    column = rows.columns[name]
+    own = linear_fit(driving_nm[:, None], column).residuals
+    return bool(np.linalg.norm(own) > policy().drag.least_own_share * np.linalg.norm(column))
+
+
 def _share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
-    """Share of the drives' acceleration, squared, that follows the torque in no way.
+    """Share of the drives' acceleration, squared, that follows the torque in no way: what is left
+    over what no column of the current explains. Where the d current has one size, its square times
+    the q current is the torque.
 
     A torque that is not logged is an error of the driving torque, and where a speed loop fights it
     the current goes with it: it makes g too small, and J too large, by this share
@@ -283,7 +300,8 @@ def _share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
     Reference: Fuller, Measurement Error Models, 1987, 1.1 (attenuation).
     """
     drives = rows.kind == DRIVE
-    without = linear_fit(np.delete(drag.design[drives], 0, axis=1), drag.target[drives])
+    others = [k for k, name in enumerate(drag.names) if not name.startswith(OF_CURRENT)]
+    without = linear_fit(drag.design[drives][:, others], drag.target[drives])
     costs = [float(np.sum(r**2)) for r in (drag.residuals[drives], without.residuals)]
     return min(costs[0] / costs[1], 1.0) if costs[1] > 0.0 else 1.0
 

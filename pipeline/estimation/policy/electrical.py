@@ -238,6 +238,10 @@ class Inverter:
         why="an inverter that loses 1 or 2 % loses about half of it in them: some milliohm of a "
         "drive of 24 V and 12 A; no capture parts them from the winding",
     )  # fmt: skip
+    most_drop: float = chosen(
+        0.04, "1", "drop of an inverter's phase that its dead time makes, at most, of the link",
+        why="2 us of a period of 50 us; a fit that gives more has mistaken a resistance for it",
+    )  # fmt: skip
     free_share: float = chosen(
         0.1, "1", "share of a drive's current that its motion leaves open on a free shaft, at most",
         why="seven free drives of three simulators left 0.002 to 0.056, three drives under a load "

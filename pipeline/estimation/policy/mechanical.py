@@ -67,6 +67,10 @@ class Drag:
         by=TRIED,
         on="ten simulated campaigns: half or twice of it moved no constant by a twentieth of its u",
     )  # fmt: skip
+    least_own_share: float = chosen(
+        0.05, "1", "part of a nuisance of the current that the torque does not hold, to count",
+        why="as of the voltages' nuisances: what parts it is also what any other error follows",
+    )  # fmt: skip
     material_share: float = derived(
         0.02, "1", "of the drag, that two numbers may leave and stand for it still",
         source="a square root of speed beside them would then have moved T_c by 20 %, B by 56 %, "
