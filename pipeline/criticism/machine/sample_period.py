@@ -90,11 +90,12 @@ def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]
     def made() -> tuple[Any, Array, tuple[Complex, Complex]]:
         turn = x.machine.pole_pairs * omega * hold_s
         flux = part * turn * (turn * base_flux(x, values) - 1j * hold_s * r_ohm * x.i_a)
-        # what no capture determines is zero
+        # what no capture determines is zero, or next to it
+        least = max(l_d, l_q) / x.machine.policy.cutting.saliency or math.inf
         return (
             iq_a,
             omega,
-            (flux, flux.real / (l_d or math.inf) + 1j * flux.imag / (l_q or math.inf)),
+            (flux, flux.real / max(l_d, least) + 1j * flux.imag / max(l_q, least)),
         )
 
     of_state = hold_s, id(iq_a), id(omega)

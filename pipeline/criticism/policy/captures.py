@@ -149,6 +149,10 @@ class Cutting:
         math.pi / 3.0, "rad", "electrical turn beyond which no voltage vector is held for a sample",
         source="six vectors a turn, the fewest of any inverter (six-step)",
     )  # fmt: skip
+    saliency: float = chosen(
+        5.0, "1", "ratio of the inductances at the most, in the ripple of the current",
+        why="machines with magnets have less; of an axis without current it may come out near 0",
+    )  # fmt: skip
     slowest_pwm_s: float = chosen(
         5e-4, "s", "longest PWM period of an inverter", why="large machines are switched at 2 kHz"
     )

@@ -16,6 +16,11 @@ class Selection:
         "difference of deviance below which captures do not discriminate two explanations",
         why="3.5 standard deviations of one parameter, passed by chance one time in 2,000",
     )  # fmt: skip
+    absent_size: float = chosen(
+        0.02, "1", "share of the least size that matters below which an effect is not there",
+        why="what explains a remainder is then a term that is none of its amplitudes, as the mean "
+        "of all gains of the gain of one phase",
+    )  # fmt: skip
     least_share: float = chosen(
         0.1, "1", "share of what is over the noise floor that an effect must take to be named",
         why="what takes less leaves the cause of nearly all of it open",

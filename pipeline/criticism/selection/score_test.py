@@ -282,7 +282,8 @@ class _Scoring:
         small = [
             (other, places)
             for other, places in best.values()
-            if not other.matters
+            if score.policy.absent_size < other.size
+            and not other.matters
             and other.fall > other.penalty
             and other.fall > score.fall - score.policy.tie
             and other.candidate.effect.discriminator is None

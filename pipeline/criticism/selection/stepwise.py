@@ -175,10 +175,13 @@ def _scored(
 def _best(
     wide: LinearSystem, scores: Sequence[Score], base: int, unsure: Set[str]
 ) -> LinearSystem | None:
-    """The fit with the candidate that is best by its score and may join; None without one."""
+    """The fit with the candidate that is best by its score, its penalty paid, and may join; None
+    without one.
+    """
     effects, couplings = wide.fit.model.effects, bool(significant_groups(wide).any())
     inside = {e.discriminator for e in effects} - {None}
     passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
+    passing.sort(key=lambda s: s.penalty - s.fall)
     return _chosen(wide, passing, effects[base:], unsure)
 
 
@@ -328,7 +331,8 @@ def _refit_best(
     policy = wide.policy.selection
     usual = Baseline.of(wide, added)
     tests = {segment.test for segment in wide.segments}
-    close = [s for s in passing if s.fall >= policy.close_share * passing[0].fall]
+    most = max((s.fall for s in passing), default=0.0)
+    close = [s for s in passing if s.fall >= policy.close_share * most]
     best: LinearSystem | None = None
     least = 0.0
     for score in close:

@@ -146,6 +146,16 @@ def test_what_a_current_ripples_by_goes_with_the_hold_of_a_vector_not_with_the_r
     assert mean_current(fast.fed(hold_s=0.0), values).i_a == pytest.approx(fast.i_a)
 
 
+@pytest.mark.parametrize("axis", ["ld_h", "lq_h"])
+def test_an_inductance_that_no_current_shows_makes_no_ripple_without_bounds(axis: str) -> None:
+    """It may come out near zero, and over it the ripple of the current would be kiloamperes."""
+    state = operating().fed(hold_s=5e-5)
+    tried = [{**BASE, axis: h} for h in (0.0, 1e-12, 1e-6, BASE[axis])]
+    sizes = [np.abs(ripple(state, 0.1, values)[1]).max() for values in tried]
+    assert sizes[:2] == pytest.approx([sizes[2]] * 2, rel=0.01)
+    assert sizes[0] < 10.0 * sizes[3]
+
+
 def test_a_log_of_the_q_axis_alone_has_no_ripple() -> None:
     """It would pass for a resistance that grows with the square of speed."""
     found = recorded(1.0)

@@ -16,8 +16,11 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import linear_system
+from pipeline.criticism.selection import stepwise
 from pipeline.criticism.selection.acceptance import _form_error_factors, _same_hook, is_determined
+from pipeline.criticism.selection.candidates import Candidate
 from pipeline.criticism.selection.requested_model import fit_of
+from pipeline.criticism.selection.score_test import Score
 from pipeline.criticism.selection.sizes import material, size_of
 from pipeline.criticism.selection.stepwise import _floored_anew, search
 from tests.unit.criticism.machines import (
@@ -167,6 +170,34 @@ def test_an_effect_that_ties_with_one_too_small_to_matter_is_not_named():
     assert last.added == ()
     shadowed = next(s for s in last.scores if s.candidate.effect.name == "twin")
     assert shadowed.confounder == "windage"
+
+
+def test_an_effect_that_is_not_there_at_its_own_size_shadows_none():
+    """What explains then is no amplitude of it, as the mean of all gains is none of one phase's."""
+    segments = (with_drag(curved(0.1)), with_drag(curved(0.1), 6))
+    twin = replace(effects()["windage"], name="twin")
+    last = search(cautious(segments, 4.0), {**asking_for(5.0), "twin": twin})[-1]
+    assert last.added == ("twin",)
+
+
+def test_candidates_are_tried_by_what_they_are_worth(monkeypatch):
+    """Of four that tie, the cheapest is among the few that are refitted."""
+    tried = []
+    monkeypatch.setattr(stepwise, "_chosen", lambda _, passing, *__: tried.extend(passing))
+    wide = linear_system(fitted((log(noise=1.0),)))
+    one = Score(
+        Candidate(effects()["windage"], ()),
+        50.0,
+        20.0,
+        {},
+        {},
+        1.0,
+        2.0,
+        policy=wide.policy.selection,
+    )
+    dear, cheap = one, replace(one, fall=49.0, penalty=12.0)
+    stepwise._best(wide, (dear, cheap), 0, frozenset())
+    assert tried == [cheap, dear]
 
 
 def test_windage_is_found_with_its_size():
