@@ -14,7 +14,7 @@ from pipeline.criticism.data.sensor_noise import rounding_step
 from pipeline.criticism.data.settling import settling_of
 from pipeline.criticism.data.traces import LINES_V, with_values
 from pipeline.criticism.operating import Array
-from pipeline.criticism.parameter import UNLOGGED, WARMING, Machine
+from pipeline.criticism.parameter import BENDING, UNLOGGED, WARMING, Machine
 from pipeline.criticism.policy.policy import DEFAULT, Policy
 from pipeline.physics.coupling import COUPLINGS, coupling_from
 from pipeline.physics.frames import vector_of_lines
@@ -114,7 +114,8 @@ def _unlogged(campaign: Campaign) -> dict[str, tuple[str, str]]:
             nuisances |= {f"{nuisance}_{n}": (column, path) for n, path in enumerate(paths)}
         logs = (c for c in campaign.of(*_TRACED) if c.has("iq_a") and not c.has(column))
         loaded = sorted(c.path for c in logs)
-        nuisances |= {f"{WARMING[column]}_{n}": (column, path) for n, path in enumerate(loaded)}
+        for course in (WARMING, BENDING):
+            nuisances |= {f"{course[column]}_{n}": (column, path) for n, path in enumerate(loaded)}
     return nuisances
 
 

@@ -219,15 +219,15 @@ def thinned(
     return cut, pad + (length + 2 * pad) * np.arange(starts.size)
 
 
-def window_of(period: float, size: int, policy: Cutting) -> int:
+def window_of(period: float, keep: NDArray[np.bool_], policy: Cutting) -> int:
     """Samples a window.
 
     Parameters
     ----------
     period
         Sample period [s].
-    size
-        Samples of the capture.
+    keep
+        Samples of the capture that count [n].
     policy
         Length of a window.
 
@@ -235,11 +235,13 @@ def window_of(period: float, size: int, policy: Cutting) -> int:
     -------
     int
         The policy's time, but no fewer than its samples, and four windows in the capture where that
-        leaves enough.
+        leaves enough; no longer than what is free of gaps.
 
     """
     samples = max(round(policy.window_s / period), policy.window_samples)
-    return max(min(samples, size // 4), policy.least_window)
+    ends = np.flatnonzero(~np.concatenate([[False], keep, [False]]))
+    longest = int(np.diff(ends).max()) - 1
+    return max(min(samples, keep.size // 4, longest), policy.least_window)
 
 
 def parabolas(signal: Array, width: int) -> Array:

@@ -68,7 +68,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     Returns
     -------
     Segment or None
-        None without a record of the motion, except for a heat run, which is at rest.
+        None without a record of the motion, except for a heat run, which is at rest, and where gaps
+        leave no window.
 
     """
     temperatures = [name for name in TEMPERATURES if capture.has(name)]
@@ -85,7 +86,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     speed = shaft_angle(columns, period, machine)
     turned = float(np.ptp(columns["theta_mech_rad"]))
     size = columns["vd_v"].size
-    window = window_of(period, size, policy)
+    window = window_of(period, keep, policy)
     orders = machine.electrical_orders if angle and turned > policy.turning_rad else ()
     sensors = with_smooth_angle(
         capture, columns, prepared(columns, period, machine.policy, speed), machine, window
@@ -106,6 +107,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     full = {**columns, "good": keep.astype(float)} if logged else None
     log = whole_log(columns, period, policy)
     columns, starts = thinned(columns, keep, window, most)
+    if not starts.size:
+        return None
     weak = projection(columns["theta_mech_rad"], starts, window, orders)
     middle = np.rint(columns["t_s"][starts + window // 2] / period)
     segment = segment_of(

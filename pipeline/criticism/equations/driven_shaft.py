@@ -70,7 +70,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     at = np.arange(log.keep.size) - shift
     columns[VOLTAGE] = columns[VOLTAGE][np.maximum(at, 0)]
     keep = log.keep & turns & (at >= 0) & log.keep[np.maximum(at, 0)]
-    window = window_of(log.period_s, keep.size, policy.cutting)
+    window = window_of(log.period_s, keep, policy.cutting)
     weak = projection(columns["theta_mech_rad"], window_starts(keep, window), window, ())
     return segment_of(
         capture,

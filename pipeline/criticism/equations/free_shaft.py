@@ -62,7 +62,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     channel = TORQUE if TORQUE in columns else SPEED
     if capture.meta.test == "cogging":
         return _slow_turn(capture, machine, period, columns, keep, channel)
-    window = window_of(period, keep.size, policy)
+    window = window_of(period, keep, policy)
     keep = keep & _coasts(columns["theta_mech_rad"], window, machine.policy)
     sensors = prepared(columns, period, machine.policy, speed)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)

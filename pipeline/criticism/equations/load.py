@@ -49,7 +49,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     period, columns, keep = even_clock(capture, ("iq_a", TORQUE, *further, *angle), policy)
     speed = shaft_angle(columns, period, machine)
     size = keep.size
-    window = window_of(period, size, policy)
+    window = window_of(period, keep, policy)
     sensors = with_smooth_angle(
         capture, columns, prepared(columns, period, machine.policy, speed), machine, window
     )

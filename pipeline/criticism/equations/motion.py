@@ -59,7 +59,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     shaft = {name: log.columns[name] for name in _USED if name in log.columns}
     shaft["t_s"] = log.period_s * np.arange(log.keep.size, dtype=np.float64)
     policy = machine.policy.cutting
-    window = window_of(log.period_s, log.keep.size, policy)
+    window = window_of(log.period_s, log.keep, policy)
     full = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
     pad = max(policy.motion_pad, reach(log.period_s, machine.policy.torsion))
     moves = log.keep & ~rests(shaft["theta_mech_rad"], window, policy)

@@ -62,7 +62,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     policy = machine.policy.cutting
     signals = tuple(names if encoder else [*lines, *extra])
     period, columns, keep = even_clock(capture, signals, policy)
-    window = window_of(period, keep.size, policy)
+    window = window_of(period, keep, policy)
     if encoder:
         shaft_angle(columns, period, machine)
     else:

@@ -48,7 +48,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     log = None if capture.has(*_BOTH_AXES) else drive_log(capture, machine)
     if log is None:
         return None
-    window = window_of(log.period_s, log.keep.size, machine.policy.cutting)
+    window = window_of(log.period_s, log.keep, machine.policy.cutting)
     starts = window_starts(log.keep, window)
     weak = projection(log.columns["theta_mech_rad"], starts, window, ())
     return segment_of(

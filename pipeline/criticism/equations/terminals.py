@@ -61,7 +61,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         # two windows in the longest level, where a multimeter took few rows of each
         jumps = np.abs(np.diff(amps)) > policy.change_u * sensors.noise["i_pair_a"]
         longest = int(np.diff(np.flatnonzero(np.concatenate([[True], jumps, [True]]))).max())
-        window = min(window_of(period, keep.size, policy), longest // 2)
+        window = min(window_of(period, keep, policy), longest // 2)
         window = max(window, policy.least_window)
     weak = projection(np.zeros(keep.size), window_starts(keep, window), window, ())
     if not stepped:

@@ -28,7 +28,7 @@ from pipeline.criticism.machine.coenergy import (
 )
 from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import Array, Complex, Noted, Operating, Values
-from pipeline.criticism.parameter import WARMING, Machine, Parameter
+from pipeline.criticism.parameter import BENDING, WARMING, Machine, Parameter
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.priors import Priors
 
@@ -155,7 +155,7 @@ COAST_SHARES = ("coast_dry_share", "coast_viscous_share")
 """Nuisances of a coast beside other tests with drags: friction repeats to some percent."""
 OPEN_FLUX = "open_flux_share"
 """Nuisance of an open-circuit test beside other tests that turn: a magnet may have lost flux."""
-CURVED = (*(c.name for c in (*BASE, *_EARLY) if c.curved), *WARMING.values())
+CURVED = (*(c.name for c in (*BASE, *_EARLY) if c.curved), *WARMING.values(), *BENDING.values())
 """How the names of nuisances begin along which no residual is linear."""
 OF_SIGNALS = frozenset(c.name for c in BASE if c.hook in ("gain", "log"))
 """Constants of sensors and logs: a segment observes them as its sensors and `fixed` say."""
@@ -180,7 +180,7 @@ def base_of(machine: Machine) -> tuple[Constant, ...]:
     further = sorted(set(machine.stated_u) - known)
     gains = (_gain(name, words="gain of a further instrument") for name in further)
     warmth = (
-        _unlogged(name, words=f"{column} of {path} over that of others, or its rise there")
+        _unlogged(name, words=f"{column} of {path} over that of others, or its course there")
         for name, (column, path) in machine.unlogged.items()
     )
     return (*BASE, *early, *gains, *warmth)

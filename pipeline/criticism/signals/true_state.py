@@ -28,7 +28,7 @@ from pipeline.criticism.operating import (
     Supply,
     Values,
 )
-from pipeline.criticism.parameter import UNLOGGED, WARMING, Machine
+from pipeline.criticism.parameter import BENDING, UNLOGGED, WARMING, Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.angle_sensor import angle_error, frame_angle, frame_turn, zero_angle
 
@@ -360,8 +360,12 @@ def _warmth(segment: Segment, signals: Signals, name: str, size: int, values: Va
     if name not in signals:
         known = [UNLOGGED[name], *([UNLOGGED_AT_REST] if name == "temp_winding_degc" else [])]
         warmed = sum(values[one] for one in segment.fixed if one.startswith(tuple(known)))
-        rise = sum(values[one] for one in segment.fixed if one.startswith(WARMING[name]))
-        return segment.fixed["ambient_k"] + warmed + rise * np.linspace(-0.5, 0.5, size)
+        rise, bend = (
+            sum(values[one] for one in segment.fixed if one.startswith(course[name]))
+            for course in (WARMING, BENDING)
+        )
+        at = np.linspace(-0.5, 0.5, size)
+        return segment.fixed["ambient_k"] + warmed + rise * at + bend * (1.0 - 12.0 * at**2)
     warm = signals[name] - 25.0 - values["offset_temp_k"]
     return _held(warm, size)
 

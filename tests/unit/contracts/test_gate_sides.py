@@ -205,6 +205,15 @@ def test_a_fifth_of_the_samples_may_be_lost(share: float, expected: str) -> None
         assert f"about {lost:.0f} samples are missing in 1 gaps, {100.0 * share:.2g} %" in words
 
 
+def test_a_rig_may_log_its_levels_alone() -> None:
+    """A third of the rows is missing, all of them where the level changes."""
+    t = np.arange(300.0)
+    kept = np.flatnonzero(np.arange(300) % 30 < 20)
+    made = capture("torque_map", t_s=t[kept], iq_a=(t // 30.0)[kept])
+    assert said("dropped_samples", made) == "warned"
+    assert said("dropped_samples", capture("drive", t_s=t[kept], iq_a=t[kept])) == "refused"
+
+
 @pytest.mark.parametrize(("usual", "expected"), [(0.95, "refused"), (1.05, "")])
 def test_steps_of_a_radian_leave_the_direction_open(usual: float, expected: str) -> None:
     angle = np.arange(90.0) * usual

@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import polars as pl
 import pytest
 
 from pipeline.criticism.comparison import compare
 from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.data.traces import window_of
 from pipeline.criticism.diagnosis import base_fit, diagnose
+from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.residuals.residual import operate
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -19,6 +23,7 @@ from pipeline.simulator.bench import campaign
 from pipeline.simulator.design import EXACT, Bench
 from pipeline.simulator.truth import truth
 from tests.simulated import campaign_of, design
+from tests.unit.criticism.machines import BASE, log, machine
 
 MOTOR = replace(design("gimbal-5208"), effects={})
 TRUE = truth(MOTOR)["constants"]
@@ -117,6 +122,30 @@ def test_a_winding_that_warms_within_a_log_without_a_thermometer_is_no_effect(na
     values = base_fit(blind, ModelSpec(), Constants()).system.fit.values
     for n, rise in enumerate(rises):
         assert values[f"warming_winding_k_{n}"] == pytest.approx(rise, rel=0.4)
+
+
+def test_a_winding_without_a_thermometer_may_come_to_rest_within_a_log():
+    """Forty-six kelvin in a minute, most of them in its first half, were an `unknown` drop."""
+    segment = log()
+    recorded = {n: c for n, c in segment.recorded.items() if n != "temp_winding_degc"}
+    fixed = {"ambient_k": 2.0, "warming_winding_k_0": 1.0, "bending_winding_k_0": 1.0}
+    blind = replace(segment, recorded=recorded, fixed=fixed)
+    values = {**BASE, "warming_winding_k_0": 10.0, "bending_winding_k_0": 3.0}
+    course = operate(blind, recorded, Model(machine(), ()), values).winding_k
+    assert course.mean() == pytest.approx(2.0, abs=0.01)
+    assert course[-1] - course[0] == pytest.approx(10.0)
+    assert course[course.size // 2] == pytest.approx(2.0 + 3.0, abs=0.01)
+
+
+def test_a_window_is_no_longer_than_what_is_free_of_gaps():
+    """A rig that logs settled rows alone, fifteen a level, had no window at all."""
+    keep = np.ones(3000, dtype=bool)
+    policy = DEFAULT.cutting
+    assert window_of(0.02, keep, policy) == policy.window_samples
+    keep[15::16] = False
+    assert window_of(0.02, keep, policy) == 15
+    keep[:] = False
+    assert window_of(0.02, keep, policy) == policy.least_window
 
 
 def test_a_shaft_that_rests_has_no_speed():
