@@ -61,7 +61,7 @@ class Priors:
     bend_angle_s2: float = chosen(
         1e-6, "s²", "angle by which a drive's frame is behind, over the acceleration of the shaft",
         why="a tracking loop of second order lags by the acceleration over its bandwidth squared: "
-        "1000 rad/s is usual",
+        "1000 rad/s is a usual default",
     )  # fmt: skip
     late_torque_s: float = derived(
         0.25, "sample periods", "lag of a torque transducer",
