@@ -73,7 +73,7 @@ def shaft_angle(columns: dict[str, Array], period: float, machine: Machine) -> S
         noise = sensor_noise(speed, policy := machine.policy.sensor_noise)
         if step := coarse_step(speed, noise, policy):
             return SpeedSensor(max(noise, scatter(speed, step, policy)), step)
-        window = window_of(period, np.ones(speed.size, dtype=bool), machine.policy.cutting)
+        window = window_of(period, speed.size, machine.policy.cutting)
         return SpeedSensor(slow_noise(speed, window / policy.window_means, policy), 0.0)
     else:
         columns["theta_mech_rad"] = np.zeros(next(iter(columns.values())).size)

@@ -219,8 +219,31 @@ def thinned(
     return cut, pad + (length + 2 * pad) * np.arange(starts.size)
 
 
-def window_of(period: float, keep: NDArray[np.bool_], policy: Cutting) -> int:
+def window_of(period: float, size: int, policy: Cutting) -> int:
     """Samples a window.
+
+    Parameters
+    ----------
+    period
+        Sample period [s].
+    size
+        Samples of the capture.
+    policy
+        Length of a window.
+
+    Returns
+    -------
+    int
+        The policy's time, but no fewer than its samples, and four windows in the capture where that
+        leaves enough.
+
+    """
+    samples = max(round(policy.window_s / period), policy.window_samples)
+    return max(min(samples, size // 4), policy.least_window)
+
+
+def window_between_gaps(period: float, keep: NDArray[np.bool_], policy: Cutting) -> int:
+    """Samples a window that is no longer than what is free of gaps.
 
     Parameters
     ----------
@@ -234,14 +257,12 @@ def window_of(period: float, keep: NDArray[np.bool_], policy: Cutting) -> int:
     Returns
     -------
     int
-        The policy's time, but no fewer than its samples, and four windows in the capture where that
-        leaves enough; no longer than what is free of gaps.
+        As `window_of`.
 
     """
-    samples = max(round(policy.window_s / period), policy.window_samples)
     ends = np.flatnonzero(~np.concatenate([[False], keep, [False]]))
     longest = int(np.diff(ends).max()) - 1
-    return max(min(samples, keep.size // 4, longest), policy.least_window)
+    return max(min(window_of(period, keep.size, policy), longest), policy.least_window)
 
 
 def parabolas(signal: Array, width: int) -> Array:

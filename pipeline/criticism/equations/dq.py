@@ -19,7 +19,7 @@ from pipeline.criticism.data.shaft_angle import (
     with_angle,
     with_smooth_angle,
 )
-from pipeline.criticism.data.traces import even_clock, thinned, window_of
+from pipeline.criticism.data.traces import even_clock, thinned, window_between_gaps
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
@@ -86,7 +86,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     speed = shaft_angle(columns, period, machine)
     turned = float(np.ptp(columns["theta_mech_rad"]))
     size = columns["vd_v"].size
-    window = window_of(period, keep, policy)
+    window = window_between_gaps(period, keep, policy)
     orders = machine.electrical_orders if angle and turned > policy.turning_rad else ()
     sensors = with_smooth_angle(
         capture, columns, prepared(columns, period, machine.policy, speed), machine, window

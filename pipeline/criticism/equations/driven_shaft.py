@@ -10,7 +10,7 @@ from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.settling import unexplained_voltage
-from pipeline.criticism.data.traces import smoothed, window_of
+from pipeline.criticism.data.traces import smoothed, window_between_gaps
 from pipeline.criticism.equation import Channel, Equation, NamedCombination, Observes, Sensing, Use
 from pipeline.criticism.machine.model import (
     ELECTRICAL,
@@ -70,7 +70,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     at = np.arange(log.keep.size) - shift
     columns[VOLTAGE] = columns[VOLTAGE][np.maximum(at, 0)]
     keep = log.keep & turns & (at >= 0) & log.keep[np.maximum(at, 0)]
-    window = window_of(log.period_s, keep, policy.cutting)
+    window = window_between_gaps(log.period_s, keep, policy.cutting)
     weak = projection(columns["theta_mech_rad"], window_starts(keep, window), window, ())
     return segment_of(
         capture,

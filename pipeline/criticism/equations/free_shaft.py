@@ -12,7 +12,13 @@ from pipeline.criticism.data.segment import Segment, Sensors, segment_of, slow_o
 from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.data.sensors import noise_and_steps, prepared
 from pipeline.criticism.data.shaft_angle import shaft_angle, with_angle
-from pipeline.criticism.data.traces import decimated, even_clock, smoothed, thinned, window_of
+from pipeline.criticism.data.traces import (
+    decimated,
+    even_clock,
+    smoothed,
+    thinned,
+    window_between_gaps,
+)
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import COAST_SHARES, Model, Pieces, clock_gain
 from pipeline.criticism.operating import Array, Operating, Signals, Values
@@ -62,7 +68,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     channel = TORQUE if TORQUE in columns else SPEED
     if capture.meta.test == "cogging":
         return _slow_turn(capture, machine, period, columns, keep, channel)
-    window = window_of(period, keep, policy)
+    window = window_between_gaps(period, keep, policy)
     keep = keep & _coasts(columns["theta_mech_rad"], window, machine.policy)
     sensors = prepared(columns, period, machine.policy, speed)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)

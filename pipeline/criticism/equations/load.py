@@ -8,7 +8,7 @@ from pipeline.criticism.data.drive_log import in_time
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.sensors import TEMPERATURES, prepared
 from pipeline.criticism.data.shaft_angle import shaft_angle, with_angle, with_smooth_angle
-from pipeline.criticism.data.traces import even_clock, thinned, window_of
+from pipeline.criticism.data.traces import even_clock, thinned, window_between_gaps
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Signals, Values
@@ -49,7 +49,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     period, columns, keep = even_clock(capture, ("iq_a", TORQUE, *further, *angle), policy)
     speed = shaft_angle(columns, period, machine)
     size = keep.size
-    window = window_of(period, keep, policy)
+    window = window_between_gaps(period, keep, policy)
     sensors = with_smooth_angle(
         capture, columns, prepared(columns, period, machine.policy, speed), machine, window
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
-from pipeline.criticism.data.traces import thinned, window_of
+from pipeline.criticism.data.traces import thinned, window_between_gaps
 from pipeline.criticism.data.unlogged_load import rests, runs_free
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
@@ -59,7 +59,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     shaft = {name: log.columns[name] for name in _USED if name in log.columns}
     shaft["t_s"] = log.period_s * np.arange(log.keep.size, dtype=np.float64)
     policy = machine.policy.cutting
-    window = window_of(log.period_s, log.keep, policy)
+    window = window_between_gaps(log.period_s, log.keep, policy)
     full = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
     pad = max(policy.motion_pad, reach(log.period_s, machine.policy.torsion))
     moves = log.keep & ~rests(shaft["theta_mech_rad"], window, policy)

@@ -18,7 +18,13 @@ from pipeline.criticism.data.segment import (
 from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
 from pipeline.criticism.data.sensors import prepared
 from pipeline.criticism.data.shaft_angle import ANGLES, shaft_angle, with_angle
-from pipeline.criticism.data.traces import LINES_V, even_clock, smoothed, thinned, window_of
+from pipeline.criticism.data.traces import (
+    LINES_V,
+    even_clock,
+    smoothed,
+    thinned,
+    window_between_gaps,
+)
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import OPEN_FLUX, Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Signals, Values
@@ -62,7 +68,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     policy = machine.policy.cutting
     signals = tuple(names if encoder else [*lines, *extra])
     period, columns, keep = even_clock(capture, signals, policy)
-    window = window_of(period, keep, policy)
+    window = window_between_gaps(period, keep, policy)
     if encoder:
         shaft_angle(columns, period, machine)
     else:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, segment_of
-from pipeline.criticism.data.traces import window_of
+from pipeline.criticism.data.traces import window_between_gaps
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, UNSAMPLED, Model, Pieces, values_of
 from pipeline.criticism.operating import Array, Operating, Signals, Values
@@ -48,7 +48,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     log = None if capture.has(*_BOTH_AXES) else drive_log(capture, machine)
     if log is None:
         return None
-    window = window_of(log.period_s, log.keep, machine.policy.cutting)
+    window = window_between_gaps(log.period_s, log.keep, machine.policy.cutting)
     starts = window_starts(log.keep, window)
     weak = projection(log.columns["theta_mech_rad"], starts, window, ())
     return segment_of(

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.criticism.data.segment import PAIR_RAD, Segment, segment_of
 from pipeline.criticism.data.sensors import prepared
-from pipeline.criticism.data.traces import even_clock, window_of
+from pipeline.criticism.data.traces import even_clock, window_between_gaps
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Recorded, Signals, Values
@@ -61,7 +61,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         # two windows in the longest level, where a multimeter took few rows of each
         jumps = np.abs(np.diff(amps)) > policy.change_u * sensors.noise["i_pair_a"]
         longest = int(np.diff(np.flatnonzero(np.concatenate([[True], jumps, [True]]))).max())
-        window = min(window_of(period, keep, policy), longest // 2)
+        window = min(window_between_gaps(period, keep, policy), longest // 2)
         window = max(window, policy.least_window)
     weak = projection(np.zeros(keep.size), window_starts(keep, window), window, ())
     if not stepped:

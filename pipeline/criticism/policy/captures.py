@@ -158,8 +158,8 @@ class Cutting:
     )
     unstated_pwm_s: float = chosen(
         1e-4, "s", "PWM period of a log that is slower than a PWM that it does not state",
-        why="drives of motors switch at 8 to 40 kHz; without one, eight of thirteen sound logs of a "
-        "foreign bench had a delay as a name or were unknown",
+        why="drives of motors switch at 8 to 40 kHz; without one, eight of thirteen sound logs of "
+        "a foreign bench had a delay as a name or were unknown",
     )  # fmt: skip
     instant_rad: float = chosen(
         0.2, "rad", "turn of the highest order in a coasting sample that is as good as an instant",

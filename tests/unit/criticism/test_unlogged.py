@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.criticism.comparison import compare
 from pipeline.criticism.data.machine_scale import machine_of
-from pipeline.criticism.data.traces import window_of
+from pipeline.criticism.data.traces import window_between_gaps
 from pipeline.criticism.diagnosis import base_fit, diagnose
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
@@ -141,11 +141,11 @@ def test_a_window_is_no_longer_than_what_is_free_of_gaps():
     """A rig that logs settled rows alone, fifteen a level, had no window at all."""
     keep = np.ones(3000, dtype=bool)
     policy = DEFAULT.cutting
-    assert window_of(0.02, keep, policy) == policy.window_samples
+    assert window_between_gaps(0.02, keep, policy) == policy.window_samples
     keep[15::16] = False
-    assert window_of(0.02, keep, policy) == 15
+    assert window_between_gaps(0.02, keep, policy) == 15
     keep[:] = False
-    assert window_of(0.02, keep, policy) == policy.least_window
+    assert window_between_gaps(0.02, keep, policy) == policy.least_window
 
 
 def test_a_shaft_that_rests_has_no_speed():
