@@ -103,8 +103,10 @@ UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlo
 """Nuisance that stands for a temperature where a test that warms the machine did not record it."""
 WARMING = {"temp_winding_degc": "warming_winding_k", "temp_magnet_degc": "warming_magnet_k"}
 """Nuisance of what such a temperature rises by from the begin to the end of one capture."""
-BENDING = {"temp_winding_degc": "bending_winding_k", "temp_magnet_degc": "bending_magnet_k"}
-"""Nuisance of how far it is above its mean in the middle of one: a winding comes to rest."""
+BENDING = {"temp_winding_degc": "bending_winding_k"}
+"""Nuisance of how far it is above its mean in the middle of one: a winding comes to rest within a
+minute, a magnet does not.
+"""
 
 
 @dataclass(frozen=True, slots=True)

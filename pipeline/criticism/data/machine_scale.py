@@ -114,8 +114,8 @@ def _unlogged(campaign: Campaign) -> dict[str, tuple[str, str]]:
             nuisances |= {f"{nuisance}_{n}": (column, path) for n, path in enumerate(paths)}
         logs = (c for c in campaign.of(*_TRACED) if c.has("iq_a") and not c.has(column))
         loaded = sorted(c.path for c in logs)
-        for course in (WARMING, BENDING):
-            nuisances |= {f"{course[column]}_{n}": (column, path) for n, path in enumerate(loaded)}
+        for stem in (course[column] for course in (WARMING, BENDING) if column in course):
+            nuisances |= {f"{stem}_{n}": (column, path) for n, path in enumerate(loaded)}
     return nuisances
 
 

@@ -361,7 +361,11 @@ def _warmth(segment: Segment, signals: Signals, name: str, size: int, values: Va
         known = [UNLOGGED[name], *([UNLOGGED_AT_REST] if name == "temp_winding_degc" else [])]
         warmed = sum(values[one] for one in segment.fixed if one.startswith(tuple(known)))
         rise, bend = (
-            sum(values[one] for one in segment.fixed if one.startswith(course[name]))
+            sum(
+                values[one]
+                for one in segment.fixed
+                if name in course and one.startswith(course[name])
+            )
             for course in (WARMING, BENDING)
         )
         at = np.linspace(-0.5, 0.5, size)
