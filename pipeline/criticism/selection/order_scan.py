@@ -230,7 +230,7 @@ class Log:
         Returns
         -------
         list of Log
-            One where there are fewer parts of a few turns than that.
+            None where there are fewer parts of a few turns than that.
 
         """
         edges = np.linspace(0.0, len(self.parts), count + 1).round().astype(int)
@@ -245,13 +245,12 @@ Line = tuple[float, Log]
 
 def _in_all_parts(cluster: Sequence[Line], policy: OrderScan) -> bool:
     """Whether each part of the time of the only log has the order of a cluster."""
-    return any(
-        all(
-            any(abs(order - other) <= policy.apart for other in _lines(part, policy))
-            for part in log.divided(policy.captures)
-        )
-        for order, log in cluster
-    )
+    for order, log in cluster:
+        lines = [_lines(part, policy) for part in log.divided(policy.captures)]
+        near = [any(abs(order - other) <= policy.apart for other in part) for part in lines]
+        if near and all(near):
+            return True
+    return False
 
 
 def _lines_in(segment: Segment, fit: Fit) -> list[Line]:

@@ -99,6 +99,14 @@ def test_of_a_single_log_both_halves_have_an_order():
     assert left(replace(whole, recorded={**whole.recorded, TORQUE: torque})) == ()
 
 
+def test_a_single_log_of_a_few_turns_has_no_order():
+    """It has no halves that could agree."""
+    one = log(10_600, 1, 1.0)
+    wave = 3e-3 * one.recorded["iq_a"] * np.cos(16 * one.recorded["theta_mech_rad"] + 0.4)
+    waved = replace(one, recorded={**one.recorded, TORQUE: one.recorded[TORQUE] + wave})
+    assert left(waved) == ()
+
+
 def test_a_free_shaft_shows_orders_as_well():
     """Its current is logged and its torque is not: the acceleration has them."""
     one = log(16_000, 1, 1.0)
