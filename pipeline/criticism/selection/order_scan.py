@@ -72,10 +72,10 @@ def orders_left(system: LinearSystem) -> tuple[float, ...]:
         logs = [log for _, log in cluster]
         seen = {log.capture for log in logs}
         if len(seen) >= policy.captures or (only and _in_all_parts(cluster, policy)):
-            found = {order for order, _ in cluster}
+            found = [order for order, _ in cluster]
+            order = float(np.median(found))
             # one that all logs have at a whole number, stronger lines taken out of each, is that
-            order = found.pop() if len(found) == 1 else float(np.median([*found]))
-            if not (order.is_integer() and not found):
+            if not order.is_integer() or len(set(found)) > 1:
                 order = _common(order, logs, policy)
             orders.append(int(order) if order.is_integer() else order)
     return tuple(dict.fromkeys(orders))
@@ -282,8 +282,9 @@ def _logs(segment: Segment, fit: Fit) -> Iterator[Log]:
 
 
 def _has_waves(segment: Segment) -> bool:
-    """Whether a segment is a log under load whose equation looks at orders of the angle."""
-    return segment.weak is not None and {"theta_mech_rad", "iq_a"} <= set(segment.recorded)
+    """Whether a segment is a log of a current and of an angle that a sensor recorded."""
+    logged = {"theta_mech_rad", "iq_a"} <= set(segment.recorded)
+    return segment.weak is not None and segment.sensors.speed is None and logged
 
 
 def _weight(weak: Projection, size: int) -> Array:

@@ -13,7 +13,7 @@ from pipeline.records.uncertainty import propagate
 
 METHOD = Method("coast_friction")
 COASTS = {"torque_coulomb_nm": "coast_coulomb_rad_s2", "b_visc_nm_s_rad": "coast_viscous_1_s"}
-"""What a coast tells of each constant, over the inertia."""
+"""What a coast gives of each constant, over the inertia."""
 EXPERIMENT = (
     "state j_rotor_kgm2 with its u_j_rotor_kgm2, or record a drive with iq_a and theta_mech_rad "
     "beside the spin_down"
@@ -21,7 +21,7 @@ EXPERIMENT = (
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """T_c and b by what coasts tell of them over the inertia.
+    """T_c and b by what coasts give of them over the inertia.
 
     Notes
     -----
@@ -43,7 +43,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 def _one(name: str, inertia: Estimate, coast: Estimate | None) -> Estimate:
     """One constant, of the stated inertia."""
     if coast is None:
-        return METHOD.missing(name, f"no coast tells of it; {EXPERIMENT}")
+        return METHOD.missing(name, f"no coast gives it; {EXPERIMENT}")
     parts = propagate([(coast.number, inertia.budget), (inertia.number, coast.budget)])
     words = f"rests on the stated j_rotor_kgm2 of {inertia.number:.4g} kg·m²"
     return METHOD.measured(

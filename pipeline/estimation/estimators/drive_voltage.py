@@ -104,7 +104,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         rows, solution, (scatter, dof), (magnet, magnet_parts), chosen, (moved, doubts), turn
     )
     if drop_v:
-        estimates = _without_drop(estimates, rows, linear_fit(design, rows.columns[DROP]), drop_v)
+        estimates = _without_drop(estimates, linear_fit(design, rows.columns[DROP]), drop_v)
     return Fit(estimates, _evidence(rows, solution))
 
 
@@ -123,17 +123,20 @@ def _plausible_drop(rows: VoltageRows, magnet: float) -> tuple[VoltageRows, floa
 
 
 def _without_drop(
-    estimates: tuple[Estimate, ...], rows: VoltageRows, along: LinearFit, drop_v: float
+    estimates: tuple[Estimate, ...], along: LinearFit, drop_v: float
 ) -> tuple[Estimate, ...]:
     """The estimates with what a drop that was not fitted may make of Ke and R; R is given up where
     that is as large as itself.
     """
-    words = f"the current has one size, and a drop of the inverter's is taken as 0 ± {drop_v:.2g} V"
+    words = (
+        "resistance and a drop are one column where the current has one size: a fit gave one that "
+        f"no inverter has, and a drop of the inverter's is taken as 0 ± {drop_v:.2g} V"
+    )
     widened = []
     for one, slope in zip(estimates, along.coefficients.tolist(), strict=False):
         part = Contribution("assumed:inverter_drop", abs(slope) * drop_v, "B")
         if one.known and one.number <= 2.0 * part.u:
-            note = f"{one.number:.3g} ± {part.u:.2g} {METHOD.unit(one.name)}, for {words}"
+            note = f"{one.number:.3g} ± {part.u:.2g} {METHOD.unit(one.name)}: {words}"
             widened.append(METHOD.missing(one.name, f"{note}; {EXPERIMENT}"))
         elif one.known:
             widened.append(replace(one, budget=(*one.budget, part), note=f"{one.note}; {words}"))

@@ -181,7 +181,7 @@ def test_an_effect_that_is_not_there_at_its_own_size_shadows_none():
 
 
 def test_candidates_are_tried_by_what_they_are_worth(monkeypatch):
-    """Of four that tie, the cheapest is among the few that are refitted."""
+    """Of two that tie, the cheaper one comes first: only a few are refitted."""
     tried = []
     monkeypatch.setattr(stepwise, "_chosen", lambda _, passing, *__: tried.extend(passing))
     wide = linear_system(fitted((log(noise=1.0),)))
