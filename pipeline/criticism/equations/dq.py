@@ -32,7 +32,7 @@ from pipeline.criticism.signals.shaft import (
     torque_reading,
     true_load,
 )
-from pipeline.criticism.signals.true_current import current_between, drive_current
+from pipeline.criticism.signals.true_current import HOLD_ENDS, current_between, drive_current
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
     averaging,
@@ -170,7 +170,8 @@ def _hold_ends(
     """
     begin, end = (segment.instrument.frame + part for part in (-0.5, 0.5))
     parts = (begin * x.supply.hold_s / segment.ts_s, end * x.supply.hold_s / segment.ts_s)
-    first, last = current_between(segment, current, model, parts).reshape(-1, 2).T
+    both = current_between(segment, current, model, parts, HOLD_ENDS)
+    first, last = both.reshape(-1, 2).T
     return (begin * x.supply.hold_s, first - current), (end * x.supply.hold_s, last - current)
 
 

@@ -62,6 +62,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     window = window_between_gaps(log.period_s, log.keep, policy)
     full = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
     pad = max(policy.motion_pad, reach(log.period_s, machine.policy.torsion))
+    # a window needs the rows that show what its current does between them
+    pad = max(pad, -(-(machine.policy.ripple.rows - window) // 2))
     moves = log.keep & ~rests(shaft["theta_mech_rad"], window, policy)
     shaft, starts = thinned(shaft, moves, window, policy.windows_motion, pad)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())

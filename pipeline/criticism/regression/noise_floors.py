@@ -23,6 +23,8 @@ from pipeline.criticism.residuals.channels import (
     reported_unit,
 )
 from pipeline.criticism.residuals.residual import operate, residual
+from pipeline.criticism.signals.shaft import averaged
+from pipeline.criticism.signals.true_current import unseen_waves
 from pipeline.criticism.signals.voltage import central, unresolved
 
 VOLTS = ("vd_v", "vq_v")
@@ -242,10 +244,11 @@ def _of_torque(segment: Segment, model: Model, values: Values) -> Array | float:
         x = operate(segment, segment.recorded, model, values)
         total[:, 0] = np.hypot(total[:, 0], at_rest(segment, model, values, x))
         total[:, 0] = np.hypot(total[:, 0], at_reversals(segment, model, values, x))
+    kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
     if "pulses" in errors:
         total[:, 0] = np.hypot(total[:, 0], _of_pulses(segment, model, values, x))
+        total[:, 0] = np.hypot(total[:, 0], kt * _of_waves(segment, x.theta_rad.size))
     if "current_jumps" in errors:
-        kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
         jumps = kt * _jumps(segment, ("id_a", "iq_a"), policy)
         total = np.hypot(total, jumps[:, None])
     if "torque_jumps" in errors:
@@ -269,6 +272,21 @@ def _of_pulses(segment: Segment, model: Model, values: Values, x: Operating) -> 
     share = model.policy.noise_floors.pulses * (pwm_s / l_q) ** 2 * values["r_ohm"]
     torque = 1.5 * pairs * values["psi_wb"] * share * emf_v
     return np.abs(weak.project(torque[None])[0, :, 0])
+
+
+def _of_waves(segment: Segment, size: int) -> Array:
+    """Current [W, A] of waves that rows do not show, as weak samples: the rms over their phase.
+
+    Where six electrical turns are nearly a whole number of rows, each row has the same phase of a
+    wave, and the mean of the rows is not that of the current.
+    """
+    weak, unseen = segment.weak, unseen_waves(segment, size)
+    if weak is None or unseen is None:
+        return np.zeros(segment.size if weak is None else weak.starts.size)
+    finer = size // segment.size
+    rows = [averaged(part, finer) for one in unseen for part in (one.real, one.imag)]
+    missed: Array = np.sqrt((weak.project(np.array(rows))[:, :, 0] ** 2).sum(0) / 2.0)
+    return missed
 
 
 def steep_drops(model: Model, values: Values, x: Operating) -> Complex:

@@ -82,6 +82,9 @@ class Waves:
         Points [b, p] of each block, of as many a row as it was made for.
     beyond
         Of each wave the part [b, p, k] that straight lines between rows miss.
+    slow
+        Which orders [b, o] look like a slow current in the rows of a block: of their size there
+        these rows show nothing.
 
     """
 
@@ -89,6 +92,7 @@ class Waves:
     fit: Array
     places: NDArray[np.int64]
     beyond: Array
+    slow: NDArray[np.bool_]
 
     @classmethod
     def of(
@@ -134,7 +138,8 @@ class Waves:
         halves = np.arange(round(2.0 * policy.slow * width))
         slow, _ = np.linalg.qr(np.cos(np.pi / width * np.outer(np.arange(width) + 0.5, halves)))
         apart = waves - slow @ (slow.T @ waves)
-        apart *= _fast_shares(waves, apart)[:, None, :] > policy.fast_share
+        shown = _fast_shares(waves, apart) > policy.fast_share
+        apart *= shown[:, None, :]
         fast = current[rows] - (current[rows] @ slow) @ slow.T
         fit = _fitted(apart, fast, policy.predicted)
         row, part = np.divmod(np.arange(step * len(parts)), len(parts))
@@ -144,7 +149,8 @@ class Waves:
         share = (at - before)[:, :, None]
         eps = np.interp(at, np.arange(eps_rad.size), eps_rad)
         straight = (1.0 - share) * _waves(eps_rad[before]) + share * _waves(eps_rad[before + 1])
-        return cls(rows, fit, len(parts) * own + part, _waves(eps) - straight)
+        places = len(parts) * own + part
+        return cls(rows, fit, places, _waves(eps) - straight, ~shown[:, : len(ORDERS)])
 
     def added(self, current: Complex, size: int) -> Complex:
         """What the waves add to straight lines.
@@ -164,6 +170,33 @@ class Waves:
         """
         total = np.zeros(size, dtype=np.complex128)
         total[self.places] = (self.beyond @ (self.fit @ current[self.rows][:, :, None]))[:, :, 0]
+        return total
+
+    def unseen(self, current: Complex, size: int) -> Complex:
+        """What waves may add where the rows do not show how large they are.
+
+        Parameters
+        ----------
+        current
+            At the rows [n, A].
+        size
+            Points.
+
+        Returns
+        -------
+        array [o, size], complex
+            Of each order, in A of the q axis, times a phase that is not known: as large as it is
+            in the mean of the blocks of the log that show it.
+
+        """
+        sizes = (self.fit @ current[self.rows][:, :, None]).imag[:, :, 0]
+        power = (sizes**2).reshape(-1, 2, len(ORDERS)).sum(1)
+        there = np.any(self.fit, axis=(1, 2))[:, None] & ~self.slow
+        level = np.sqrt((power * there).sum(0) / np.maximum(there.sum(0), 1))
+        total = np.zeros((len(ORDERS), size), dtype=np.complex128)
+        for order, one in enumerate(total):
+            wave = self.beyond[:, :, order] + 1j * self.beyond[:, :, order + len(ORDERS)]
+            one[self.places] = level[order] * self.slow[:, order, None] * wave
         return total
 
 

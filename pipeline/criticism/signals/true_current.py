@@ -13,6 +13,9 @@ from pipeline.criticism.operating import Array, Complex, Recorded, Signals, Valu
 from pipeline.criticism.signals.angle_sensor import both_axes
 from pipeline.criticism.signals.between_rows import Waves, at_parts, evenly
 
+WAVES, HOLD_ENDS = "waves", "hold_ends"
+"""Places between rows: even ones, and where a vector that is held begins and ends."""
+
 
 def drive_current(
     segment: Segment, signals: Signals, model: Model, values: Values, size: int
@@ -56,7 +59,11 @@ def _at_rows(segment: Segment, signals: Signals, model: Model, values: Values) -
 
 
 def current_between(
-    segment: Segment, current: Complex, model: Model, parts: tuple[float, ...]
+    segment: Segment,
+    current: Complex,
+    model: Model,
+    parts: tuple[float, ...],
+    name: str = WAVES,
 ) -> Complex:
     """A log's current between its rows: straight lines, and waves of the angle on them.
 
@@ -70,6 +77,8 @@ def current_between(
         Pole pairs and policy.
     parts
         Where points are behind each row [p, rows].
+    name
+        Of these places; what they take is computed once for each name.
 
     Returns
     -------
@@ -84,7 +93,7 @@ def current_between(
         recorded = _recorded(segment, signals, model).i_a
         return Waves.of(segment, recorded, pairs * theta, parts, policy)
 
-    waves = segment.once(theta, "waves", (parts, pairs, policy), made)
+    waves = segment.once(theta, name, (parts, pairs, policy), made)
     lines = at_parts(current, parts)
     return lines + waves.added(current, lines.size) if segment.instrument.waves else lines
 
@@ -98,8 +107,31 @@ def ripples(segment: Segment) -> bool:
         The log.
 
     """
-    known = segment.cache.get("waves")
-    return known is not None and bool(known[2].fit.any())
+    known = (segment.cache.get(name) for name in (WAVES, HOLD_ENDS))
+    return any(bool(one[2].fit.any()) for one in known if one is not None)
+
+
+def unseen_waves(segment: Segment, size: int) -> Complex | None:
+    """Waves of a log's current whose size its rows do not show (`Waves.unseen`).
+
+    Parameters
+    ----------
+    segment
+        A log that was looked at between its rows.
+    size
+        Points.
+
+    Returns
+    -------
+    array [o, size], complex, or None
+        In A of the q axis; None where no such wave was looked for.
+
+    """
+    known = segment.cache.get(WAVES)
+    if known is None or not segment.instrument.waves:
+        return None
+    signals = segment.recorded
+    return known[2].unseen(signals.get("id_a", 0.0) + 1j * signals["iq_a"], size)
 
 
 def table_current(

@@ -101,3 +101,22 @@ def test_no_wave_goes_across_a_gap_and_short_runs_have_none() -> None:
     pieces = ROW_S * (np.arange(ROWS) + 500.0 * (np.arange(ROWS) // 30))
     straight, with_waves = missed(1.6, t_s=pieces)
     assert with_waves == straight
+
+
+def test_a_wave_that_rows_do_not_show_is_as_large_as_where_they_do() -> None:
+    """Half of the log turns a sixth of a turn a row but for a thousandth, half a fourteenth."""
+    sixth = 2.0 * np.pi / 6.0
+    turn_rad = np.where(np.arange(ROWS * POINTS) < ROWS * POINTS // 2, 0.43, 0.999) * sixth
+    eps = np.cumsum(turn_rad) / POINTS
+    current = (slow(AT) + 0.2j * np.cos(6.0 * eps + 0.4))[::POINTS] + NOISE
+    segment = clock(ROW_S * np.arange(ROWS))
+    waves = Waves.of(segment, current, eps[::POINTS], PARTS, POLICY)
+    unseen = waves.unseen(current, AT.size)
+    shown, not_shown = slice(0, 1200), slice(2000, -POINTS)
+    assert not unseen[:, shown].any()
+    assert np.abs(unseen[0, not_shown]).max() == pytest.approx(2.0 * 0.2, rel=0.1)
+    assert np.abs(unseen[1]).max() < 0.03
+    # what straight lines miss there is within it, at every point
+    true = 0.2 * np.cos(6.0 * eps + 0.4)
+    beside = true - on_points(true[::POINTS], AT.size)
+    assert (np.abs(beside) < 1.1 * np.abs(unseen[0]) + 1e-3)[not_shown].all()
