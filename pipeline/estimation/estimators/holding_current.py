@@ -12,6 +12,7 @@ from pipeline.estimation.estimators.cogging import (
     mean_speed_rad_s,
     name_orders,
     part_orders,
+    past_doubt,
     slots_and_pole_pairs,
     spectrum_bars,
 )
@@ -100,8 +101,10 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     spec, present = find_orders(turns, highest, options["level"])
-    lines, slow = part_orders(present, known, campaign)
     positions = even_positions(turns)
+    # of few positions an order looks like another, which no slots or poles need make
+    counting = present if positions else past_doubt(present, known, campaign)[0]
+    lines, slow = part_orders(counting, known, campaign)
     residuals = held_out_residual(turns, [line.order for line in [*lines, *slow]])
     rms_a = None if residuals is None else float(np.sqrt(np.mean(residuals**2)))
     waves = _Waves(captures, spec, lines, positions, rms_a)

@@ -129,6 +129,22 @@ def test_orders_one_and_two_are_unbalance_but_in_motors_that_make_them() -> None
     assert [one.order for one in slow] == [1]
 
 
+def test_an_order_that_nothing_makes_counts_past_doubt_alone() -> None:
+    """12 slots and 7 pole pairs; 83 and 85 are sidebands of an eccentric encoder."""
+    found = [line(84), line(59, p=5e-3), line(59 * 2, p=1e-9), line(36, p=5e-3), line(35, p=5e-3)]
+    found += [line(2, p=5e-3), line(83, 0.1, p=5e-3), line(85, -0.1, p=5e-3)]
+    plate = plated(slots=12, pole_pairs=7)
+    counting, strangers = cogging.past_doubt(found, Constants(), plate)
+    assert [one.order for one in strangers] == [59]
+    assert [one.order for one in counting] == [84, 118, 36, 35, 2, 83, 85]
+    assert cogging.past_doubt(found, Constants(), plated(slots=12))[1] == []
+    # of three phases any multiple of three may be slots
+    at_odds = cogging.past_doubt(
+        [line(59, p=5e-3), line(27, p=5e-3)], Constants(), plated(pole_pairs=7)
+    )
+    assert [[one.order for one in part] for part in at_odds] == [[27], [59]]
+
+
 def test_the_second_and_third_multiple_count_with_their_own_noise() -> None:
     spec = spectrum_of([0.0, 0.1], [0.0, 0.1])
     kept = cogging.peak_orders([line(20)], spec, [], [])
