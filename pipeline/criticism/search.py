@@ -280,7 +280,9 @@ def _by_orders(
 ) -> tuple[Ladder, UnknownStructure | None, float]:
     """The ladder, a sketch of what it leaves and the deviance that this takes.
 
-    Orders a turn that a first ladder leaves unseen have rows of their own.
+    Orders a turn that a first ladder leaves unseen have rows of their own. Where something is left
+    without one, an effect may have taken a part of them, and the steps before are looked at: a gap
+    between two masses took the half of a cogging beyond the rows' reach.
 
     Steps of a programme make lines of any order too, and these predict no other capture: orders
     that are no whole numbers join where the sketch with them takes more.
@@ -290,6 +292,8 @@ def _by_orders(
     integers = tuple(order for order in unobserved if isinstance(order, int))
     if integers:
         ladder = search_again(*integers)
+    elif not unobserved and ladder.remainders:
+        ladder = _by_earlier_orders(ladder, search_again)
     sketch, gain = _sketched(ladder, ladder.remainders, name)
     if len(unobserved) > len(integers) and not ladder.explains(ladder.remainders):
         with_fractions = search_again(*unobserved)
@@ -297,6 +301,22 @@ def _by_orders(
         if wider_sketch is not None and (sketch is None or wider_gain > gain):
             return with_fractions, wider_sketch, wider_gain
     return ladder, sketch, gain
+
+
+def _by_earlier_orders(ladder: Ladder, search_again: Callable[..., Ladder]) -> Ladder:
+    """The ladder with the whole orders that its latest step with some leaves, where less is left;
+    else the same.
+    """
+    for step in reversed(ladder.steps[:-1]):
+        orders = tuple(order for order in orders_left(step.system) if isinstance(order, int))
+        if orders:
+            return min(ladder, search_again(*orders), key=_worst)
+    return ladder
+
+
+def _worst(ladder: Ladder) -> float:
+    """The largest χ²/n that a ladder leaves."""
+    return max((left_over.chi2_per_n for left_over in ladder.remainders), default=0.0)
 
 
 def _with_drift(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder | None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records.parse import number
+from pipeline.records.row_means import row_means, slower_rows
 
 if TYPE_CHECKING:
     import polars as pl
@@ -285,7 +286,9 @@ class Capture:
         dict of array [n]
             Each column in its unit. The clock is that of `table_of`; columns of other tables are
             interpolated linearly onto it, from their own unmasked, finite samples, and are NaN
-            outside their own span.
+            outside their own span. Beside slower rows that are means (`voltage_timing`) they are
+            means over the row as well, but for angles, which have one value at an instant: an
+            oscillation that the rows average out is no noise of the other column.
 
         Raises
         ------
@@ -326,13 +329,12 @@ class Capture:
                 keep = self.kept(index) & np.isfinite(other[name].to_numpy())
                 if not keep.any():
                     return np.full(table.height, np.nan)
-                return np.interp(
-                    table["t_s"].to_numpy(),
-                    other["t_s"].to_numpy()[keep],
-                    other[name].to_numpy()[keep],
-                    left=np.nan,
-                    right=np.nan,
-                )
+                row_s, sample_s = table["t_s"].to_numpy(), other["t_s"].to_numpy()[keep]
+                samples = other[name].to_numpy()[keep]
+                means = self.meta.voltage_timing == "centred" and not name.startswith("theta_")
+                if means and slower_rows(row_s, sample_s):
+                    return row_means(row_s, sample_s, samples)
+                return np.interp(row_s, sample_s, samples, left=np.nan, right=np.nan)
         raise KeyError(f"{self.path} holds no column {name}")
 
 

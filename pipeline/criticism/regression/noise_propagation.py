@@ -199,8 +199,10 @@ class _Recording:
         """The columns with an angle, or the speed that it is the integral of, rounded anew; none
         where neither is rounded.
 
-        A rounded signal shows neither where between two steps it began nor, to a step a window, how
-        fast it moved: both are spread evenly.
+        A rounded signal does not show where between two steps it began, and how fast it moved to a
+        part of a step a window (`NoiseFloors.pace`): both are spread evenly. Of an even pace the
+        same harmonic of the rounding meets an order in every window: a wider spread would leave
+        that one out.
         """
         sensors, weak = self.segment.sensors, self.segment.weak
         if not sensors.rounded:
@@ -208,9 +210,10 @@ class _Recording:
         theta = self.segment.recorded["theta_mech_rad"]
         ramp = np.arange(theta.size) / (theta.size if weak is None else weak.length)
         spread = (np.arange(count) + 0.5) / count - 0.5
-        paces = 2.0 * np.random.default_rng(count).permutation(spread)
-        for number, (shift, pace) in enumerate(zip(spread, paces, strict=True)):
-            moved = shift + pace * ramp
+        pace = 2.0 * self.model.policy.noise_floors.pace
+        paces = pace * np.random.default_rng(count).permutation(spread)
+        for number, (shift, of_pace) in enumerate(zip(spread, paces, strict=True)):
+            moved = shift + of_pace * ramp
             if sensors.speed is not None:
                 generator = np.random.default_rng([count, number])
                 error = _rounded_speed(sensors.speed, self.even[_SPEED], moved, generator)

@@ -308,7 +308,9 @@ def _parts(theta: Array, weight: Array, policy: OrderScan) -> Iterator[NDArray[n
     count = max(round(turns / policy.turns), int(turns >= policy.least_turns))
     edges = np.searchsorted(turned, np.linspace(0.0, turned[-1], count + 1)) if count else ()
     for first, last in pairwise(edges):
-        yield rows[first:last]
+        # a shaft that turns far in a row may leave none to a part
+        if last - first > 1:
+            yield rows[first:last]
 
 
 def _lines(log: Log, policy: OrderScan) -> list[float]:

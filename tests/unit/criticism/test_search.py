@@ -132,3 +132,27 @@ def test_a_changed_constant_is_reported_where_it_takes_more_than_a_sketch(climbs
 def test_a_changed_constant_is_no_matter_where_the_names_explain_all(climbs):
     climbs.explained, climbs.change = True, SimpleNamespace(gain=9.0, words="psi_wb is lower")
     assert (end().change, end().notes) == (None, ())
+
+
+@pytest.mark.parametrize(("better", "taken"), [(1.2, "wider"), (4.0, "first")])
+def test_orders_of_an_earlier_step_join_where_the_last_one_leaves_something(
+    monkeypatch: pytest.MonkeyPatch, better: float, taken: str
+) -> None:
+    """A gap between two masses took a part of a cogging, and its orders were not seen behind it."""
+    seen = {"base": (7, 9), "cogging": (22, 4.83, 24), "backlash": ()}
+
+    def ladder(name: str, left: float, *systems: str) -> SimpleNamespace:
+        steps = tuple(SimpleNamespace(system=system) for system in systems)
+        remainders = (SimpleNamespace(chi2_per_n=left),)
+        return SimpleNamespace(name=name, steps=steps, remainders=remainders)
+
+    asked = []
+
+    def search_again(*orders: int) -> SimpleNamespace:
+        asked.append(orders)
+        return ladder("wider", better) if orders else ladder("first", 2.5, *seen)
+
+    monkeypatch.setattr(search, "orders_left", lambda system: seen[system])
+    monkeypatch.setattr(search, "_sketched", lambda *_: (None, 0.0))
+    assert search._by_orders(search_again, "m_unknown")[0].name == taken
+    assert asked == [(), (22, 24)]

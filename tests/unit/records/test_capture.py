@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import polars as pl
+import pytest
 
 from pipeline.records.capture import Capture, CaptureMeta, Mask
+from pipeline.records.row_means import row_means, slower_rows
 
 
 def test_a_stream_of_which_every_row_is_set_aside_is_missing() -> None:
@@ -17,3 +19,40 @@ def test_a_stream_of_which_every_row_is_set_aside_is_missing() -> None:
     data = capture.arrays("iq_a", "temp_winding_degc")
     assert np.isnan(data["temp_winding_degc"]).all()
     assert data["iq_a"].size == 6
+
+
+def rows_beside(timing: str, fast_hz: float = 2000.0) -> tuple[dict[str, np.ndarray], Capture]:
+    """Rows of 5 ms of a current, beside a torque and an angle on a clock of their own."""
+    fast_s = np.arange(0.0, 0.1, 1.0 / fast_hz)
+    ringing = 2.0 + 10.0 * fast_s + 0.5 * np.sin(2.0 * np.pi * 380.0 * fast_s)
+    fast = {"t_s": fast_s, "torque_shaft_nm": ringing, "theta_mech_rad": 3.0 * fast_s**2}
+    row_s = np.arange(0.0025, 0.09, 0.005)
+    slow = {"t_s": row_s, "id_a": 0.0 * row_s, "iq_a": np.ones(row_s.size), "vd_v": 0.0 * row_s}
+    meta = CaptureMeta("m", "torque_map", voltage_timing=timing)
+    tables = (pl.DataFrame(slow), pl.DataFrame(fast))
+    capture = Capture("c", "0" * 64, "verified", meta, tables)
+    names = ("t_s", "id_a", "iq_a", "vd_v", "torque_shaft_nm", "theta_mech_rad")
+    return capture.arrays(*names), capture
+
+
+def test_a_fast_column_is_a_mean_beside_slow_rows_that_are_means() -> None:
+    data, _ = rows_beside("centred")
+    line = 2.0 + 10.0 * data["t_s"]
+    # 380 Hz over 5 ms: 1.9 periods, whose mean is 0.05 of the amplitude at the most
+    assert np.abs(data["torque_shaft_nm"] - line).max() < 0.03
+    assert data["theta_mech_rad"] == pytest.approx(3.0 * data["t_s"] ** 2, abs=1e-6)
+
+
+def test_a_fast_column_is_an_instant_beside_slow_rows_that_are_instants() -> None:
+    data, _ = rows_beside("instant")
+    line = 2.0 + 10.0 * data["t_s"]
+    assert np.abs(data["torque_shaft_nm"] - line).max() > 0.3
+
+
+def test_a_row_is_averaged_over_what_is_recorded_of_it() -> None:
+    row_s, sample_s = np.array([-0.1, 0.0, 1.0, 2.0, 3.1]), np.linspace(0.0, 3.0, 31)
+    means = row_means(row_s, sample_s, sample_s)
+    assert np.isnan(means[[0, 4]]).all()
+    assert means[1:4] == pytest.approx([0.25, 1.0, 2.0])
+    assert not slower_rows(sample_s, sample_s)
+    assert not slower_rows(row_s[:1], sample_s)

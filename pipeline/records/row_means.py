@@ -1,0 +1,66 @@
+"""What a fast signal is beside slow rows that are means: its own mean over each row."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+FASTER = 1.5
+"""How many times as often as the rows a signal is sampled that is averaged over them."""
+
+
+def slower_rows(row_s: Array, sample_s: Array) -> bool:
+    """Whether rows are slower than the samples of another table.
+
+    Parameters
+    ----------
+    row_s
+        Times of the rows [n, s].
+    sample_s
+        Times of the samples [m, s].
+
+    """
+    if row_s.size < 2 or sample_s.size < 2:
+        return False
+    return bool(np.median(np.diff(row_s)) > FASTER * np.median(np.diff(sample_s)))
+
+
+def row_means(row_s: Array, sample_s: Array, samples: Array) -> Array:
+    """Means of a sampled signal over rows about their middles.
+
+    Parameters
+    ----------
+    row_s
+        Middles of the rows [n, s]; each is as long as the median of their distances.
+    sample_s
+        Times of the samples [m, s], ascending.
+    samples
+        The signal [m, any unit], finite.
+
+    Returns
+    -------
+    array [n]
+        Of straight lines between samples, over what of a row the samples span; NaN where they do
+        not span its middle.
+
+    """
+    half = 0.5 * float(np.median(np.diff(row_s)))
+    steps = np.diff(sample_s)
+    integral = np.concatenate([[0.0], np.cumsum(steps * 0.5 * (samples[1:] + samples[:-1]))])
+
+    def until(t_s: Array) -> Array:
+        place = np.clip(np.searchsorted(sample_s, t_s, side="right") - 1, 0, steps.size - 1)
+        within = t_s - sample_s[place]
+        share = within / np.where(steps[place] > 0.0, steps[place], 1.0)
+        rise = samples[place + 1] - samples[place]
+        part: Array = integral[place] + within * (samples[place] + 0.5 * share * rise)
+        return part
+
+    begin = np.clip(row_s - half, sample_s[0], sample_s[-1])
+    end = np.clip(row_s + half, sample_s[0], sample_s[-1])
+    inside = (row_s >= sample_s[0]) & (row_s <= sample_s[-1]) & (end > begin)
+    means = np.full(row_s.size, np.nan)
+    means[inside] = (until(end) - until(begin))[inside] / (end - begin)[inside]
+    return means
