@@ -196,6 +196,45 @@ def held_speed(
     return np.append(level & quiet, False)
 
 
+def out_of_step(
+    capture: Capture, theta_rad: Array, keep: NDArray[np.bool_], machine: Machine, window: int
+) -> NDArray[np.bool_]:
+    """Samples of a drive's log but for those at whose speed its encoder counts in step with them.
+
+    Parameters
+    ----------
+    capture
+        Whose rows they are.
+    theta_rad
+        Recorded angle [n].
+    keep
+        Samples that count [n].
+    machine
+        Step of its encoder.
+    window
+        Samples of a weak window.
+
+    Returns
+    -------
+    array [n] of bool
+        `keep` without those where the counts of a row are within one a window of a whole number,
+        but for zero; all of it where that is most of them, and where rows are means.
+
+    Notes
+    -----
+    The loops of a drive answer the rounding of its angle, a line at the rate of the counts. There,
+    rows that are instants see one phase of that ripple of currents and voltages, and not its mean.
+
+    """
+    if not machine.encoder_rad or capture.meta.voltage_timing == "centred":
+        return keep
+    turned = smoothed(np.abs(np.gradient(theta_rad)), 2 * (window // 2) + 1)
+    counts = turned / machine.encoder_rad
+    whole = np.rint(counts)
+    apart = keep & ((whole == 0.0) | (np.abs(counts - whole) >= 1.0 / window))
+    return apart if 2 * np.count_nonzero(apart) > keep.size else keep
+
+
 def whole_log(columns: Mapping[str, Array], period: float, policy: Cutting) -> dict[str, Array]:
     """The signals of a log that an instrument may record late, of all samples.
 

@@ -14,6 +14,7 @@ from pipeline.criticism.data.sensors import TEMPERATURES, prepared
 from pipeline.criticism.data.shaft_angle import (
     ANGLES,
     held_speed,
+    out_of_step,
     shaft_angle,
     whole_log,
     with_angle,
@@ -91,6 +92,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     sensors = with_smooth_angle(
         capture, columns, prepared(columns, period, machine.policy, speed), machine, window
     )
+    keep = out_of_step(capture, columns["theta_mech_rad"], keep, machine, window)
     if held and torque:
         # a noisy speed that is differenced, times J, would be a torque
         noise_rad = speed.noise_rad_s * period if speed is not None else 0.0
