@@ -64,8 +64,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         return METHOD.nothing(GIVES, note)
     highest = largest_order(turns, int(options["highest_order"]))
     spec, lines = find_orders(turns, highest, options["level"])
-    counting, strangers = past_doubt(lines, known, campaign)
-    by_cause = *part_orders(counting, known, campaign), strangers
+    counting, unexplained = past_doubt(lines, known, campaign)
+    by_cause = *part_orders(counting, known, campaign), unexplained
     estimates = _cogging(captures, spec, by_cause, known, campaign, options)
     estimates += (_friction(captures, turns, spec, known),)
     return Fit(estimates, _evidence(turns, spec, by_cause[0]))
@@ -74,7 +74,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 def past_doubt(
     lines: Sequence[OrderLine], known: Constants, campaign: Campaign
 ) -> tuple[list[OrderLine], list[OrderLine]]:
-    """Parts the orders that count from strangers, which chance may have made.
+    """Parts the orders that count from unexplained ones, which chance may have made.
 
     Parameters
     ----------
@@ -87,9 +87,9 @@ def past_doubt(
 
     Returns
     -------
-    counting, strangers
-        Strangers are orders that neither unbalance nor teeth nor poles nor sidebands of an encoder
-        explain, where p is not below `cogging.stranger_level`. The slots of three phases are a
+    counting, unexplained
+        Neither unbalance nor teeth nor poles nor sidebands of an encoder make the unexplained
+        ones, and their p is not below `cogging.stranger_level`. The slots of three phases are a
         multiple of three. Where no pole pairs are known, all orders count.
 
     Notes
@@ -230,10 +230,10 @@ def _cogging(
     campaign: Campaign,
     options: Mapping[str, float],
 ) -> tuple[Estimate, ...]:
-    lines, slow, strangers = by_cause
+    lines, slow, unexplained = by_cause
     also = f"; also {name_orders(slow, known, campaign)} N·m, of unbalance or coupling" * bool(slow)
-    if strangers:
-        also += f"; left out: {name_orders(strangers, known, campaign)} N·m, which no slots or "
+    if unexplained:
+        also += f"; left out: {name_orders(unexplained, known, campaign)} N·m, which no slots or "
         also += "poles make and chance may"
     tested = f"{spec.orders.size} orders tested over {spec.turns} turns at {options['level']:g}"
     if not lines:

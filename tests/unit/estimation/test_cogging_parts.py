@@ -134,8 +134,8 @@ def test_an_order_that_nothing_makes_counts_past_doubt_alone() -> None:
     found = [line(84), line(59, p=5e-3), line(59 * 2, p=1e-9), line(36, p=5e-3), line(35, p=5e-3)]
     found += [line(2, p=5e-3), line(83, 0.1, p=5e-3), line(85, -0.1, p=5e-3)]
     plate = plated(slots=12, pole_pairs=7)
-    counting, strangers = cogging.past_doubt(found, Constants(), plate)
-    assert [one.order for one in strangers] == [59]
+    counting, unexplained = cogging.past_doubt(found, Constants(), plate)
+    assert [one.order for one in unexplained] == [59]
     assert [one.order for one in counting] == [84, 118, 36, 35, 2, 83, 85]
     assert cogging.past_doubt(found, Constants(), plated(slots=12))[1] == []
     # of three phases any multiple of three may be slots
