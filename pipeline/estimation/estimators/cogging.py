@@ -9,15 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.mechanical.slow_turns import (
+    of_still_shaft,
+    part_orders,
+    past_doubt,
+    slots_and_pole_pairs,
+    slow_turns,
+    torque_turns,
+)
 from pipeline.estimation.method import Method
-from pipeline.estimation.policy import policy
+from pipeline.estimation.policy import DEFAULT, policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, unstated_note
 from pipeline.numerics.order_waveform import half_peak_to_peak, waveform
 from pipeline.numerics.orders import OrderLine, detection_limit, find_orders, phase_modulated
 from pipeline.numerics.turn_spectrum import Spectrum, noise_power
-from pipeline.numerics.turns import Turn, largest_order, whole_turns
+from pipeline.numerics.turns import Turn, largest_order
 from pipeline.physics.mechanics import cogging_order
 from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Campaign, Capture
@@ -29,7 +36,7 @@ from pipeline.records.uncertainty import Contribution
 METHOD = Method("cogging")
 COGGING = ("cogging_order", "cogging_amplitude_nm", "cogging_peak_nm")
 GIVES = (*COGGING, "torque_coulomb_nm")
-AIDS = ("pole_pairs", "coast_coulomb_rad_s2", "coast_viscous_1_s")
+AIDS = ("pole_pairs", "coast_coulomb_rad_s2", "coast_viscous_1_s", "j_rotor_kgm2")
 EXPERIMENT = (
     "record a cogging test: zero current, at least one slow whole turn each way, with "
     "theta_mech_rad and torque_shaft_nm"
@@ -45,7 +52,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 
     The coefficients c_k are those of each whole turn (numerics.orders); an order is there where
     its mean over the turns stands out of what they scatter. The mean over both directions holds
-    the cogging, half their difference the friction.
+    the cogging, half their difference the friction. Where the inertia is known, what the shaft
+    itself shakes at an order is added (`slow_turns.of_still_shaft`).
 
     References
     ----------
@@ -53,90 +61,19 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     a motor makes).
 
     """
-    captures = [c for c in campaign.of("cogging") if c.has("theta_mech_rad", "torque_shaft_nm")]
-    turns: list[Turn] = []
-    for capture in captures:
-        columns = capture.arrays("theta_mech_rad", "torque_shaft_nm")
-        finite = np.isfinite(columns["theta_mech_rad"])
-        turns += whole_turns(columns["theta_mech_rad"][finite], columns["torque_shaft_nm"][finite])
+    captures = slow_turns(campaign)
+    turns = torque_turns(captures)
     if len(turns) < 2:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     highest = largest_order(turns, int(options["highest_order"]))
     spec, lines = find_orders(turns, highest, options["level"])
     counting, unexplained = past_doubt(lines, known, campaign)
+    counting = of_still_shaft(counting, captures, known.best("j_rotor_kgm2"))
     by_cause = *part_orders(counting, known, campaign), unexplained
     estimates = _cogging(captures, spec, by_cause, known, campaign, options)
     estimates += (_friction(captures, turns, spec, known),)
     return Fit(estimates, _evidence(turns, spec, by_cause[0]))
-
-
-def past_doubt(
-    lines: Sequence[OrderLine], known: Constants, campaign: Campaign
-) -> tuple[list[OrderLine], list[OrderLine]]:
-    """Parts the orders that count from unexplained ones, which chance may have made.
-
-    Parameters
-    ----------
-    lines
-        Orders found, the strongest first.
-    known
-        Constants found so far.
-    campaign
-        Its nameplate, where the pole pairs are not known.
-
-    Returns
-    -------
-    counting, unexplained
-        Neither unbalance nor teeth nor poles nor sidebands of an encoder make the unexplained
-        ones, and their p is not below `cogging.stranger_level`. The slots of three phases are a
-        multiple of three. Where no pole pairs are known, all orders count.
-
-    Notes
-    -----
-    Of a thousand orders that are tested at 0.01, one motor in a hundred has a false one, and a
-    fleet has many motors. A slow turn of a shaft that rings with its load has more.
-
-    """
-    slots, pairs = slots_and_pole_pairs(known, campaign)
-    if not lines or not pairs:
-        return list(lines), []
-    teeth, sides = (slots or 3, pairs), phase_modulated(lines, lines[0].order)
-    counting = [
-        line
-        for line in lines
-        if line.p_value < policy().cogging.stranger_level
-        or line.order <= 2
-        or line in sides
-        or any(line.order % order == 0 for order in teeth)
-    ]
-    return counting, [line for line in lines if line not in counting]
-
-
-def part_orders(
-    lines: Sequence[OrderLine], known: Constants, campaign: Campaign
-) -> tuple[list[OrderLine], list[OrderLine]]:
-    """Parts the orders that teeth and magnets can make from those of a shaft that is not true.
-
-    Parameters
-    ----------
-    lines
-        All orders found.
-    known
-        Constants found so far.
-    campaign
-        Its nameplate, where the pole pairs are not known.
-
-    Returns
-    -------
-    cogging, slow
-        Orders 1 and 2 are slow except in a motor of one or two pole pairs or slots: unbalance, a
-        bent shaft and an eccentric coupling make them in any motor.
-
-    """
-    slots_and_poles = {*slots_and_pole_pairs(known, campaign)} - {None}
-    slow = [line for line in lines if line.order <= 2 and not slots_and_poles & {1, line.order}]
-    return [line for line in lines if line not in slow], slow
 
 
 def peak_orders(
@@ -194,22 +131,6 @@ def _teeth(known: Constants, campaign: Campaign) -> list[int]:
     return [n for n in (slots or 0, 2 * (pairs or 0)) if n > 1]
 
 
-def slots_and_pole_pairs(known: Constants, campaign: Campaign) -> tuple[int | None, int | None]:
-    """Slots by the nameplate, and pole pairs as measured, else by the nameplate.
-
-    Parameters
-    ----------
-    known
-        Constants so far.
-    campaign
-        Captures of the motor.
-
-    """
-    slots = campaign.nameplate("slots")
-    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
-    return slots if isinstance(slots, int) else None, pairs
-
-
 def name_orders(lines: Sequence[OrderLine], known: Constants, campaign: Campaign) -> str:
     """What each order found says of the motor, in words."""
     slots, pairs = slots_and_pole_pairs(known, campaign)
@@ -244,6 +165,8 @@ def _cogging(
     sides = phase_modulated(lines, leading.order)
     amplitude = float(np.sqrt(sum(line.amplitude**2 for line in [leading, *sides])))
     note = f"N·m by order: {name_orders(lines, known, campaign)}; {tested}{also}"
+    if known.best("j_rotor_kgm2") is not None:
+        note += "; with J times the shaft's own acceleration at each order"
     if sides:
         note += "; sidebands are those of an eccentric encoder and counted to the amplitude"
     peak, u_peak = half_peak_to_peak(peak_orders(lines, spec, _teeth(known, campaign), sides))
@@ -415,5 +338,8 @@ ESTIMATOR = Estimator(
     uses=AIDS,
     aids=AIDS,
     rank=10,
-    options={"highest_order": 1000.0, "level": 0.01},
+    options={
+        "highest_order": float(DEFAULT.cogging.highest_order),
+        "level": DEFAULT.cogging.level,
+    },
 )

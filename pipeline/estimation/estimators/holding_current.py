@@ -8,14 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.estimation.estimators.cogging import (
-    mean_speed_rad_s,
-    name_orders,
-    part_orders,
-    past_doubt,
-    slots_and_pole_pairs,
-    spectrum_bars,
-)
+from pipeline.estimation.estimators.cogging import mean_speed_rad_s, name_orders, spectrum_bars
+from pipeline.estimation.mechanical.slow_turns import part_orders, past_doubt, slots_and_pole_pairs
 from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy

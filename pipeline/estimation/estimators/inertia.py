@@ -28,6 +28,7 @@ from pipeline.estimation.mechanical.setups import another_setup, setups_of
 from pipeline.estimation.mechanical.shaft_doubts import DRAGS, Doubts
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, SAMPLED, ShaftRows, shaft_rows
+from pipeline.estimation.mechanical.slow_turns import leading_order
 from pipeline.estimation.mechanical.torque_constant import UNKNOWN, USES, torque_constant
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
@@ -66,7 +67,6 @@ AIDS = (
     "ld_h",
     "lq_h",
     "pole_pairs",
-    "cogging_order",
     "r_phase_ohm",
 )
 NUISANCES = (
@@ -260,7 +260,8 @@ def _setups_reason(setups: Sequence[Setup]) -> str:
 def _rows(known: Constants, campaign: Campaign) -> ShaftRows | None:
     """Rows of the drives that log their load, of all drives where none does; and of coast-downs."""
     pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
-    forms = DRAG_FORMS, *_orders(known, pairs), winding_of(pairs, known.best("r_phase_ohm"))
+    winding = winding_of(pairs, known.best("r_phase_ohm"))
+    forms = DRAG_FORMS, *_orders(known, campaign, pairs), winding
     logged = [c for c in campaign.of("drive", "spin_down") if not _loadless(c)]
     rows = shaft_rows(logged, *forms)
     if rows is not None and np.any(rows.kind == DRIVE):
@@ -341,10 +342,12 @@ def _torque(known: Constants) -> Torque | None:
     return Torque(kt.number, kt.budget, 0.0, (), *magnet, words, reluctance_known=False)
 
 
-def _orders(known: Constants, pairs: int | None) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _orders(
+    known: Constants, campaign: Campaign, pairs: int | None
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Orders a turn of cogging, and of the torque ripple that six-fold back-EMF harmonics make."""
-    order = known.best("cogging_order")
-    cogging = () if order is None else (round(order.number),)
+    order = leading_order(campaign, known)
+    cogging = () if order is None else (order,)
     return cogging, () if pairs is None else (6 * pairs,)
 
 

@@ -256,6 +256,13 @@ class RippleTorque:
 class Cogging:
     """Which orders of torque against angle are a motor's."""
 
+    highest_order: int = chosen(
+        1000, "1", "highest order a turn that is looked for",
+        why="cogging of 36 slots and 42 poles is 252 a turn, and has three multiples in it",
+    )  # fmt: skip
+    level: float = derived(
+        0.01, "1", "chance that any order is found in noise", source="beyond the 99 % interval"
+    )
     stranger_level: float = chosen(
         1e-6, "1", "chance below which an order that no tooth makes counts",
         why="over a turn its crest meets the others somewhere: a false one adds its whole height",

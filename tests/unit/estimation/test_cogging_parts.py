@@ -7,10 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.estimation.estimators import (
-    cogging,
-    holding_current,
-)
+from pipeline.estimation.estimators import cogging, holding_current
+from pipeline.estimation.mechanical import slow_turns
 from pipeline.numerics.orders import OrderLine
 from pipeline.numerics.turn_spectrum import Spectrum, noise_power
 from pipeline.numerics.turns import Turn
@@ -120,12 +118,12 @@ def test_what_orders_say_of_the_motor() -> None:
 
 def test_orders_one_and_two_are_unbalance_but_in_motors_that_make_them() -> None:
     lines = [line(84), line(1), line(2), line(3)]
-    body, slow = cogging.part_orders(lines, Constants(), plated(slots=12, pole_pairs=7))
+    body, slow = slow_turns.part_orders(lines, Constants(), plated(slots=12, pole_pairs=7))
     assert [one.order for one in slow] == [1, 2]
     assert [one.order for one in body] == [84, 3]
     for meta in ({"pole_pairs": 1}, {"slots": 1}):
-        assert cogging.part_orders(lines, Constants(), plated(**meta))[1] == []
-    _, slow = cogging.part_orders(lines, Constants(), plated(pole_pairs=2))
+        assert slow_turns.part_orders(lines, Constants(), plated(**meta))[1] == []
+    _, slow = slow_turns.part_orders(lines, Constants(), plated(pole_pairs=2))
     assert [one.order for one in slow] == [1]
 
 
@@ -134,12 +132,12 @@ def test_an_order_that_nothing_makes_counts_past_doubt_alone() -> None:
     found = [line(84), line(59, p=5e-3), line(59 * 2, p=1e-9), line(36, p=5e-3), line(35, p=5e-3)]
     found += [line(2, p=5e-3), line(83, 0.1, p=5e-3), line(85, -0.1, p=5e-3)]
     plate = plated(slots=12, pole_pairs=7)
-    counting, unexplained = cogging.past_doubt(found, Constants(), plate)
+    counting, unexplained = slow_turns.past_doubt(found, Constants(), plate)
     assert [one.order for one in unexplained] == [59]
     assert [one.order for one in counting] == [84, 118, 36, 35, 2, 83, 85]
-    assert cogging.past_doubt(found, Constants(), plated(slots=12))[1] == []
+    assert slow_turns.past_doubt(found, Constants(), plated(slots=12))[1] == []
     # of three phases any multiple of three may be slots
-    at_odds = cogging.past_doubt(
+    at_odds = slow_turns.past_doubt(
         [line(59, p=5e-3), line(27, p=5e-3)], Constants(), plated(pole_pairs=7)
     )
     assert [[one.order for one in part] for part in at_odds] == [[27], [59]]
@@ -158,6 +156,53 @@ def test_the_second_and_third_multiple_count_with_their_own_noise() -> None:
     stranger = [line(20), line(7, p=0.9e-6), line(9, p=1.1e-6), line(12, p=0.5), line(11, p=0.5)]
     kept = cogging.peak_orders(stranger, spec, [6], [stranger[4]])
     assert {one.order for one in kept} == {20, 7, 12, 11, 40, 60}
+
+
+def shaking(sense: float, rotor_kgm2: float, load_kgm2: float, cogging_nm: float):
+    """A slow turn, 60 orders of cogging, of a rotor that shakes with a load that gives way."""
+    step, theta, omega = 1e-4, 0.1, 3.0 * sense
+    rows = np.empty((round(TURN / 3.0 / step * 1.05), 2))
+    for row in rows:
+        pull = -cogging_nm * math.sin(60.0 * theta) / (rotor_kgm2 + load_kgm2)
+        # a weak speed loop holds the mean
+        pull += 2.0 * (3.0 * sense - omega)
+        row[:] = theta, -cogging_nm * math.sin(60.0 * theta) - rotor_kgm2 * pull - 0.01 * sense
+        omega += step * pull
+        theta += step * omega
+    theta_rad, torque = rows[::10].T
+    count = TURN / 16384
+    return capture(
+        "cogging",
+        f"turn_{sense:+.0f}",
+        t_s=10 * step * np.arange(theta_rad.size),
+        theta_mech_rad=count * np.floor(theta_rad / count),
+        torque_shaft_nm=torque + np.random.default_rng(1).normal(0.0, 1e-4, torque.size),
+        slots=30,
+        pole_pairs=2,
+    )
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_shaft_that_shakes_takes_a_part_of_its_cogging(stated: bool) -> None:
+    """A load of twice the rotor's inertia: without J two thirds of the cogging are seen."""
+    turns = tuple(shaking(sense, 1e-4, 2e-4, 0.006) for sense in (1.0, -1.0))
+    known = Constants((known_value("j_rotor_kgm2", 1e-4),) if stated else ())
+    options = dict(cogging.ESTIMATOR.options)
+    found = cogging.fit(Campaign("m", turns), known, options).estimates
+    by_name = {one.name: one for one in found}
+    assert by_name["cogging_order"].number == 60
+    amplitude = by_name["cogging_amplitude_nm"]
+    assert amplitude.number == pytest.approx(0.006 if stated else 0.004, rel=0.03)
+    assert by_name["cogging_peak_nm"].number == pytest.approx(amplitude.number, rel=0.1)
+
+
+def test_the_uncertainty_of_the_inertia_is_in_what_it_adds() -> None:
+    turns = [shaking(sense, 1e-4, 2e-4, 0.006) for sense in (1.0, -1.0)]
+    inertia = known_value("j_rotor_kgm2", 1e-4, 1e-5)
+    (sure,) = slow_turns.of_still_shaft([line(60, 0.004)], turns, known_value("j_rotor_kgm2", 1e-4))
+    (unsure,) = slow_turns.of_still_shaft([line(60, 0.004)], turns, inertia)
+    assert math.sqrt(unsure.u**2 - sure.u**2) == pytest.approx(0.1 * 0.002, rel=0.1)
+    assert slow_turns.of_still_shaft([line(60, 0.004)], turns, None) == [line(60, 0.004)]
 
 
 def test_an_order_seen_on_even_positions_may_be_another() -> None:

@@ -22,6 +22,7 @@ from pipeline.estimation.mechanical.locked_rotor import angle_doubt, ripple_shar
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.estimation.uncertainty.agreement import judges, reconciled
 from pipeline.numerics.least_squares import linear_fit
+from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import type_a, type_b
 from tests.recovery.simulated import recorded
@@ -155,8 +156,11 @@ def test_reluctance_by_itself_by_the_inductances_or_not_at_all() -> None:
 
 
 def test_orders_of_cogging_and_of_six_fold_ripple() -> None:
-    assert _orders(Constants((known_value("cogging_order", 84.0),)), 7) == ((84,), (42,))
-    assert _orders(Constants(), None) == ((), ())
+    plate = {"slots": 12, "pole_pairs": 7}
+    campaign = Campaign("m", (capture("drive", t_s=np.arange(2.0), **plate),))
+    assert _orders(Constants(), campaign, 7) == ((84,), (42,))
+    bare = Campaign("m", (capture("drive", t_s=np.arange(2.0)),))
+    assert _orders(Constants(), bare, None) == ((), ())
 
 
 def test_the_share_of_the_acceleration_that_follows_no_torque() -> None:
