@@ -8,7 +8,6 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
-from pipeline.criticism.data.shaft_angle import out_of_step
 from pipeline.criticism.data.traces import thinned, window_between_gaps
 from pipeline.criticism.data.unlogged_load import rests, runs_free
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
@@ -65,8 +64,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     pad = max(policy.motion_pad, reach(log.period_s, machine.policy.torsion))
     # a window needs the rows that show what its current does between them
     pad = max(pad, -(-(machine.policy.ripple.rows - window) // 2))
-    keep = out_of_step(capture, shaft["theta_mech_rad"], log.keep, machine, window)
-    moves = keep & ~rests(shaft["theta_mech_rad"], window, policy)
+    moves = log.keep & ~rests(shaft["theta_mech_rad"], window, policy)
     shaft, starts = thinned(shaft, moves, window, policy.windows_motion, pad)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     middle = np.rint(shaft["t_s"][starts + window // 2] / log.period_s)
