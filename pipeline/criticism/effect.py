@@ -23,7 +23,7 @@ from pipeline.criticism.operating import (
     between,
     log1p,
 )
-from pipeline.criticism.parameter import Machine, Parameter, choice
+from pipeline.criticism.parameter import Machine, Parameter, alone, choice
 
 __all__ = [
     "Array",
@@ -34,6 +34,7 @@ __all__ = [
     "Parameter",
     "Recorded",
     "Values",
+    "alone",
     "between",
     "choice",
     "log1p",

@@ -390,6 +390,9 @@ class Recorded:
     ahead
         Changes of current, torque and electrical angle within a delay [s], from the whole log; None
         where these samples are all there is.
+    analysed
+        Whether the voltages beside it are measured, so that an analyser may have recorded all of
+        them with sensors of its own.
 
     """
 
@@ -402,6 +405,18 @@ class Recorded:
     instrument: str
     phase: int | None = None
     ahead: Callable[[float], tuple[Complex, Array, Array]] | None = None
+    analysed: bool = False
+
+    def by_drive(self, q: Values) -> bool:
+        """Whether an error of a drive's own sensors is in these currents.
+
+        Parameters
+        ----------
+        q
+            Of the effect; with `alone` the currents beside measured voltages are an analyser's.
+
+        """
+        return self.inverter and not (self.analysed and q["alone"])
 
     def later(self, delay_s: float) -> tuple[Complex, Array, Array]:
         """Current and torque as they are recorded some time later, and what the rotor turns until

@@ -99,6 +99,12 @@ def choice(name: str, values: tuple[float, ...], words: str = "") -> Parameter:
     return Parameter(name, "1", 1.0, 0.0, words=words, scan=values, choice=True)
 
 
+def alone() -> Parameter:
+    """Whether the sensors of a drive recorded the currents beside measured voltages too."""
+    words = "1: of the logs of a drive's own voltages alone, 0: of those with measured ones as well"
+    return choice("alone", (0.0, 1.0), words)
+
+
 UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
 """Nuisance that stands for a temperature where a test that warms the machine did not record it."""
 WARMING = {"temp_winding_degc": "warming_winding_k", "temp_magnet_degc": "warming_magnet_k"}

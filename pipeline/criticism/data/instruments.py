@@ -72,6 +72,7 @@ def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
             ("gain_torque", meta.u_rel_torque),
             ("offset_temp_k", meta.u_temp_degc),
             ("gain_lcr", _u_lcr(meta)),
+            ("phase_lcr_rad", _u_lcr(meta)),
             ("gain_clock", meta.u_rel_clock),
         ):
             if one:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values, choice
+from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values, alone, choice
 
 _LATE = tuple(2.0**k for k in range(1, 8))
 _EARLY = tuple(-late for late in _LATE)
@@ -12,7 +12,7 @@ _EARLY = tuple(-late for late in _LATE)
 
 
 def _current(r: Recorded, q: Values) -> Complex:
-    if not r.inverter:
+    if not r.by_drive(q):
         return r.i_a
     # of phase currents, the rotor has turned on since they were sampled
     later, _, turned = r.later(q["delay_s"])
@@ -36,6 +36,7 @@ EFFECT = Effect(
             (1.0, 0.0),
             "1: the phase currents are late, 0: those of the rotor frame are",
         ),
+        alone(),
     ),
     signals=("id_a", "iq_a"),
     alternatives={

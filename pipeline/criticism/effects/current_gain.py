@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values, choice
+from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values, alone, choice
 
 
 def _current(r: Recorded, q: Values) -> Complex:
-    if not r.inverter:
+    if not r.by_drive(q):
         return r.i_a if r.phase is None else r.i_a / (1.0 + q["bench"] * _of_phase(r.phase, q))
     gamma = (q["cosine"] + 1j * q["sine"]) * np.exp(-2j * r.eps_rad)
     mean = 1.0 + q["mean"] + 1j * _turn(q)
@@ -51,6 +51,7 @@ EFFECT = Effect(
         Parameter("mean", "1", 0.01, 0.0, low=-0.3, high=0.3, usual=(0.0, 0.03)),
         choice("shunts", (0.0, 1.0, 2.0, 3.0)),
         choice("bench", (0.0, 1.0)),
+        alone(),
     ),
     signals=("id_a", "iq_a"),
     alternatives={"phase_imbalance": "resistance through all three terminal pairs"},

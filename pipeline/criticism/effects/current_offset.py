@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values
+from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values, alone
 
 
 def _current(r: Recorded, q: Values) -> Complex:
-    if not r.inverter:
+    if not r.by_drive(q):
         return r.i_a
     offset = (q["alpha_a"] + 1j * q["beta_a"]) * np.exp(-1j * r.eps_rad)
     return r.i_a - offset
@@ -25,6 +25,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("alpha_a", "A", 0.01, 0.0005, "current_a", low=-0.3, high=0.3),
         Parameter("beta_a", "A", 0.01, 0.0005, "current_a", low=-0.3, high=0.3),
+        alone(),
     ),
     signals=("id_a", "iq_a"),
     alternatives={},

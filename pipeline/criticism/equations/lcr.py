@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
 from pipeline.criticism.data.sensor_noise import resolution
 from pipeline.criticism.equation import Channel, Equation, Observes
-from pipeline.criticism.machine.model import Model, Pieces, evaluate
+from pipeline.criticism.machine.model import PHASE_LCR, Model, Pieces, evaluate
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.true_state import Motion, operating
@@ -99,7 +99,12 @@ def predicted(
     Notes
     -----
     A unit of current through ab is i = (2/√3) e^{−j(30° + ε)} in the rotor frame, and the line
-    voltage is √3 Re[v e^{j(30° + ε)}].
+    voltage is √3 Re[v e^{j(30° + ε)}]. The meter shows an impedance of a gain and a phase of its
+    own: an error δ of the phase is one of −δ ω L in the resistance, Q times as large a share of it.
+
+    References
+    ----------
+    Keysight Technologies, Impedance Measurement Handbook, 6th ed. (accuracy of R_s at a Q).
 
     """
     del pieces
@@ -114,7 +119,13 @@ def predicted(
         "lab_h": ((sides[0].psi_wb - sides[1].psi_wb) / (2 * probe) * back).real,
         "rab_ohm": ((sides[0].drop_v - sides[1].drop_v) / (2 * probe) * back).real,
     }
-    return (1.0 + values["gain_lcr"]) * np.stack([rows[c] for c in segment.channels])
+    hz = np.where(x.freq_hz > 0.0, x.freq_hz, model.policy.tables.lcr_hz)
+    reactance, late = 2.0 * math.pi * hz, values[PHASE_LCR]
+    shown = {
+        "lab_h": rows["lab_h"] + late * rows["rab_ohm"] / reactance,
+        "rab_ohm": rows["rab_ohm"] - late * reactance * rows["lab_h"],
+    }
+    return (1.0 + values["gain_lcr"]) * np.stack([shown[c] for c in segment.channels])
 
 
 EQUATION = Equation(

@@ -111,6 +111,7 @@ BASE: tuple[Constant, ...] = (
     _gain("gain_torque", words="gain of the torque transducer"),
     Constant("late_torque_s", "s", "lag of the torque transducer", 0.0, "gain", "period_s"),
     _gain("gain_lcr", words="gain of the LCR meter"),
+    Constant("phase_lcr_rad", "rad", "phase of the LCR meter's impedance", hook="gain"),
     Constant("gain_clock", "1", "recorded time over true time, less one", hook="gain"),
     Constant("offset_temp_k", "K", "offset of the thermometers", hook="gain", curved=True),
     _of_log("unlogged_d_share", "1", "reluctance torque of an unlogged i_d"),
@@ -139,6 +140,8 @@ UNLOGGED_AT_REST = "unlogged_rest_k"
 """That of the winding in tests at rest: they warm it little, and show nothing of one that turns."""
 _NOTHING = 1e-6
 """Share of its usual size that a nuisance keeps beside an effect that names it."""
+PHASE_LCR = "phase_lcr_rad"
+"""Nuisance of an LCR meter, whose resistance it makes unsure by as much as Q times its gain."""
 LATE_TORQUE = "late_torque_s"
 """Nuisance of every transducer: its filter."""
 LATE_SPEED = "late_speed_s"

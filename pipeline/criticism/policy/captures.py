@@ -244,6 +244,10 @@ class Cutting:
 class Tables:
     """Tables without a clock: their levels and what they are known to; currents that hold."""
 
+    lcr_hz: float = chosen(
+        1000.0, "Hz", "frequency of an LCR meter that is not recorded",
+        why="what bench meters begin with",
+    )  # fmt: skip
     levels: int = chosen(
         4, "levels", "levels of current from which on they are held out one by one",
         why="the others show a curve, its slope and scatter",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Hooks
 from pipeline.criticism.library.equations import equation_of
-from pipeline.criticism.machine.model import LATE_TORQUE, OF_SIGNALS
+from pipeline.criticism.machine.model import LATE_TORQUE, OF_SIGNALS, PHASE_LCR
 from pipeline.criticism.parameter import Machine
 
 
@@ -62,6 +62,7 @@ def constants_in(segment: Segment, machine: Machine) -> frozenset[str]:
         "gain_torque": observes_sensor(segment, "load"),
         LATE_TORQUE: observes_sensor(segment, "load"),
         "gain_lcr": observes_sensor(segment, "lcr"),
+        PHASE_LCR: observes_sensor(segment, "lcr"),
         "offset_temp_k": any(name.startswith("temp_") for name in segment.recorded),
         "gain_clock": observes_sensor(segment, "clock"),
         instrument.meter: observes_sensor(segment, "voltage"),

@@ -189,6 +189,7 @@ def _recorded(segment: Segment, signals: Signals, model: Model) -> Recorded:
         inverter=True,
         instrument=segment.instrument.name,
         ahead=ahead_in(segment, signals, model.machine.pole_pairs),
+        analysed=bool(segment.fixed.get("measured")),
     )
 
 

@@ -56,7 +56,7 @@ def test_a_scope_a_multimeter_a_drive_and_a_bridge_are_four_instruments():
     }
     assert gains["lcr"] == gains["spin_down"] == {}
     u = stated_u(captures)
-    assert u.pop("gain_lcr") == pytest.approx(0.05 * 2**0.5)
+    assert u.pop("gain_lcr") == u.pop("phase_lcr_rad") == pytest.approx(0.05 * 2**0.5)
     assert u == {
         "gain_current": 0.01,
         "gain_commanded": 0.005,

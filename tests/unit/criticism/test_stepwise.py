@@ -308,7 +308,7 @@ def test_what_goes_with_an_effect_is_no_larger_than_there_can_be(mean, possible)
     """No current sensor reads a third too little: with that, its ripple stood for a dead time."""
     gain = effects()["current_gain"]
     model = Model(machine(), (gain,))
-    sizes = {"cosine": 0.02, "sine": 0.0, "mean": mean, "shunts": 0.0, "bench": 0.0}
+    sizes = {"cosine": 0.02, "sine": 0.0, "mean": mean, "shunts": 0.0, "bench": 0.0, "alone": 0.0}
     values = {**BASE, **{f"current_gain.{name}": value for name, value in sizes.items()}}
     assert material(Fit((), model, values, (), values), gain) is possible
 

@@ -19,11 +19,13 @@ from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.bounds import bounded_step, limits_of
 from pipeline.criticism.regression.columns import Column
+from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from tests.sectors import sector_errors
+from tests.unit.criticism.machines import BASE
 
 MACHINE = Machine(5, 6, {"current_a": 1.0, "voltage_v": 1.0, "torque_nm": 1.0})
 
@@ -256,3 +258,21 @@ def test_a_term_that_is_left_out_is_zero_and_no_parameter():
     assert names == ["q_fall", "d_odd", "d_fall"]
     q = values_of(less, MACHINE, {f"saturation.{n}": 0.1 for n in names})
     assert q == {"q_fall": 0.1, "q_bend": 0.0, "d_odd": 0.1, "d_fall": 0.1, "d_bend": 0.0}
+
+
+@pytest.mark.parametrize(("freq_hz", "seen_hz"), [(400.0, 400.0), (None, 1000.0)])
+def test_a_meter_s_phase_is_in_its_resistance_by_the_reactance(freq_hz, seen_hz):
+    """A milliradian is three per cent of the resistance at a Q of thirty."""
+    angle = np.arange(0.0, 180.0, 15.0)
+    frequency = {} if freq_hz is None else {"freq_hz": np.full(angle.size, freq_hz)}
+    ohm, henry = np.full(angle.size, 0.62), np.full(angle.size, 6e-4)
+    table = capture("lcr", theta_elec_deg=angle, lab_h=henry, rab_ohm=ohm, **frequency)
+    (segment,) = segments(Campaign("m", (table,)), MACHINE)
+    values = {**BASE, "r_ohm": 0.31, "ld_h": 3e-4, "lq_h": 3e-4}
+    plain = Model(MACHINE, ())
+    late = {**values, "phase_lcr_rad": 1e-3}
+    before, after = (residual(segment, plain, one) for one in (values, late))
+    henries, ohms = np.abs(after - before)
+    reactance = 2.0 * np.pi * seen_hz * 6e-4
+    assert ohms == pytest.approx(1e-3 * reactance, rel=1e-3)
+    assert henries == pytest.approx(1e-3 * 0.62 / (2.0 * np.pi * seen_hz), rel=1e-3)

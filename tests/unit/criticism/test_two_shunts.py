@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -40,3 +42,15 @@ def test_the_gains_of_two_shunts_turn_the_current_as_well(pair, gains):
     assert found == pytest.approx(true * frame, abs=1e-12)
     other = current(r, {**q, "shunts": 0.0})
     assert np.abs(other - true * frame).max() > 0.2 * abs(gamma)
+
+
+@pytest.mark.parametrize("name", ["current_gain", "current_offset", "current_delay"])
+@pytest.mark.parametrize(("analysed", "alone"), list(product((False, True), (0.0, 1.0))))
+def test_an_analyser_beside_a_drive_may_have_sensors_of_its_own(name, analysed, alone):
+    n = np.arange(50) / 8.0
+    seen, still = np.exp(1j * n), np.zeros(50)
+    r = Recorded(seen, still, n, np.ones(50), 1e-4, True, "drive", analysed=analysed)
+    effect = effects()[name]
+    q = {p.name: p.scan[0] if p.choice else p.typical for p in effect.parameters}
+    changed = effect.current(r, {**q, "alone": alone}) - seen
+    assert changed.any() == (not (analysed and alone))

@@ -11,7 +11,7 @@ import pytest
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.equations import equations
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.model import LATE_TORQUE, Model, zero
+from pipeline.criticism.machine.model import LATE_TORQUE, PHASE_LCR, Model, zero
 from pipeline.criticism.residuals.observability import observes
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import segments
@@ -130,11 +130,11 @@ def test_what_a_segment_does_not_hear_changes_nothing_in_it(kind: str, name: str
 @pytest.mark.parametrize("kind", RECORDED)
 def test_a_constant_that_a_segment_does_not_hear_changes_nothing_in_it(kind: str) -> None:
     """But for less than a millionth: the ripple of a q log, and the creep of a held rotor. Gains,
-    and the lag of a transducer, go by the sensors that a segment has.
+    phases, and the lag of a transducer, go by the sensors that a segment has.
     """
     segment, plain = segment_of(kind), Model(machine(), ())
     here = residual(segment, plain, BASE)
-    sensors = ("gain_", "offset_", "unlogged_", LATE_TORQUE)
+    sensors = ("gain_", "offset_", "unlogged_", PHASE_LCR, LATE_TORQUE)
     constants = {c for c in BASE if not c.startswith(sensors)}
     observed = set(equations()[kind].observes.constants)
     assert constants >= observed
