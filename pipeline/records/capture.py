@@ -21,6 +21,11 @@ VoltageTiming = Literal["instant", "held", "centred"]
 VoltageKind = Literal["measured", "commanded"]
 Array = NDArray[np.float64]
 
+_ALTERNATING = frozenset(
+    name for line in ("a", "b", "c", "ab", "bc", "ca") for name in (f"v{line}_v", f"i{line}_a")
+)
+"""Columns that go through zero twice an electrical turn."""
+
 
 # Standard uncertainty (k=1) of an instrument that states none, by metadata key: a gain [1] of a
 # percent, a thermometer [K] of two kelvin, a time base of 100 ppm: crystals are cut to 20 to 50 ppm
@@ -246,7 +251,7 @@ class Capture:
         return keep
 
     def table_of(self, *names: str) -> int:
-        """The table that holds most of some columns, the longest where several do.
+        """The table on whose clock some columns are best seen.
 
         Parameters
         ----------
@@ -256,7 +261,9 @@ class Capture:
         Returns
         -------
         int
-            Index in `tables`.
+            Index in `tables`: of the one that holds most of the columns that alternate, voltages
+            and currents of lines and phases, then most of all; the longest where several do.
+            Straight lines between samples take a part of a wave away, of an angle nothing.
 
         Raises
         ------
@@ -264,12 +271,14 @@ class Capture:
             No table holds any of them.
 
         """
-        counts = [len(set(names) & set(table.columns)) for table in self.tables]
-        if not counts or max(counts) == 0:
+        held = [set(names) & set(table.columns) for table in self.tables]
+        if not any(held):
             raise KeyError(f"{self.path} holds none of {', '.join(names)}")
-        best = max(counts)
-        heights = [t.height if c == best else -1 for t, c in zip(self.tables, counts, strict=True)]
-        return int(np.argmax(heights))
+        ranks = [
+            (len(columns & _ALTERNATING), len(columns), table.height)
+            for columns, table in zip(held, self.tables, strict=True)
+        ]
+        return ranks.index(max(ranks))
 
     def arrays(self, *names: str, masked: bool = True) -> dict[str, Array]:
         """Columns on one clock, without the rows that were set aside.

@@ -11,7 +11,8 @@ _AXES_A = ("id_a", "iq_a")
 _LINES_A = ("ia_a", "ib_a", "ic_a")
 _VOLTS = ("vd_v", "vq_v", "va_v", "vb_v", "vc_v", "vab_v", "vbc_v", "vca_v")
 _FLUXES = ("psi_d_wb", "psi_q_wb")
-_METERS = ("gain_current", "gain_current_bench", "gain_voltage", "gain_commanded")
+_AT_REST = "gain_current_rest"
+_METERS = ("gain_current", "gain_current_bench", _AT_REST, "gain_voltage", "gain_commanded")
 """Gains of which a station may have several instruments; the first of a kind has its name."""
 
 
@@ -32,7 +33,8 @@ def gains_of(captures: Iterable[Capture]) -> dict[str, dict[str, str]]:
     -----
     Captures that state the same uncertainty of the same kind have the same instrument: a scope of
     1.5 % is not the multimeter of 0.3 % beside it. The best of a kind has the name of the kind,
-    others a number.
+    others a number. What feeds and measures a rotor at rest, as in a heat run, may be the bench's
+    supply or an analyser: its ammeter is neither.
 
     """
     used = {capture.path: _used(capture) for capture in captures}
@@ -40,7 +42,7 @@ def gains_of(captures: Iterable[Capture]) -> dict[str, dict[str, str]]:
     for kind in _METERS:
         stated = {kinds[kind] for kinds in used.values() if kind in kinds}
         for n, u in enumerate(sorted(stated, key=lambda u: math.inf if u is None else u), 1):
-            named[kind, u] = kind if n == 1 else f"{kind}_{n}"
+            named[kind, u] = kind if n == 1 and kind != _AT_REST else f"{kind}_{n}"
     return {p: {kind: named[kind, u] for kind, u in kinds.items()} for p, kinds in used.items()}
 
 
@@ -86,7 +88,8 @@ def _used(capture: Capture) -> Mapping[str, float | None]:
     if meta.test == "lcr":
         return {}
     if any(capture.has(name) for name in _AXES_A):
-        used["gain_current"] = meta.u_rel_current or None
+        at_rest = meta.test == "heat_run" and meta.voltage_kind == "measured"
+        used[_AT_REST if at_rest else "gain_current"] = meta.u_rel_current or None
     elif any(capture.has(name) for name in _LINES_A):
         used["gain_current_bench"] = meta.u_rel_current or None
     if any(capture.has(name) for name in (*_VOLTS, *_FLUXES)):

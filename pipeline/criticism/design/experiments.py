@@ -30,6 +30,7 @@ from pipeline.records.diagnosis import Separation
 
 _GAIN_WORDS = {
     "gain_current": "the drive's current sensors calibrated to {:g} %",
+    "gain_current_rest_1": "the ammeter of the heat run calibrated to {:g} %",
     "gain_current_bench": "the bench's ammeter calibrated to {:g} %",
     "gain_voltage": "the bench's voltmeters calibrated to {:g} %",
     "gain_commanded": "the drive's voltage calibrated to {:g} %",

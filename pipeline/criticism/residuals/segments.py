@@ -160,7 +160,8 @@ def _late_speed(segment: Segment, capture: Capture) -> dict[str, float]:
 def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:
     """The segment with the gains of the instruments that recorded it, by kind."""
     volts = gains.get("gain_commanded") or gains.get("gain_voltage", "gain_voltage")
-    amps = gains.get("gain_current") or gains.get("gain_current_bench", "gain_current")
+    ammeters = [name for kind, name in gains.items() if kind.startswith("gain_current")]
+    amps = ammeters[0] if ammeters else "gain_current"
     return replace(segment, instrument=replace(segment.instrument, meter=volts, ammeter=amps))
 
 

@@ -94,3 +94,19 @@ def test_two_ammeters_may_disagree_by_what_they_state_and_the_better_one_counts(
     assert costs["gain_current_bench_2"] == pytest.approx((off / 0.003) ** 2, rel=0.15)
     assert costs["gain_current"] == pytest.approx(0.0, abs=1e-6)
     assert "gain_current_bench_2" in {constant.name for constant in base_of(found)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("measured", "gain_current_rest_1"), ("commanded", "gain_current")]
+)
+def test_what_measures_a_rotor_at_rest_has_an_ammeter_of_its_own(kind, name):
+    """An analyser of the maps and the supply of a heat run may state the same uncertainty."""
+    columns = ("id_a", "iq_a", "vd_v", "vq_v")
+    captures = (
+        other("torque_map", 0.001, 0.0005, *columns, voltage_kind="measured"),
+        other("heat_run", 0.001, 0.0005, *columns, voltage_kind=kind),
+    )
+    gains = gains_of(captures)
+    assert gains["torque_map"]["gain_current"] == "gain_current"
+    assert name in gains["heat_run"].values()
+    assert stated_u(captures)[name] == 0.001

@@ -56,3 +56,16 @@ def test_a_row_is_averaged_over_what_is_recorded_of_it() -> None:
     assert means[1:4] == pytest.approx([0.25, 1.0, 2.0])
     assert not slower_rows(sample_s, sample_s)
     assert not slower_rows(row_s[:1], sample_s)
+
+
+def test_waves_stay_on_their_own_clock_beside_an_angle_of_another() -> None:
+    """Straight lines took 0.35 % of a voltage of 20 samples a turn, and with it of Ke."""
+    own_s, other_s = np.arange(0.0, 0.1, 1e-4), np.arange(3e-5, 0.1, 0.9e-4)
+    voltage = {"t_s": own_s, "vab_v": np.cos(3000.0 * own_s), "vbc_v": np.sin(3000.0 * own_s)}
+    motion = {"t_s": other_s, "theta_mech_rad": 300.0 * other_s}
+    motion |= {"omega_mech_rad_s": np.full(other_s.size, 300.0), "temp_magnet_degc": 25.0}
+    tables = (pl.DataFrame(motion), pl.DataFrame(voltage))
+    capture = Capture("c", "0" * 64, "verified", CaptureMeta("m", "open_circuit"), tables)
+    data = capture.arrays("t_s", *voltage, *motion)
+    assert data["vab_v"] == pytest.approx(voltage["vab_v"], abs=1e-12)
+    assert data["theta_mech_rad"][1:-1] == pytest.approx(300.0 * own_s[1:-1])
