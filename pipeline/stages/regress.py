@@ -106,10 +106,11 @@ def _diagnosis_folders(settings: RegressSettings) -> Sequence[Path]:
 
 def _write(output: Path, regression: LotRegression) -> tuple[str, ...]:
     folder = output / "regression"
+    links = links_of(output, LOTS, coming=["regression/report.json"])
     files = {
         "report.json": canonical_json(regression.document()),
         "report.xml": junit_xml(regression),
-        "report.html": render_regression(regression, links_of(output, LOTS)).encode(),
+        "report.html": render_regression(regression, links).encode(),
     }
     for name, content in files.items():
         write_whole(folder / name, content)
