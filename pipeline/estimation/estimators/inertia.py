@@ -69,8 +69,10 @@ AIDS = (
     "pole_pairs",
     "r_phase_ohm",
 )
+OFFSET, COAST_LOAD = "offset", "coast load"
+"""A constant torque that the drives show beyond their current; and the same in the coasts."""
 NUISANCES = (
-    "offset", "load friction", "load lag", "current lag", "d current", "d current cos",
+    OFFSET, "load friction", "load lag", "current lag", "d current", "d current cos",
     "d current sin", "q current cubed", "d squared q current", "d q current cubed",
     "eccentric cos", "eccentric sin", "unbalance cos", "unbalance sin",
 )  # fmt: skip
@@ -203,7 +205,11 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
     nuisances = [name for name in nuisances if _is_apart(rows, driving, name)]
     if short := too_short(rows):
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
-    drag = drag_of(rows, acceleration(rows, driving), nuisances, options["level"])
+    law = acceleration(rows, driving)
+    drag = drag_of(rows, law, nuisances, options["level"])
+    if OFFSET in drag.names:
+        # an error of the current, or a load: in coasts of one sense that would be friction
+        drag = drag_of(rows, law, [*nuisances, COAST_LOAD], options["level"])
     if not torque_is_separable(drag.design, drag.sigma):
         note = f"the drive's torque cannot be separated from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)

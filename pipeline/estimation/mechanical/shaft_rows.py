@@ -315,6 +315,7 @@ def _nuisances(part: _Part) -> dict[str, Array]:
     torque = np.abs(part.current) * np.sign(part.speed)
     return {
         "offset": np.full(weak.count, driven),
+        "coast load": np.full(weak.count, 1.0 - driven),
         SAMPLED: weak.integral(part.theta, 1) * driven,
         "load friction": weak.integral(torque),
         "d current": weak.integral(part.direct),
