@@ -166,7 +166,7 @@ def _cogging(
     amplitude = float(np.sqrt(sum(line.amplitude**2 for line in [leading, *sides])))
     note = f"N·m by order: {name_orders(lines, known, campaign)}; {tested}{also}"
     if known.best("j_rotor_kgm2") is not None:
-        note += "; with J times the shaft's own acceleration at each order"
+        note += "; with J times the shaft's own acceleration at each order, where it has a clock"
     if sides:
         note += "; sidebands are those of an eccentric encoder and counted to the amplitude"
     peak, u_peak = half_peak_to_peak(peak_orders(lines, spec, _teeth(known, campaign), sides))

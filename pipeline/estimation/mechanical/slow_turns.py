@@ -155,7 +155,7 @@ def past_doubt(
     Notes
     -----
     Of a thousand orders that are tested at 0.01, one motor in a hundred has a false one, and a
-    fleet has many motors. A slow turn of a shaft that rings with its load has more.
+    fleet has many motors.
 
     """
     slots, pairs = slots_and_pole_pairs(known, campaign)

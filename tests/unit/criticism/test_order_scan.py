@@ -12,7 +12,7 @@ from pipeline.criticism.data.segment import Unthinned, row_index
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.criticism.selection.order_scan import Part, orders_left
+from pipeline.criticism.selection.order_scan import Part, _parts, orders_left
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine
 
@@ -194,3 +194,11 @@ def test_two_lines_at_once_are_told_apart():
         both = 6e-3 * np.abs(current) * np.cos(1.73 * theta) + 0.024 * np.sin(6.41 * theta)
         waved.append(replace(one, recorded={**one.recorded, TORQUE: torque + both}))
     assert left(*waved) == pytest.approx((1.73, 6.41), abs=0.02)
+
+
+def test_a_part_of_a_log_has_rows():
+    """A shaft that turns by ten turns from row to row passes whole parts without any."""
+    theta = np.cumsum(np.repeat([0.1, 20.0 * np.pi, 0.1], [500, 4, 500]))
+    parts = list(_parts(theta, np.ones(theta.size), PLAIN.policy.order_scan))
+    assert parts
+    assert min(part.size for part in parts) > 1
