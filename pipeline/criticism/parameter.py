@@ -182,6 +182,14 @@ class Machine:
         p = self.pole_pairs
         return tuple(sorted({1, 2, p, 2 * p, 6 * p, 12 * p, *self.load_orders}))
 
+    @property
+    def ripple_orders(self) -> tuple[float, ...]:
+        """Orders [1/turn] of waves that may turn far from row to row of a log, sorted: 6p, 12p and
+        the cogging order.
+        """
+        p, cogging = self.pole_pairs, self.cogging_order
+        return tuple(sorted({6 * p, 12 * p, *([cogging] if cogging else [])}))
+
     def scale(self, parameter: Parameter) -> float:
         """Size of one relative unit of a parameter.
 

@@ -79,7 +79,7 @@ def drive_log(capture: Capture, machine: Machine) -> DriveLog | None:
     sensor = shaft_angle(columns, period, machine)
     if speed is not None:
         columns["omega_mech_rad_s"] = speed
-    sensors = prepared(columns, period, machine.policy, sensor)
+    sensors = prepared(columns, period, machine.policy, sensor, machine.ripple_orders)
     angle = any("theta" in name for name in moving)
     return DriveLog(period, columns, keep, sensors, speed is not None, angle)
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from pipeline.criticism.data.locked_waves import LockedWaves
 from pipeline.criticism.data.traces import parabolas
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.sensors import SensorNoise
@@ -37,7 +38,12 @@ _MOST_DECIMALS = 9
 """Decimals of a file that may be seen beside a step."""
 
 
-def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> float:
+def sensor_noise(
+    signal: Array,
+    policy: SensorNoise,
+    steady: bool = False,
+    waves: LockedWaves | None = None,
+) -> float:
     """Standard deviation of a signal's white sensor noise.
 
     Parameters
@@ -48,6 +54,8 @@ def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> fl
         Constants of judgement.
     steady
         Whether it is an angle, whose rounding comes and goes with its speed.
+    waves
+        Of the rotor's angle in the same samples, which the signal may contain.
 
     Returns
     -------
@@ -59,7 +67,8 @@ def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> fl
     Third differences of white noise have the variance 20 σ². Their mean square is taken in blocks,
     and a low quantile over the blocks keeps steps and bursts out, a higher one for a `steady`
     signal; what a quantile of chi-square is below its mean is made up for. Where shorter blocks
-    have far less, the signal steps in most of the longer ones.
+    have far less, the signal steps in most of the longer ones. Where waves of the rotor leave far
+    less, they are most of it.
 
     References
     ----------
@@ -76,9 +85,13 @@ def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> fl
     quantile = policy.steady if steady else policy.quiet
     level = _of_blocks(third, width, quantile)
     if not steady:
-        shorter = range(1, (width // policy.shortest_block).bit_length())
-        clean = min((_of_blocks(third, width >> n, quantile) for n in shorter), default=level)
-        level = clean if clean * policy.steps_growth < level else level
+        widths = [width >> n for n in range((width // policy.shortest_block).bit_length())]
+        clean = [_of_blocks(third, one, quantile) for one in widths[1:]]
+        if waves is not None:
+            fitted = [one for one in widths if one >= waves.shortest()]
+            clean += [_of_blocks(waves.remainder(third, one), one, quantile) for one in fitted]
+        least = min(clean, default=level)
+        level = least if least * policy.steps_growth < level else level
     return max(level, _rounding(third) / math.sqrt(12.0))
 
 

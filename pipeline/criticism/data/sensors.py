@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from pipeline.criticism.data.hysteresis import play_lag, with_travel
+from pipeline.criticism.data.locked_waves import LockedWaves
 from pipeline.criticism.data.segment import Sensors, SpeedSensor
 from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
 from pipeline.criticism.data.traces import smoothed
@@ -23,6 +24,7 @@ def prepared(
     period: float,
     policy: Policy,
     speed: SpeedSensor | None = None,
+    orders: Sequence[float] = (),
 ) -> Sensors:
     """Noise, coarse steps and runs of columns, which get ready for `segment_of`.
 
@@ -37,6 +39,8 @@ def prepared(
         Constants of judgement.
     speed
         Of a speed whose integral is the angle (`shaft_angle`).
+    orders
+        Waves a turn of the angle that are no noise.
 
     Returns
     -------
@@ -44,7 +48,7 @@ def prepared(
         For `segment_of`.
 
     """
-    noise, steps = noise_and_steps(columns, policy.sensor_noise)
+    noise, steps = noise_and_steps(columns, policy.sensor_noise, orders)
     width = max(2 * round(policy.cutting.temperature_s / period) + 1, 51)
     for name in TEMPERATURES:
         if name in columns:
@@ -59,7 +63,7 @@ def prepared(
 
 
 def noise_and_steps(
-    columns: Mapping[str, Array], policy: SensorNoise
+    columns: Mapping[str, Array], policy: SensorNoise, orders: Sequence[float] = ()
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Noise of columns, and steps of those that are rounded too coarsely for it.
 
@@ -69,6 +73,8 @@ def noise_and_steps(
         Columns [n].
     policy
         Constants of judgement.
+    orders
+        Waves a turn of `theta_mech_rad` that are no noise.
 
     Returns
     -------
@@ -77,6 +83,8 @@ def noise_and_steps(
 
     """
     angles = {name: name.startswith("theta") for name in columns}
-    noise = {n: sensor_noise(column, policy, angles[n]) for n, column in columns.items()}
+    theta = columns.get("theta_mech_rad")
+    waves = LockedWaves.of(theta, orders) if orders and theta is not None else None
+    noise = {n: sensor_noise(column, policy, angles[n], waves) for n, column in columns.items()}
     steps = {n: coarse_step(c, noise[n], policy) for n, c in columns.items() if not angles[n]}
     return noise, {name: step for name, step in steps.items() if step > 0.0}

@@ -89,9 +89,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     size = columns["vd_v"].size
     window = window_between_gaps(period, keep, policy)
     orders = machine.electrical_orders if angle and turned > policy.turning_rad else ()
-    sensors = with_smooth_angle(
-        capture, columns, prepared(columns, period, machine.policy, speed), machine, window
-    )
+    sensors = prepared(columns, period, machine.policy, speed, machine.ripple_orders)
+    sensors = with_smooth_angle(capture, columns, sensors, machine, window)
     keep = out_of_step(capture, columns["theta_mech_rad"], keep, machine, window)
     if held and torque:
         # a noisy speed that is differenced, times J, would be a torque

@@ -50,9 +50,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     speed = shaft_angle(columns, period, machine)
     size = keep.size
     window = window_between_gaps(period, keep, policy)
-    sensors = with_smooth_angle(
-        capture, columns, prepared(columns, period, machine.policy, speed), machine, window
-    )
+    sensors = prepared(columns, period, machine.policy, speed, machine.ripple_orders)
+    sensors = with_smooth_angle(capture, columns, sensors, machine, window)
     columns["t_s"] = period * np.arange(size, dtype=np.float64)
     cut_out, starts = thinned(columns, keep, window, policy.windows)
     by_angle = "omega_mech_rad_s" not in angle

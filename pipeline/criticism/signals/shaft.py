@@ -222,12 +222,15 @@ def sensed_torque(
     Notes
     -----
     T − J d²θ/dt² in the shaft, T at the stator and where the speed is held, with its errors and
-    its gain.
+    its gain. Rows that are means (`centred`) have the mean of a held shaft's torque too: little is
+    left there of a wave that turns far in a row.
 
     """
     finer, torque = x.theta_rad.size // segment.size, torque_nm
     if finer > 1:
-        torque = torque_nm[::finer] if x.shaft.held else averaged(torque_nm, finer)
+        means = segment.instrument.timing == "centred"
+        of_held = row_means(torque_nm, finer) if means else torque_nm[::finer]
+        torque = of_held if x.shaft.held else averaged(torque_nm, finer)
     if not segment.instrument.stator and not segment.sensors.held_speed:
         acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
         torque = torque - values["j_kgm2"] * acceleration
@@ -334,4 +337,27 @@ def averaged(fine: Array, finer: int) -> Array:
     before, after = cells @ (1.0 / finer - ramp), cells @ ramp
     mean: Array = before.copy()
     mean[1:] += after[:-1]
+    return mean
+
+
+def row_means(fine: Array, finer: int) -> Array:
+    """Means of a signal over half a sample either side of each sample.
+
+    Parameters
+    ----------
+    fine
+        A signal at some points a sample [n·m], m even.
+    finer
+        Points m a sample [1].
+
+    Returns
+    -------
+    array [n]
+        Of straight lines between points; of the first and the last sample a part.
+
+    """
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (fine[1:] + fine[:-1]))])
+    at = np.arange(0, fine.size, finer)
+    first, last = np.maximum(at - finer // 2, 0), np.minimum(at + finer // 2, fine.size - 1)
+    mean: Array = (total[last] - total[first]) / (last - first)
     return mean
