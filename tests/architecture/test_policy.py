@@ -84,7 +84,6 @@ ARITHMETIC = {
     "equations/lcr.py": {"_PROBE"},  # differences
     "equations/load.py": {"EQUATION"},  # an order of equations
     "equations/motion.py": {"EQUATION"},  # an order of equations
-    "equations/torque_table.py": {"_TERMS"},  # a formula
 }
 """Numbers that are no judgement: rounding, seeds, formulas, pictures, how work is run."""
 

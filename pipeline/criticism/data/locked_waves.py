@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.criticism.operating import Array
-
-_FLAT = 1e-3
-"""Size of a wave's third differences over the largest one's from which on it is in the fit."""
-_WHITE = 20.0
-"""Variance of third differences over that of white noise."""
-_LEAST = 3
-"""Third differences a wave that a block has at the least."""
+from pipeline.criticism.policy.sensors import SensorNoise
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,13 +22,16 @@ class LockedWaves:
     ----------
     third
         Third differences of the waves [n - 3, k].
+    policy
+        How many rows a wave needs, and how little it may turn.
 
     """
 
     third: Array
+    policy: SensorNoise
 
     @classmethod
-    def of(cls, theta_rad: Array, orders: Sequence[float]) -> LockedWaves:
+    def of(cls, theta_rad: Array, orders: Sequence[float], policy: SensorNoise) -> LockedWaves:
         """The waves of an angle.
 
         Parameters
@@ -44,14 +40,16 @@ class LockedWaves:
             Angle of the rows [n].
         orders
             Waves a turn.
+        policy
+            Constants of judgement.
 
         """
         turned = np.multiply.outer(theta_rad, np.array(orders, dtype=np.float64))
-        return cls(np.diff(np.hstack([np.cos(turned), np.sin(turned)]), 3, axis=0))
+        return cls(np.diff(np.hstack([np.cos(turned), np.sin(turned)]), 3, axis=0), policy)
 
     def shortest(self) -> int:
         """Third differences of a block at the least."""
-        return _LEAST * self.third.shape[1]
+        return self.policy.wave_rows * self.third.shape[1]
 
     def remainder(self, third: Array, width: int) -> Array:
         """What a fit of the waves to each block leaves.
@@ -72,21 +70,19 @@ class LockedWaves:
         blocks = third[: third.size // width * width].reshape(-1, width)
         waves = self.third[: blocks.size].reshape(len(blocks), width, -1)
         basis, sizes, _ = np.linalg.svd(waves, full_matrices=False)
-        basis = basis * (sizes > _FLAT * sizes[:, :1])[:, None, :]
+        basis = basis * (sizes > self.policy.still * sizes[:, :1])[:, None, :]
         left = blocks - np.einsum(
             "bwk,bk->bw", basis, np.einsum("bwk,bw->bk", basis, blocks, optimize=True)
         )
-        taken = _noise_along(basis) / (_WHITE * width)
+        # third differences of white noise have 20 times its variance
+        taken = _noise_along(basis) / (20.0 * width)
         remainder: Array = (left / np.sqrt(1.0 - taken)[:, None]).ravel()
         return remainder
 
 
 def _noise_along(basis: Array) -> Array:
     """Variance of white noise's third differences along all columns [b, w, k] of a basis: [b]."""
-    kernel = (-1.0, 3.0, -3.0, 1.0)
-    spread = sum(
-        part * np.pad(basis, ((0, 0), (n, len(kernel) - 1 - n), (0, 0)))
-        for n, part in enumerate(kernel)
-    )
+    third = (-1.0, 3.0, -3.0, 1.0)
+    spread = sum(part * np.pad(basis, ((0, 0), (n, 3 - n), (0, 0))) for n, part in enumerate(third))
     power: Array = np.square(spread).sum(axis=(1, 2))
     return power

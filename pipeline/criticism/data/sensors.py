@@ -84,7 +84,7 @@ def noise_and_steps(
     """
     angles = {name: name.startswith("theta") for name in columns}
     theta = columns.get("theta_mech_rad")
-    waves = LockedWaves.of(theta, orders) if orders and theta is not None else None
+    waves = LockedWaves.of(theta, orders, policy) if orders and theta is not None else None
     noise = {n: sensor_noise(column, policy, angles[n], waves) for n, column in columns.items()}
     steps = {n: coarse_step(c, noise[n], policy) for n, c in columns.items() if not angles[n]}
     return noise, {name: step for name, step in steps.items() if step > 0.0}

@@ -39,6 +39,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     Segment or None
         None with too few cells; sectors of the turn are held out one by one.
 
+    Notes
+    -----
+    Friction of a rotor at rest is whatever holds it, up to stiction, and not that of one that
+    turns. So by how much the current differs between the senses is left free.
+
     """
     cells = holding_cells(capture, machine.policy)
     if cells is None:
@@ -52,6 +57,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         Sensors({"iq_a": cells.noise_a}),
         channels=("iq_a",),
         blocks=cells.sector,
+        offsets=(cells.sense * float(np.abs(cells.iq_a).max()))[None],
     )
 
 

@@ -23,8 +23,6 @@ from pipeline.records.capture import Capture
 TORQUE = "torque_shaft_nm"
 _BESIDE = ("id_a", "theta_mech_rad", "temp_magnet_degc")
 """Columns that are used where they are there."""
-_TERMS = 3
-"""Terms of the curve of torque over current that noise is the scatter about: offset, slope, sag."""
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
@@ -45,8 +43,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
     Notes
     -----
-    The noise is the scatter about T0 + k i + s i³, with a curve for every rotor angle: friction
-    that holds torque back on the way up and down is in it. The zero of the transducer, and the
+    The noise is the scatter about T0 + k i_q + s i_q³, and with d currents (r + t i_d) i_d i_q,
+    with a curve for every rotor angle: friction that holds torque back on the way up and down is in
+    it. The zero of the transducer, and the
     weight of an arm, is an offset that the table may have.
 
     """
@@ -116,23 +115,38 @@ def _parts(current: Array, policy: Tables) -> NDArray[np.int64] | None:
 
 def _noise(columns: Signals, reading: float) -> float | None:
     """Standard deviation [N·m] of the torques about their curves; None with too few rows."""
-    torque, current = columns[TORQUE], columns["iq_a"] / float(np.abs(columns["iq_a"]).max())
+    torque, curve = columns[TORQUE], _curve(columns)
     angles = columns.get("theta_mech_rad")
     place = np.zeros(torque.size, dtype=np.int64) if angles is None else levels_of(angles)
-    if torque.size < 2 * _TERMS * (int(place.max()) + 1):
+    terms = curve.shape[1]
+    if torque.size < 2 * terms * (int(place.max()) + 1):
         place = np.zeros(torque.size, dtype=np.int64)
-    free = torque.size - _TERMS * (int(place.max()) + 1)
+    free = torque.size - terms * (int(place.max()) + 1)
     if free < 1:
         return None
-    power = sum(_about_its_curve(current[place == k], torque[place == k]) for k in np.unique(place))
+    power = sum(_about(curve[place == k], torque[place == k]) for k in np.unique(place))
     least = max(reading * float(np.abs(torque).max()), 1e-12)
     return max(math.sqrt(power / free), least)
 
 
-def _about_its_curve(current: Array, torque: Array) -> float:
-    """Sum of squares [N²·m²] of torques about offset, slope and sag over current."""
-    design = np.column_stack([np.ones(current.size), current, current**3])
-    residual = torque - design @ np.linalg.lstsq(design, torque, rcond=None)[0]
+def _curve(columns: Signals) -> Array:
+    """Terms [n, k] of the torque over the currents: offset, slope and sag; with d currents those of
+    a reluctance that saturates.
+    """
+    q = _of_range(columns["iq_a"])
+    terms = [np.ones(q.size), q, q**3]
+    d = _of_range(columns.get("id_a", np.zeros(q.size)))
+    return np.column_stack([*terms, d * q, d**2 * q] if np.ptp(d) > 0.0 else terms)
+
+
+def _of_range(current: Array) -> Array:
+    """A current [n] over the largest of its size."""
+    return current / max(float(np.abs(current).max()), 1e-300)
+
+
+def _about(curve: Array, torque: Array) -> float:
+    """Sum of squares [N²·m²] of what a curve [n, k] leaves of torques [n]."""
+    residual = torque - curve @ np.linalg.lstsq(curve, torque, rcond=None)[0]
     return float(residual @ residual)
 
 

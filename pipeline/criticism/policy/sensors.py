@@ -32,6 +32,14 @@ class SensorNoise:
         why="of white noise both are the same to a few percent; levels of fifty rows made it ten "
         "to forty",
     )  # fmt: skip
+    wave_rows: int = chosen(
+        3, "samples", "third differences that a block has for each wave it is fitted with",
+        why="a third of them are fitted then, and what that takes of white noise is made up for",
+    )  # fmt: skip
+    still: float = derived(
+        1e-3, "1", "third difference of a wave, over the largest, below which it is left out",
+        source="of a turn of a tenth of a radian a row, beside waves of a radian",
+    )  # fmt: skip
     motion_growth: float = derived(
         4.0, "1", "growth of a noise with means of twice the length that no noise has",
         source="a loop of second order falls by 40 dB a decade; a smooth motion grows by eleven",

@@ -26,8 +26,16 @@ from pipeline.estimation.mechanical.drive_windows import (
 from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.setups import another_setup, setups_of
 from pipeline.estimation.mechanical.shaft_doubts import DRAGS, Doubts
+from pipeline.estimation.mechanical.shaft_nuisances import (
+    COAST_LOAD,
+    NUISANCES,
+    OF_CURRENT,
+    OFFSET,
+    RELUCTANCE,
+    SAMPLED,
+)
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
-from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, SAMPLED, ShaftRows, shaft_rows
+from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.estimation.mechanical.slow_turns import leading_order
 from pipeline.estimation.mechanical.torque_constant import UNKNOWN, USES, torque_constant
 from pipeline.estimation.method import Method
@@ -69,19 +77,6 @@ AIDS = (
     "pole_pairs",
     "r_phase_ohm",
 )
-OFFSET, COAST_LOAD = "offset", "coast load"
-"""A constant torque that the drives show beyond their current; and the same in the coasts."""
-NUISANCES = (
-    OFFSET, "load friction", "load lag", "current lag", "d current", "d current cos",
-    "d current sin", "q current cubed", "d squared q current", "d q current cubed",
-    "eccentric cos", "eccentric sin", "unbalance cos", "unbalance sin",
-)  # fmt: skip
-
-
-OF_CURRENT = ("torque", "load", "current", "d current", "q current", "d q current", "d squared")
-"""How the names of columns begin that the current makes."""
-RELUCTANCE = "d q current"
-"""What reluctance adds to the torque, where nothing shows how much."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from pipeline.estimation.mechanical.drag_forms import (
     low_end,
 )
 from pipeline.estimation.mechanical.drive_windows import coasts_decide, drive_columns, freedom
+from pipeline.estimation.mechanical.shaft_nuisances import TIMING
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.estimation.policy import policy
 from pipeline.numerics.clusters import cluster_covariance
@@ -87,6 +88,9 @@ def _additions(
     )
     pool = {n: column for n, column in candidates.items() if n not in STRIBECK}
     chosen = needed_columns(law, pool, y, sigma, level, _most_nuisances(rows), tau)
+    if not TIMING.isdisjoint(chosen):
+        # they take much the same of the torque, and which of them it is chance says
+        chosen += sorted(n for n in TIMING.difference(chosen) if n in pool)
     start = np.column_stack([law, *(candidates[n] for n in chosen)])
     shapes = {n: candidates[n] for n in STRIBECK}
     chosen += needed_columns(start, shapes, y, sigma, level, 1, tau)

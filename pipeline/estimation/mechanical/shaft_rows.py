@@ -17,9 +17,18 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.magnet_temperature import assumed_temperature
 from pipeline.estimation.electrical.ripple_torque import Winding, ripple_by_speed
+from pipeline.estimation.mechanical.shaft_nuisances import (
+    COAST_LOAD,
+    CURRENT_LAG,
+    JUMPS,
+    OFFSET,
+    RELUCTANCE,
+    SAMPLED,
+)
 from pipeline.estimation.policy import policy
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
+from pipeline.numerics.jumps import jumps
 from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.shaft_log import SPEED, motion_column
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
@@ -28,9 +37,6 @@ from pipeline.records.capture import Array, Capture
 DRIVE, COAST = 0, 1
 ACCELERATION_NOISE, CURRENT_NOISE = "acceleration noise", "current noise"
 """Columns of a window's noise [rad/s², A], for fits that have these signals among their columns."""
-SAMPLED = "sampled current"
-"""Column of a current that is sampled off the middle of its pulse: by a dead time pulses are late,
-and the back-EMF moves the current on in proportion to speed."""
 SpeedFunction = Callable[[Array], Array]
 
 
@@ -314,24 +320,34 @@ def _nuisances(part: _Part) -> dict[str, Array]:
     driven = float(part.kind == DRIVE)
     torque = np.abs(part.current) * np.sign(part.speed)
     return {
-        "offset": np.full(weak.count, driven),
-        "coast load": np.full(weak.count, 1.0 - driven),
+        OFFSET: np.full(weak.count, driven),
+        COAST_LOAD: np.full(weak.count, 1.0 - driven),
         SAMPLED: weak.integral(part.theta, 1) * driven,
+        JUMPS: weak.integral(_jumps(part.current)),
         "load friction": weak.integral(torque),
         "d current": weak.integral(part.direct),
-        "d q current": weak.integral(part.direct * part.current),
+        RELUCTANCE: weak.integral(part.direct * part.current),
         "d current cos": weak.integral(part.direct * turning.real),
         "d current sin": weak.integral(part.direct * turning.imag),
         "q current cubed": weak.integral(part.current**3),
         "d squared q current": weak.integral(part.direct**2 * part.current),
         "d q current cubed": weak.integral(part.direct * part.current**3),
         "load lag": weak.integral(part.load, 1) * driven,
-        "current lag": weak.integral(part.current, 1) * driven,
+        CURRENT_LAG: weak.integral(part.current, 1) * driven,
         "eccentric cos": weak.integral(turning.real, 2),
         "eccentric sin": weak.integral(turning.imag, 2),
         "unbalance cos": weak.integral(turning.real),
         "unbalance sin": weak.integral(turning.imag),
     }
+
+
+def _jumps(current: Array) -> Array:
+    """Current [n, A] by which the mean between two samples may be off a straight line, where it
+    jumps: snapshots do not show when.
+    """
+    sigma = noise_about_cubics(np.arange(current.size, dtype=np.float64), current)
+    half = 0.5 * jumps(current, policy().shaft_rows.jump_sigmas * sigma)
+    return np.append(half, 0.0) + np.append(0.0, half)
 
 
 def _noise(part: _Part) -> dict[str, Array]:

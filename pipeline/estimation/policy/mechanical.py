@@ -22,6 +22,10 @@ class ShaftRows:
         0.02, "1", "of the acceleration, below which a window's noise is quiet",
         source="a fiftieth adds 0.02 % to its scatter",
     )  # fmt: skip
+    jump_sigmas: float = derived(
+        10.0, "standard deviations of noise", "step of a current from which on it jumps",
+        source="steps of white noise have 1.4, and come to five times that; their median as well",
+    )  # fmt: skip
     coast_share: float = calibrated(
         0.05, "1", "of a coast-down, that a window takes",
         by=TRIED,

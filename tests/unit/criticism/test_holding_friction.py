@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
 from pipeline.criticism.data.machine_scale import machine_of
@@ -55,3 +56,20 @@ def test_an_ampere_is_an_ampere_of_the_residual_whatever_the_friction(share) -> 
     holds = residual(held, model, values) - held.recorded["iq_a"]
     torque = 1.5 * machine.pole_pairs * MOTOR.psi_pm_wb * np.abs(holds)
     assert torque == pytest.approx(MOTOR.torque_coulomb_nm / (1.0 - share), rel=share**3 + 1e-9)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.8, 1.3])
+def test_a_held_rotor_has_any_friction_up_to_stiction(share) -> None:
+    """A rotor at rest had a fifth less friction than one that turned: `iron_eddy` was named."""
+    whole = recorded("holding_current", "drive", "spin_down")
+    ampere = MOTOR.torque_coulomb_nm / (1.5 * MOTOR.pole_pairs * MOTOR.psi_pm_wb)
+    lacking = (share - 1.0) * ampere * pl.col("iq_a").sign()
+    captures = [
+        replace(c, tables=tuple(t.with_columns(pl.col("iq_a") + lacking) for t in c.tables))
+        if c.meta.test == "holding_current"
+        else c
+        for c in whole.captures
+    ]
+    found = diagnose(replace(whole, captures=tuple(captures)), ModelSpec(), Constants())
+    assert found.missing == ()
+    assert found.verdict != "unknown"

@@ -14,8 +14,10 @@ from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import operate, residual
+from pipeline.criticism.signals.shaft import sensed_torque
 from pipeline.criticism.signals.true_current import ripples
-from pipeline.criticism.signals.true_state import averaging
+from pipeline.criticism.signals.true_state import averaging, motion_of
+from pipeline.criticism.signals.true_state import operating as state_of
 from pipeline.criticism.signals.voltage import mean_voltage, rotor_voltage
 from tests.unit.criticism.machines import (
     BASE,
@@ -277,3 +279,19 @@ def test_times_count_alike_at_one_point_a_sample_or_eight():
     drops = [effect.drop(x, lost) for x in (fine, fine.sampled())]
     assert np.ptp(drops[1].real) > 1e-3
     assert drops[0][::8][1:-1] == pytest.approx(drops[1][1:-1], abs=1e-9)
+
+
+@pytest.mark.parametrize(("timing", "share"), [("centred", None), ("held", 1.0)])
+def test_a_held_shaft_s_torque_is_the_mean_of_a_row_of_means(timing, share):
+    """Of a wave that turns by 5 rad in a row its mean is a quarter, and the wrong way round."""
+    turn, order = 5.0 / 12.0, 84
+    segment = as_cut(replace(slow_log(turn, timing), test="torque_map"))
+    assert segment.instrument.points > 1
+    motion = motion_of(segment, segment.recorded, PLAIN.machine, segment.instrument.points)
+    current = np.zeros(motion.theta_rad.size, dtype=complex)
+    values = {**BASE, "gain_torque": 0.0, "j_kgm2": 0.0}
+    x = state_of(segment, segment.recorded, PLAIN, values, current, motion)
+    wave = sensed_torque(segment, x, x.shaft_waves(order)[0], PLAIN, values)
+    phase = order * segment.recorded["theta_mech_rad"]
+    left = np.sinc(2.5 / np.pi) if share is None else share
+    assert wave[2:-2] == pytest.approx(left * np.cos(phase)[2:-2], abs=0.04)

@@ -65,6 +65,21 @@ def test_its_noise_is_the_scatter_about_a_curve_of_each_angle():
     assert segment.sensors.angle_step_rad == 0.0
 
 
+def test_the_torque_of_its_d_currents_is_no_noise():
+    """By the scatter at each angle, that of d currents was 180 times the transducer's noise."""
+    random, campaign = np.random.default_rng(1), table()
+    (capture,) = campaign.captures
+    rows = capture.arrays("iq_a", "theta_mech_rad")
+    direct = random.choice([0.0, -4.0, -8.0], rows["iq_a"].size)
+    torque = (KT_NM_A - (0.02 + 5e-4 * direct) * direct) * rows["iq_a"]
+    torque += random.normal(0.0, 2e-3, torque.size)
+    columns = (pl.Series("id_a", direct), pl.Series("torque_shaft_nm", torque))
+    changed = replace(capture, tables=(capture.tables[0].with_columns(columns),))
+    motor = replace(campaign, captures=(changed,))
+    (segment,) = segments(motor, machine_of(motor, Constants()))
+    assert segment.sensors.noise["torque_shaft_nm"] == pytest.approx(2e-3, rel=0.25)
+
+
 def test_state_and_transducer_are_in_the_prediction():
     """Electrical angle p theta, a shaft at rest, and 1 + gain of the transducer."""
     campaign = table()

@@ -1,0 +1,23 @@
+"""Names of what may turn a shaft beside the torque of its current: columns of its rows."""
+
+from __future__ import annotations
+
+OFFSET, COAST_LOAD = "offset", "coast load"
+"""A constant torque that the drives show beyond their current; and the same in the coasts."""
+CURRENT_LAG, JUMPS = "current lag", "current jumps"
+"""A current that is late, and one that jumps between its samples."""
+TIMING = frozenset({CURRENT_LAG, JUMPS})
+"""What is not known of a current's instant."""
+SAMPLED = "sampled current"
+"""A current that is sampled off the middle of its pulse: by a dead time pulses are late, and the
+back-EMF moves the current on in proportion to speed."""
+NUISANCES = (
+    OFFSET, "load friction", "load lag", *sorted(TIMING), "d current", "d current cos",
+    "d current sin", "q current cubed", "d squared q current", "d q current cubed",
+    "eccentric cos", "eccentric sin", "unbalance cos", "unbalance sin",
+)  # fmt: skip
+"""What may join any fit."""
+OF_CURRENT = ("torque", "load", "current", "d current", "q current", "d q current", "d squared")
+"""How the names of columns begin that the current makes."""
+RELUCTANCE = "d q current"
+"""What reluctance adds to the torque, where nothing shows how much."""
