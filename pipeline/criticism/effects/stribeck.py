@@ -36,7 +36,7 @@ EFFECT = Effect(
             "speed_rad_s",
             low=0.001,
             high=0.3,
-            scan=(0.004, 0.012, 0.036, 0.1),
+            scan=(0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.25),
         ),
         Parameter("exponent", "1", 2.0, 0.0, low=0.3, high=4.0, scan=(2.0,)),
         Parameter("tail", "1", 0.5, 0.0, low=0.0, high=1.0, scan=(0.0,), optional=1),
