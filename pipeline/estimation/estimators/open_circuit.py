@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.special import fdtrc
 
 from pipeline.estimation.electrical.back_emf import flux_of
 from pipeline.estimation.electrical.magnet_temperature import (
@@ -18,6 +19,7 @@ from pipeline.estimation.electrical.magnet_temperature import (
 from pipeline.estimation.electrical.spin import read_spin
 from pipeline.estimation.electrical.spin_angle import Group, angle_offset, count_pole_pairs
 from pipeline.estimation.electrical.steady_speed import steady_stretches
+from pipeline.estimation.electrical.voltage_filter import behind_filter, left_by_filter
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import DEFAULT, policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -70,6 +72,12 @@ GIVES = (
     *(term.name for term in TERMS),
 )
 METHOD = Method("open_circuit", TERMS)
+
+
+_FILTERED = (
+    "the voltage has {:.2g} % less flux in it at {:.0f} rad/s (electrical) than at standstill, as "
+    "behind a filter, and the flux is that of a standstill"
+)
 
 
 def flux_linkage(temp_degc: Array) -> Array:
@@ -171,15 +179,19 @@ def _flux_estimates(
     at = _conditions(groups, excess)
     extra: list[Contribution] = []
     words = [*notes, unlogged_note(used)]
-    value, chosen = float(free.coefficients[0]), free
-    if not measured:
+    if measured:
+        chosen, filtered = _by_speed(groups, design, psi, sigma)
+        value = float(chosen.coefficients[0])
+        alpha, u_alpha = _slope(chosen)
+    else:
         alpha = options["alpha_assumed_1_k"]
         factor = 1.0 + alpha * excess
-        chosen = linear_fit(factor[:, None], psi, sigma)
+        chosen, filtered = _by_speed(groups, factor[:, None], psi, sigma)
         value = float(chosen.coefficients[0])
         lever = _lever(excess, factor, sigma)
         extra = [Contribution(SOURCE, -value * lever * options["u_alpha_assumed_1_k"], "B")]
         words.append(f"magnet coefficient {alpha:g} 1/K assumed to reach 25 degC")
+    words.append(filtered)
     widened, dof = _birge(chosen)
     parts = [METHOD.scatter("psi", chosen.u(0) * math.sqrt(widened), dof), *extra]
     parts += [Contribution(source, value * u, "B") for source, u in gains.items()]
@@ -192,6 +204,28 @@ def _flux_estimates(
     offset = [Contribution(s, alpha**2 * u, "B") for s, u in offsets_k.items()]
     coefficient = METHOD.measured(name, alpha, [scatter, *offset], used, at, words)
     return {psi_25.name: psi_25, name: coefficient}
+
+
+def _by_speed(
+    groups: Sequence[Group], design: Array, psi: Array, sigma: Array
+) -> tuple[LinearFit, str]:
+    """The flux by its design, and why it is that of a standstill where the speeds differ as behind
+    a filter of the voltage. Where they differ otherwise, noise says nothing of their weights.
+    """
+    plain = linear_fit(design, psi, sigma)
+    if not _beyond_chance(plain.chi2_dof, plain.dof):
+        return plain, ""
+    alike = linear_fit(design, psi, np.full(psi.size, float(np.mean(sigma))))
+    speed = np.array([g.flux.speed_elec_rad_s for g in groups])
+    filtered = behind_filter(design, psi, sigma, speed)
+    if filtered is None:
+        return alike, ""
+    ratio = plain.dof * plain.chi2_dof / (filtered.dof * filtered.chi2_dof)
+    if fdtrc(1.0, filtered.dof, filtered.dof * (ratio - 1.0)) > policy().back_emf.filter_level:
+        return alike, ""
+    top = float(np.abs(speed).max())
+    lost = 1.0 - float(left_by_filter(np.array([top]), filtered.coefficients[-1])[0])
+    return filtered, _FILTERED.format(100.0 * lost, top)
 
 
 def _lever(excess_k: Array, factor: Array, sigma: Array) -> float:
@@ -214,10 +248,10 @@ def _conditions(groups: Sequence[Group], excess_k: Array) -> dict[str, float]:
 
 def _slope(fit: LinearFit) -> tuple[float, float]:
     """Alpha = slope/intercept and its standard uncertainty from the scatter."""
-    value, slope = (float(c) for c in fit.coefficients)
+    value, slope = (float(c) for c in fit.coefficients[:2])
     alpha = slope / value
     gradient = np.array([-alpha / value, 1.0 / value])
-    return alpha, math.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0))
+    return alpha, math.sqrt(max(float(gradient @ fit.covariance[:2, :2] @ gradient), 0.0))
 
 
 def _birge(fit: LinearFit) -> tuple[float, float]:
@@ -231,7 +265,7 @@ def _birge(fit: LinearFit) -> tuple[float, float]:
 
 def _beyond_chance(chi2_dof: float, dof: int) -> bool:
     """Whether chi squared per degree of freedom lies three of its standard deviations over 1."""
-    return dof >= 2 and chi2_dof > 1.0 + 3.0 * math.sqrt(2.0 / dof)
+    return dof >= 1 and chi2_dof > 1.0 + 3.0 * math.sqrt(2.0 / dof)
 
 
 def _instrument_shares(

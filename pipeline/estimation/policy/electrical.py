@@ -31,6 +31,9 @@ class BackEmf:
         0.02, "1", "of the largest voltage, below which the rotor counts as standing",
         why="at a fiftieth of the speed the signal is a fiftieth of the fastest one",
     )  # fmt: skip
+    filter_level: float = derived(
+        0.01, "1", "chance of a filter of the voltage that is none", source="one motor in a hundred"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
