@@ -78,9 +78,10 @@ class GaussNewton:
         0.5, "1", "share of the inertia beyond which a step that lowers it may be in 1/J",
         why="the tangent in J reaches zero at twice the inertia that is sought",
     )  # fmt: skip
-    least_inertia: float = chosen(
-        1e-3, "machine scales", "least inertia",
-        why="far below any motor's; at zero a coasting shaft's equation divides by nothing",
+    least_constant: float = chosen(
+        1e-3, "machine scales", "least inertia, and least flux of the magnet",
+        why="far below any motor's; at zero the equations of a coast and of a holding current "
+        "divide by nothing, and a flux below zero would be a friction that drives",
     )  # fmt: skip
     walk_factor: float = chosen(
         2.0, "1", "factor by which parameters are moved along a direction without information",

@@ -35,15 +35,14 @@ def limits_of(model: Model) -> dict[str, tuple[float, float]]:
 
     Notes
     -----
-    A resistance or inductance below zero, or an inertia next to nothing, would stand for an effect
-    that is not in the model.
+    A resistance, inductance or flux below zero, or an inertia next to nothing, would stand for an
+    effect that is not in the model.
 
     """
     limits = dict.fromkeys(("r_ohm", "ld_h", "lq_h"), (0.0, np.inf))
-    limits["j_kgm2"] = (
-        model.policy.fit.least_inertia * base_scales(model.machine)["j_kgm2"],
-        np.inf,
-    )
+    least, scales = model.policy.fit.least_constant, base_scales(model.machine)
+    for name in ("j_kgm2", "psi_wb"):
+        limits[name] = (least * scales[name], np.inf)
     for name, (_, p) in model.parameters().items():
         scale = model.machine.scale(p)
         limits[name] = (p.low * scale, p.high * scale)

@@ -81,8 +81,13 @@ class Baseline:
         return holds and not spoils(tried, without, after, relief)
 
 
-def matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_]) -> bool:
-    """Whether the newest effect of a refit is large enough to matter in use, or takes most.
+def matters(
+    system: LinearSystem,
+    before: LinearSystem,
+    significant: NDArray[np.bool_],
+    effect: Effect | None = None,
+) -> bool:
+    """Whether an effect of a refit is large enough to matter in use, or takes most.
 
     Parameters
     ----------
@@ -92,22 +97,27 @@ def matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np.
         The fit without the effect.
     significant
         Groups [G] that `before` leaves over their floor.
+    effect
+        The effect; the newest where not given.
 
     """
-    fit, effect = system.fit, system.fit.model.effects[-1]
-    return material(fit, effect) or _takes_most(system, before, significant)
+    fit = system.fit
+    effect = effect or fit.model.effects[-1]
+    return material(fit, effect) or _takes_most(system, before, significant, effect)
 
 
-def _takes_most(system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_]) -> bool:
-    """Whether the newest effect takes most of what was `significant` [G] as a remainder before."""
-    fit, effect = system.fit, system.fit.model.effects[-1]
+def _takes_most(
+    system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_], effect: Effect
+) -> bool:
+    """Whether an effect takes most of what was `significant` [G] as a remainder before."""
+    fit = system.fit
     chi2 = [fitted.reduced_chi2(fitted.residual) for fitted in (before, system)]
     takes_most = effect.discriminator is None and clears(system, significant, *chi2)
     return takes_most and shaped(fit, effect)
 
 
-def is_determined(system: LinearSystem, before: LinearSystem) -> bool:
-    """Whether some amplitude of the newest effect that matters differs significantly from zero.
+def is_determined(system: LinearSystem, before: LinearSystem, effect: Effect | None = None) -> bool:
+    """Whether some amplitude of an effect that matters differs significantly from zero.
 
     Parameters
     ----------
@@ -115,6 +125,8 @@ def is_determined(system: LinearSystem, before: LinearSystem) -> bool:
         The fit with the effect.
     before
         The fit without it.
+    effect
+        The effect; the newest where not given.
 
     Returns
     -------
@@ -130,10 +142,10 @@ def is_determined(system: LinearSystem, before: LinearSystem) -> bool:
     matter are sure beside a large one that may be zero.
 
     """
-    effect = system.fit.model.effects[-1]
+    effect = effect or system.fit.model.effects[-1]
     present = sure_amplitudes(system, leave_out(system), effect)
     return size_of(system.fit, effect, present) >= 1.0 or (
-        bool(present) and _takes_most(system, before, significant_groups(before))
+        bool(present) and _takes_most(system, before, significant_groups(before), effect)
     )
 
 

@@ -38,6 +38,7 @@ from pipeline.criticism.selection.improvement import clears
 from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.log_start import with_log_start
 from pipeline.criticism.selection.other_readings import by_best_readings
+from pipeline.criticism.selection.pairs import best_pair
 from pipeline.criticism.selection.pruning import reshaped, trimmed, with_all_terms
 from pipeline.criticism.selection.round_rotor_start import with_round_rotor_start
 from pipeline.criticism.selection.score_test import Score, score_all
@@ -87,6 +88,8 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
 
     Notes
     -----
+    Where none passes and something is left, two that hold together may join (`pairs`).
+
     Shares of friction or magnet left free, or another reading of a column, that explain as much as
     the best effect, within a `tie`, are taken instead; what full logs show of that effect counts
     for it. Friction that changes with time is taken where it explains more by a `tie`: in one coast
@@ -144,6 +147,7 @@ def _steps_from(
             fit = alternative.fit
             del steps[-1]
             continue
+        chosen = chosen or _with_pair(steps, library, base, unsure)
         if chosen is None:
             break
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
@@ -153,6 +157,27 @@ def _steps_from(
         if tuple(e.name for e in fit.model.effects[base:]) in {r.added for r in steps}:
             break
     return steps
+
+
+def _with_pair(
+    steps: list[LadderStep], library: Mapping[str, Effect], base: int, unsure: Set[str]
+) -> LinearSystem | None:
+    """The fit with two effects that hold together where none joins the last step alone, and that
+    step is over its floors; the `steps` get one with the first of them.
+    """
+    last = steps[-1]
+    if len(steps) + 1 >= last.fit.policy.selection.most_steps:
+        return None
+    if not significant_groups(last.system).any():
+        return None
+    scores = [s for s in last.scores if s.candidate.effect.name not in unsure]
+    offered = candidates(library, last.fit.model)
+    both = best_pair(last.system, offered, scores, last.fit.model.effects[base:])
+    if both is not None:
+        first, second = (effect.name for effect in both.fit.model.effects[-2:])
+        alone = _refloored(gauss_newton(both.fit.without(second), before=both), base)
+        steps.append(LadderStep((*last.added, first), *_scored(alone, library, last.system)))
+    return both
 
 
 def _scored(
