@@ -31,7 +31,7 @@ from pipeline.estimation.uncertainty.instruments import (
     unstated_note,
 )
 from pipeline.estimation.uncertainty.nuisances import allowed_for
-from pipeline.numerics.least_squares import linear_fit
+from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.numerics.selection import needed_columns
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Array, Campaign, Capture
@@ -259,14 +259,15 @@ def _estimates(
     else:
         why = f"d current did not vary enough to show reluctance torque; {EXPERIMENT}"
         estimates.append(METHOD.missing(GIVES[1], why))
-    drag, covariance, dof, why = _drag(points, model)
+    drag = _drag(points, model)
     type_b[3] += sampling_drag(used, slope_k.kt_nm_a, known)
-    if why:
-        return (*estimates, *(METHOD.missing(name, why) for name in DRAG))
+    if drag.why:
+        return (*estimates, *(METHOD.missing(name, drag.why) for name in DRAG))
+    note = f"{note}; beside a drag by the square of speed" if drag.windage else note
     for index, name in enumerate(DRAG):
-        u_drag = float(np.sqrt(covariance[index, index]))
+        u_drag = float(np.sqrt(drag.covariance[index, index]))
         parts = [*type_b[2 + index], *_untested_form(points, model, index)]
-        estimates.append(estimate(name, float(drag[index]), u_drag, dof, parts))
+        estimates.append(estimate(name, float(drag.values[index]), u_drag, drag.dof, parts))
     return tuple(estimates)
 
 
@@ -287,7 +288,7 @@ def _values(
     shifted, alpha = [p.shifted(shift) for p in points], alpha + shift.get(SOURCE, 0.0)
     refitted = _regress(shifted, alpha, chosen)
     bent = _slope(shifted, alpha, chosen, refitted)
-    return np.array([bent.kt_nm_a, _reluctance(refitted), *_drag(points, refitted)[0]])
+    return np.array([bent.kt_nm_a, _reluctance(refitted), *_drag(points, refitted).values])
 
 
 def _type_b(
@@ -307,41 +308,65 @@ def _per_alpha(points: Sequence[Point], chosen: Sequence[str], alpha: float) -> 
     return float(step[0]) / 1e-4
 
 
-def _drag(points: Sequence[Point], model: Regression) -> tuple[Array, Array, int, str]:
-    """Coulomb and viscous drag from the offsets of the speeds: values, covariance, dof, why not.
+@dataclass(frozen=True, slots=True)
+class _Drag:
+    """Coulomb and viscous drag [2] of a map, their covariance [2, 2] and its dof; why there are
+    none; and whether windage was allowed for beside them.
+    """
+
+    values: Array
+    covariance: Array
+    dof: int
+    why: str = ""
+    windage: bool = False
+
+
+def _drag(points: Sequence[Point], model: Regression) -> _Drag:
+    """Coulomb and viscous drag from the offsets of the speeds.
 
     A shaft that stands has no drag: its offset is cogging and static friction. Offsets that miss
     the line by more than their scatter widen it, and beyond chance it has the speeds' freedom.
+    Where they do, and a drag by the square of speed explains it, that is allowed for.
     """
     turning = sorted({p.group for p in points if not p.standing})
     speeds = np.array(
         [np.mean([p.omega_mech_rad_s for p in points if p.group == g]) for g in turning]
     )
-    blank = np.zeros(2), np.zeros((2, 2)), 0
+    blank = partial(_Drag, np.zeros(2), np.zeros((2, 2)), 0)
+    few = f"drag and transducer zero need three speeds, both senses; {EXPERIMENT}"
     if np.unique(np.sign(speeds)).size < 2 or speeds.size < 3:
-        return *blank, f"drag and transducer zero need three speeds, both senses; {EXPERIMENT}"
+        return blank(few)
     design = np.column_stack([-np.sign(speeds), -speeds, np.ones(speeds.size)])
     rows = [model.index(f"speed {g}") for g in turning]
     offsets, block = model.coefficients[rows], model.covariance[np.ix_(rows, rows)]
-    part = linear_fit(design, offsets)
+    part, windage = linear_fit(design, offsets), False
     if not part.full_rank:
-        return *blank, f"drag and transducer zero need three speeds, both senses; {EXPERIMENT}"
+        return blank(few)
+    level, lack_of_fit = policy().torque_map.level, _lack_of_fit(part, block)
+    if part.dof >= 2 and fdtrc(part.dof, model.dof, lack_of_fit) < level:
+        wider = np.column_stack([design, -speeds * np.abs(speeds)])
+        other = linear_fit(wider, offsets)
+        left = max(_lack_of_fit(other, block), 1e-300)
+        ratio = part.dof * lack_of_fit / (other.dof * left)
+        chance = fdtrc(1.0, other.dof, other.dof * (ratio - 1.0))
+        windage = bool(other.full_rank and other.coefficients[3] > 0.0 and chance < level)
+        if windage:
+            design, part, lack_of_fit = wider, other, _lack_of_fit(other, block)
     inverse = np.linalg.pinv(design)
-    covariance = inverse @ block @ inverse.T
-    dof = model.dof
-    if part.dof > 0:
-        lack_of_fit = _lack_of_fit(part.residuals, block, part.dof)
-        covariance = np.maximum(1.0, lack_of_fit) * covariance
-        if fdtrc(part.dof, model.dof, lack_of_fit) < policy().torque_map.level:
-            dof = part.dof
-    least = -policy().evidence.sigmas * np.sqrt(np.diag(covariance)[:2])
+    covariance = np.maximum(1.0, lack_of_fit) * (inverse @ block @ inverse.T)[:2, :2]
+    beyond = part.dof > 0 and fdtrc(part.dof, model.dof, lack_of_fit) < level
+    least = -policy().evidence.sigmas * np.sqrt(np.diag(covariance))
     if np.any(part.coefficients[:2] < least):
-        return *blank, "drag is not Coulomb and viscous: a fitted coefficient is negative"
-    return part.coefficients[:2], covariance[:2, :2], dof, ""
+        return blank("drag is not Coulomb and viscous: a fitted coefficient is negative")
+    dof = part.dof if beyond else model.dof
+    return _Drag(part.coefficients[:2], covariance, dof, windage=windage)
 
 
-def _lack_of_fit(residuals: Array, block: Array, dof: int) -> float:
-    return float(np.sum(residuals**2) / np.mean(np.diag(block)) / dof)
+def _lack_of_fit(part: LinearFit, block: Array) -> float:
+    """Variance of what a fit of offsets leaves over their own; 0 where it leaves nothing."""
+    if part.dof < 1:
+        return 0.0
+    return float(np.sum(part.residuals**2) / np.mean(np.diag(block)) / part.dof)
 
 
 def _untested_form(
@@ -357,7 +382,7 @@ def _untested_form(
     faster = np.diff(np.log(np.sort(np.abs(speeds)))) > policy().points.same_speed
     if np.count_nonzero(faster) >= 2:
         return ()
-    drag = _drag(points, model)[0]
+    drag = _drag(points, model).values
     slowest = float(np.min(np.abs(speeds)))
     torque = policy().torque_map.untested_form_share * abs(drag[0] + drag[1] * slowest)
     u = torque if index == 0 else torque / slowest

@@ -131,32 +131,46 @@ def test_drag_is_the_line_through_the_offsets() -> None:
     points, offsets = speeds_of(speeds)
     block = np.diag([1e-6, 2e-6, 3e-6, 4e-6])
     model = regression([f"speed {g}" for g in range(4)], offsets, block, dof=12)
-    values, covariance, dof, why = _drag(points, model)
-    assert why == ""
-    assert values == pytest.approx([0.1, 2e-3])
+    drag = _drag(points, model)
+    assert (drag.why, drag.windage) == ("", False)
+    assert drag.values == pytest.approx([0.1, 2e-3])
     design = np.column_stack([-np.sign(speeds), -np.array(speeds), np.ones(4)])
     inverse = np.linalg.inv(design.T @ design) @ design.T
-    assert covariance == pytest.approx((inverse @ block @ inverse.T)[:2, :2])
-    assert dof == 12
+    assert drag.covariance == pytest.approx((inverse @ block @ inverse.T)[:2, :2])
+    assert drag.dof == 12
     # an offset that is off by much widens it, and has one degree of freedom
     off = [*offsets[:3], offsets[3] + 0.1]
-    _, wide, dof, why = _drag(points, regression(model.names, off, block, dof=12))
-    left = linear_fit(design, np.array(off)).residuals
-    lack = float(left @ left) / 2.5e-6
-    assert _lack_of_fit(left, block, 1) == pytest.approx(lack)
-    assert wide == pytest.approx(lack * covariance)
-    assert dof == 1
+    wide = _drag(points, regression(model.names, off, block, dof=12))
+    part = linear_fit(design, np.array(off))
+    lack = float(part.residuals @ part.residuals) / 2.5e-6
+    assert _lack_of_fit(part, block) == pytest.approx(lack)
+    assert wide.covariance == pytest.approx(lack * drag.covariance)
+    assert wide.dof == 1
     assert _untested_form(points, model, 0) == ()
+
+
+@pytest.mark.parametrize("windage", [0.0, 2e-5])
+def test_a_drag_by_the_square_of_speed_is_no_viscous_one(windage: float) -> None:
+    """Six speeds of a map gave a viscous drag four times too large, at ten of its u."""
+    speeds = (-120.0, -80.0, -40.0, 40.0, 80.0, 120.0)
+    points, offsets = speeds_of(speeds)
+    noise = np.random.default_rng(6).normal(0.0, 1e-3, len(speeds))
+    offsets = [o - windage * w * abs(w) + e for o, w, e in zip(offsets, speeds, noise, strict=True)]
+    names = [f"speed {g}" for g in range(len(speeds))]
+    drag = _drag(points, regression(names, offsets, np.eye(6) * 1e-6, dof=40))
+    assert drag.windage is (windage > 0.0)
+    assert np.all(np.abs(drag.values - [0.1, 2e-3]) < 3.0 * np.sqrt(np.diag(drag.covariance)))
+    assert drag.covariance[1, 1] < (2e-4) ** 2
 
 
 def test_drag_needs_three_speeds_and_both_senses() -> None:
     for speeds in ((-100.0, 100.0), (50.0, 80.0, 120.0)):
         points, offsets = speeds_of(speeds)
         model = regression([f"speed {g}" for g in range(len(speeds))], offsets)
-        assert "three speeds" in _drag(points, model)[3]
+        assert "three speeds" in _drag(points, model).why
     points, offsets = speeds_of((-100.0, 40.0, 100.0))
     model = regression([f"speed {g}" for g in range(3)], offsets)
-    assert _drag(points, model)[0] == pytest.approx([0.1, 2e-3])
+    assert _drag(points, model).values == pytest.approx([0.1, 2e-3])
     (dry,), (wet,) = _untested_form(points, model, 0), _untested_form(points, model, 1)
     assert dry.u == pytest.approx(0.1 * (0.1 + 2e-3 * 40.0))
     assert wet.u == pytest.approx(dry.u / 40.0)
@@ -184,7 +198,7 @@ def test_a_negative_drag_beyond_four_u_is_none(sigmas: float, fine: bool) -> Non
     u = math.sqrt((inverse @ block @ inverse.T)[0, 0])
     _, offsets = speeds_of(speeds, coulomb=-sigmas * u)
     model = regression([f"speed {g}" for g in range(3)], offsets, block)
-    assert (_drag(points, model)[3] == "") is fine
+    assert (_drag(points, model).why == "") is fine
 
 
 def test_enough_points_leave_one_over() -> None:

@@ -30,7 +30,7 @@ def driven(
 @pytest.mark.parametrize("direct_a", [0.0, -3.0])
 @pytest.mark.parametrize(("ld_h", "lq_h"), [(4e-4, 4e-4), (4e-4, 9e-4)])
 def test_a_d_current_that_is_held_is_no_back_emf(offset_rad, direct_a, ld_h, lq_h) -> None:
-    """As complex numbers its inductances were a back-EMF of any angle: 0.13 rad of a sound motor."""
+    """Complex inductances were a back-EMF of any angle: 0.13 rad of a sound motor."""
     found = magnet_angle(*driven(offset_rad, direct_a, ld_h, lq_h), PAIRS)
     assert found.offset_rad == pytest.approx(offset_rad, abs=3e-3)
     assert found.u_rad < 2e-3
