@@ -186,7 +186,12 @@ def _drafted(
     groups = _groups(unmapped)
     seen = [field.column for shape, _ in groups for field in shape.fields if field.column]
     paths = [one.file for one in unmapped]
-    names = name_patterns(paths, frozenset(settings.answers), frozenset(seen))
+    answered = frozenset(settings.answers)
+    names = name_patterns(paths, answered, frozenset(seen))
+    unanswered = name_patterns(paths, answered - {"test"}, frozenset(seen))
+    if "test" not in unanswered.keys:
+        # names give the test of some files, and the answer is that of the others
+        names = unanswered
     by_name = any("contract" in dict(one.report.metadata) for one in unmapped)
     text = map_text([shape for shape, _ in groups], names, metadata, by_name=by_name)
     lines = _shape_lines(groups, names) if listed else []

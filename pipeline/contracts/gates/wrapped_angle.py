@@ -17,8 +17,9 @@ from pipeline.records.naming import counted
 ANGLES = ("theta_mech_rad", "theta_elec_rad")
 GAP = 2.0
 REMEDY = (
-    "count the turns on, as numpy.unwrap does, before the file is written, or log the angle "
-    "unwrapped; keep the column, for much follows from the angle alone"
+    "in the source map of a foreign file write what one turn of the field is, as `wraps: 360` of "
+    "degrees; else count the turns on before the file is written, as numpy.unwrap does, or log the "
+    "angle unwrapped; keep the column, for much follows from the angle alone"
 )
 
 

@@ -146,7 +146,17 @@ def _columns(
         if free:
             columns[min(free, key=lambda clock: clock.jitter).field] = ("t_s",)
     answered = frozenset(name for name in columns if _is_answered(name, answers))
-    return _from_relations(columns, evidence, answered)
+    return _from_relations(_of_meter(columns, answered), evidence, answered)
+
+
+def _of_meter(
+    columns: dict[str, tuple[str, ...]], answered: frozenset[str]
+) -> dict[str, tuple[str, ...]]:
+    """An LCR meter's table has the electrical angle that the rotor is locked at, in degrees."""
+    if not any(one[:1] in (("lab_h",), ("rab_ohm",)) for one in columns.values()):
+        return columns
+    locked = {name for name, one in columns.items() if one[:1] == ("theta_elec_rad",)}
+    return columns | dict.fromkeys(locked - answered, ("theta_elec_deg",))
 
 
 def _is_answered(name: str, answers: Mapping[str, str]) -> bool:

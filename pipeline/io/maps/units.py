@@ -19,6 +19,8 @@ _SPELLINGS_OF = {
     COUNTS: ("count", "cnt", "cnts", "ticks", "#", "pu", "p.u.", "per unit"),
     "V": ("Volt", "Volts", "volt", "volts", "伏"),
     "A": ("Amp", "Amps", "Ampere", "ampere", "amp", "A pk", "Apk", "A peak", "安"),
+    "V_rms": ("Vrms", "V rms", "V RMS", "V eff", "Veff"),
+    "A_rms": ("Arms", "A rms", "A RMS", "A eff", "Aeff"),
     "deg": ("度", "degree", "degrees", "°", "Grad"),
     "rad/s": ("rad/sec", "Radian per Second"),
     "deg/s": ("deg/sec", "dps", "°/s"),
@@ -70,6 +72,8 @@ def _prefixed(unit: str, *prefixes: str) -> dict[str, Scale]:
     return {prefix + unit: Scale(powers[prefix]) for prefix in prefixes}
 
 
+_RMS = Scale(math.sqrt(2.0))
+"""Of a rotor frame that is scaled to rms: an amplitude is √2 times as much."""
 _SHARE = {"percent": Scale(0.01), "%": Scale(0.01), "1": Scale(1.0)}
 _ANGLE = {
     "rad": Scale(1.0),
@@ -94,8 +98,8 @@ _TORQUE = {
 }
 FOREIGN_UNITS: dict[str, dict[str, Scale]] = {
     "s": _prefixed("s", "", "m", "u", "n") | {"min": Scale(60.0), "h": Scale(3600.0)},
-    "V": _prefixed("V", "", "m", "u", "k") | _SHARE,
-    "A": _prefixed("A", "", "m", "u", "k"),
+    "V": _prefixed("V", "", "m", "u", "k") | {"V_rms": _RMS} | _SHARE,
+    "A": _prefixed("A", "", "m", "u", "k") | {"A_rms": _RMS},
     "rad": _ANGLE,
     "deg": {name: Scale(scale.factor * 180 / math.pi) for name, scale in _ANGLE.items()}
     | {"deg": Scale(1.0), "rev": Scale(360.0), "rotation": Scale(360.0)},

@@ -309,6 +309,26 @@ def test_files_that_a_map_reads_get_it_with_the_answers(
     np.testing.assert_allclose(np.diff(even), 0.002)
 
 
+def test_an_answered_test_is_that_of_the_files_whose_names_give_none(tmp_path: Path) -> None:
+    """It was put over all files: the spin-down and the LCR meter's table were refused as it."""
+    logs, made = tmp_path / "logs", tmp_path / "mine.yaml"
+    logs.mkdir()
+    (logs / "M1_Auslauf.csv").write_text("Zeit_ms;n_rpm\n0;100\n5;99\n10;98\n15;97\n")
+    meter = "Winkel el. [°];Lab [µH];f [kHz]\n0;300;1\n30;310;1\n60;320;1\n"
+    (logs / "M1_LCR.csv").write_text(meter, encoding="utf-8")
+    (logs / "M1_Kennlinie.csv").write_text("Iq [A];M [mNm]\n-1;-90\n0;0\n1;90\n")
+    assert main(["inspect", str(logs), f"map={made}", "test=torque_table", "increment_s=1"]) == 0
+    found = survey(logs, parse_source_file(made.read_bytes(), "mine"))
+    tests = {entry.path: entry.stated["test"] for entry in found.entries}
+    assert tests == {
+        "M1_Auslauf.csv": "spin_down",
+        "M1_LCR.csv": "lcr",
+        "M1_Kennlinie.csv": "torque_table",
+    }
+    (locked,) = (e for e in found.entries if e.path == "M1_LCR.csv")
+    assert read_capture(logs, locked).tables[0]["theta_elec_deg"].to_list() == [0.0, 30.0, 60.0]
+
+
 def test_a_folder_that_needs_no_map_is_checked_without_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -36,6 +36,8 @@ from pipeline.records.errors import CaptureError
         (45.0, "mΩ", "ohm", 0.045),
         (1.0, "kHz", "Hz", 1000.0),
         (50.0, "percent", "V", 0.5),
+        (10.0, "(Arms)", "A", 14.142135623730951),
+        (230.0, "V rms", "V", 325.2691193458119),
     ],
 )
 def test_units_convert_to_the_value_in_the_tables(
