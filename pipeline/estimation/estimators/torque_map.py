@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy.special import fdtrc
 
 from pipeline.estimation.electrical.magnet_temperature import magnet_uncertainties, unlogged_note
 from pipeline.estimation.electrical.operating_points import (
@@ -18,6 +17,7 @@ from pipeline.estimation.electrical.operating_points import (
 )
 from pipeline.estimation.electrical.ripple_torque import RIPPLE
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, angle_doubt, standstill_words
+from pipeline.estimation.mechanical.map_drag import MapDrag, map_drag
 from pipeline.estimation.mechanical.other_current import not_along_q, unlogged_share
 from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d
@@ -31,7 +31,7 @@ from pipeline.estimation.uncertainty.instruments import (
     unstated_note,
 )
 from pipeline.estimation.uncertainty.nuisances import allowed_for
-from pipeline.numerics.least_squares import LinearFit, linear_fit
+from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.selection import needed_columns
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Array, Campaign, Capture
@@ -308,65 +308,18 @@ def _per_alpha(points: Sequence[Point], chosen: Sequence[str], alpha: float) -> 
     return float(step[0]) / 1e-4
 
 
-@dataclass(frozen=True, slots=True)
-class _Drag:
-    """Coulomb and viscous drag [2] of a map, their covariance [2, 2] and its dof; why there are
-    none; and whether windage was allowed for beside them.
-    """
-
-    values: Array
-    covariance: Array
-    dof: int
-    why: str = ""
-    windage: bool = False
-
-
-def _drag(points: Sequence[Point], model: Regression) -> _Drag:
+def _drag(points: Sequence[Point], model: Regression) -> MapDrag:
     """Coulomb and viscous drag from the offsets of the speeds.
 
-    A shaft that stands has no drag: its offset is cogging and static friction. Offsets that miss
-    the line by more than their scatter widen it, and beyond chance it has the speeds' freedom.
-    Where they do, and a drag by the square of speed explains it, that is allowed for.
+    A shaft that stands has no drag: its offset is cogging and static friction.
     """
     turning = sorted({p.group for p in points if not p.standing})
     speeds = np.array(
         [np.mean([p.omega_mech_rad_s for p in points if p.group == g]) for g in turning]
     )
-    blank = partial(_Drag, np.zeros(2), np.zeros((2, 2)), 0)
-    few = f"drag and transducer zero need three speeds, both senses; {EXPERIMENT}"
-    if np.unique(np.sign(speeds)).size < 2 or speeds.size < 3:
-        return blank(few)
-    design = np.column_stack([-np.sign(speeds), -speeds, np.ones(speeds.size)])
     rows = [model.index(f"speed {g}") for g in turning]
     offsets, block = model.coefficients[rows], model.covariance[np.ix_(rows, rows)]
-    part, windage = linear_fit(design, offsets), False
-    if not part.full_rank:
-        return blank(few)
-    level, lack_of_fit = policy().torque_map.level, _lack_of_fit(part, block)
-    if part.dof >= 2 and fdtrc(part.dof, model.dof, lack_of_fit) < level:
-        wider = np.column_stack([design, -speeds * np.abs(speeds)])
-        other = linear_fit(wider, offsets)
-        left = max(_lack_of_fit(other, block), 1e-300)
-        ratio = part.dof * lack_of_fit / (other.dof * left)
-        chance = fdtrc(1.0, other.dof, other.dof * (ratio - 1.0))
-        windage = bool(other.full_rank and other.coefficients[3] > 0.0 and chance < level)
-        if windage:
-            design, part, lack_of_fit = wider, other, _lack_of_fit(other, block)
-    inverse = np.linalg.pinv(design)
-    covariance = np.maximum(1.0, lack_of_fit) * (inverse @ block @ inverse.T)[:2, :2]
-    beyond = part.dof > 0 and fdtrc(part.dof, model.dof, lack_of_fit) < level
-    least = -policy().evidence.sigmas * np.sqrt(np.diag(covariance))
-    if np.any(part.coefficients[:2] < least):
-        return blank("drag is not Coulomb and viscous: a fitted coefficient is negative")
-    dof = part.dof if beyond else model.dof
-    return _Drag(part.coefficients[:2], covariance, dof, windage=windage)
-
-
-def _lack_of_fit(part: LinearFit, block: Array) -> float:
-    """Variance of what a fit of offsets leaves over their own; 0 where it leaves nothing."""
-    if part.dof < 1:
-        return 0.0
-    return float(np.sum(part.residuals**2) / np.mean(np.diag(block)) / part.dof)
+    return map_drag(speeds, offsets, block, model.dof, EXPERIMENT)
 
 
 def _untested_form(

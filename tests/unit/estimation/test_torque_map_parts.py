@@ -14,12 +14,12 @@ from pipeline.estimation.estimators.torque_map import (
     _chosen,
     _drag,
     _enough,
-    _lack_of_fit,
     _regress,
     _sigma,
     _untested_form,
     torque,
 )
+from pipeline.estimation.mechanical.map_drag import lack_of_fit
 from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d
 from pipeline.numerics.least_squares import linear_fit
 from tests.unit.estimation.points import W, point
@@ -143,7 +143,7 @@ def test_drag_is_the_line_through_the_offsets() -> None:
     wide = _drag(points, regression(model.names, off, block, dof=12))
     part = linear_fit(design, np.array(off))
     lack = float(part.residuals @ part.residuals) / 2.5e-6
-    assert _lack_of_fit(part, block) == pytest.approx(lack)
+    assert lack_of_fit(part, block) == pytest.approx(lack)
     assert wide.covariance == pytest.approx(lack * drag.covariance)
     assert wide.dof == 1
     assert _untested_form(points, model, 0) == ()
