@@ -60,7 +60,8 @@ def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None
     -----
     What an effect moves is its part of the residual that the other parameters do not absorb, in
     units of what is left there without it. So a capture that the effect explains wholly shows at
-    most its number of windows of it, and none beside the nuisance that the effect stands for. A
+    most its number of windows of it, and none beside the nuisance that the effect stands for. Less
+    than a share `form_error` of what the effect does there may be what the tangent is wrong by. A
     capture whose own deviance falls by more than a `tie` where the effect acts is moved by it, too.
 
     """
@@ -72,10 +73,10 @@ def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None
     others = np.setdiff1d(tried.model_columns, columns)
     size = np.array([fit.values[tried.columns[n].name] for n in columns])
     weight = np.sqrt(tried.weights(np.maximum(before, after)))
-    moved = weight * (tried.matrix[:, columns] @ size)
+    whole = weight * (tried.matrix[:, columns] @ size)
     beside = tried.matrix[:, others] * weight[:, None]
     scale = np.maximum(np.sqrt((beside**2).sum(axis=0)), 1e-300)
-    moved = moved - beside / scale @ np.linalg.lstsq(beside / scale, moved, rcond=1e-9)[0]
+    moved = whole - beside / scale @ np.linalg.lstsq(beside / scale, whole, rcond=1e-9)[0]
     paths = [segment.capture for segment in tried.segments]
     names = list(dict.fromkeys(paths))
     of_group = np.array([names.index(paths[number]) for number, _, _ in tried.labels])
@@ -84,10 +85,13 @@ def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None
     )
     acts = np.bincount(tried.group, np.any(tried.matrix[:, columns], axis=1), len(tried.labels)) > 0
     moved[~acts[tried.group]] = 0.0
-    power = np.bincount(of_group[tried.group], moved**2, len(names))
+    power, of_whole = (
+        np.bincount(of_group[tried.group], one**2, len(names)) for one in (moved, whole)
+    )
+    share = fit.policy.selection.form_error
     gain = np.bincount(of_group[acts], (was - now)[acts], len(names))
     tie = fit.policy.selection.tie
-    could = (power > tie) | (gain > tie)
+    could = ((power > tie) & (power > share**2 * of_whole)) | (gain > tie)
     most = int(np.argmax(gain))
     could[most] = False
     alone = bool(could.any()) and float(gain[could].sum()) <= 0.0

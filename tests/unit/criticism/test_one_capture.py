@@ -64,6 +64,18 @@ def test_what_another_parameter_absorbs_moves_nothing():
     assert only_capture(system([3.0, 1.5, 1.5, 0.0], absorbed=True), LARGE, after) is None
 
 
+@pytest.mark.parametrize(("wrong", "alone"), [(0.02, None), (0.1, "drive_0")])
+def test_what_a_tangent_is_wrong_by_is_no_movement(wrong, alone):
+    """An open winding at hundreds of noises, which its own nuisance takes but for that share."""
+    tried = system([3.0, 300.0, 0.0, 0.0])
+    second, shape = tried.group == 1, np.sign(tried.matrix[:, 1])
+    other = np.where(second, tried.matrix[:, 1], 0.0)
+    other += np.where(second, wrong * tried.matrix[:, 1] * np.roll(shape, 7), 0.0)
+    tried.matrix[:, 0] = other
+    after = np.array([4.0, 2.1, 2.0, 1.0])
+    assert only_capture(tried, LARGE, after) == alone
+
+
 def test_a_capture_that_gains_by_itself_confirms_it():
     """An encoder's zero in two logs that miss by thousands of floors, and in an open winding.
 
