@@ -157,7 +157,7 @@ def _columns() -> Iterable[Term]:
 
 def _constants() -> Iterable[Term]:
     def constant(
-        name: str, unit: str, words: str, low: float = 0.0, high: float = 1e6, whole: bool = False
+        name: str, unit: str, words: str, low: float = TINY, high: float = 1e6, whole: bool = False
     ) -> Term:
         return Term(name, unit, words, "constant", low, high, whole)
 
@@ -182,18 +182,18 @@ def _constants() -> Iterable[Term]:
     yield constant("kt_from_ke_nm_a", "N·m/A", "torque per peak q ampere, 1.5 p ψ of the back-EMF")
     yield constant("motor_constant_nm_sqrt_w", "N·m/sqrt(W)", "torque per root of copper loss")
     yield constant("pole_pairs", "1", "electrical cycles a mechanical turn", 1, 200, True)
-    yield constant("cogging_peak_nm", "N·m", "half the peak-to-peak of the cogging torque")
+    yield constant("cogging_peak_nm", "N·m", "half the peak-to-peak of the cogging torque", 0.0)
     yield constant("cogging_order", "1", "leading cogging order a mechanical turn", 1, 5000, True)
-    yield constant("cogging_amplitude_nm", "N·m", "amplitude of the leading cogging order")
+    yield constant("cogging_amplitude_nm", "N·m", "amplitude of the leading cogging order", 0.0)
     yield constant("j_rotor_kgm2", "kg·m²", "rotor inertia", TINY, 1e4)
     # the magnet's flux brakes at zero current too: only a rotor without magnets parts iron from dry
     dry = "drag of any speed: Coulomb friction, and hysteresis of the iron"
     viscous = "drag over speed: viscous friction, and eddy currents of the magnet's flux"
-    yield constant("torque_coulomb_nm", "N·m", dry)
+    yield constant("torque_coulomb_nm", "N·m", dry, 0.0)
     yield constant("b_visc_nm_s_rad", "N·m·s/rad", viscous, -1.0, 1e4)
-    yield constant("tau_elec_s", "s", "electrical time constant, Lq over R", 0.0, 100.0)
-    yield constant("tau_mech_s", "s", "mechanical time constant, J R over 1.5 (p ψ)²", 0.0, 1e5)
-    yield constant("rth_winding_k_w", "K/W", "winding to ambient, steady state", 0.0, 1e4)
+    yield constant("tau_elec_s", "s", "electrical time constant, Lq over R", TINY, 100.0)
+    yield constant("tau_mech_s", "s", "mechanical time constant, J R over 1.5 (p ψ)²", TINY, 1e5)
+    yield constant("rth_winding_k_w", "K/W", "winding to ambient, steady state", TINY, 1e4)
 
 
 def _metadata() -> Iterable[Term]:
