@@ -22,6 +22,7 @@ State = Callable[[Segment, Signals, Model, Values], Operating]
 Measured = Callable[[Segment, Signals, Model, Values], Array]
 Predicted = Callable[[Segment, Operating, Pieces, Model, Values], Array]
 Reading = Callable[[Segment, str, Model, Values], Array]
+Begins = Callable[[Segment, Machine], Values]
 Sensed = Callable[[Segment, Array, Model, Values], Signals]
 
 
@@ -208,6 +209,9 @@ class Equation:
         Whose clock it goes by (`effect.RECORDERS`); None of a table.
     sensing, use : Sensing, Use
         What the sensors add, and what else such segments serve for.
+    begins : callable (segment, machine) -> mapping, or None
+        Values of constants that its signals show at once, where a fit from their usual ones might
+        end elsewhere.
     rank : int
         Place among the segments of one capture, the lowest first; then by name.
 
@@ -232,6 +236,7 @@ class Equation:
     recorder: str | None = None
     sensing: Sensing = field(default_factory=Sensing)
     use: Use = field(default_factory=Use)
+    begins: Begins | None = None
     rank: int = 0
 
     def channel(self, name: str) -> Channel:

@@ -233,6 +233,34 @@ def predicted(
     return np.stack([voltage.real, voltage.imag])
 
 
+def begins(segment: Segment, machine: Machine) -> Values:
+    """Zero of the bench's encoder, where the back-EMF puts the magnet.
+
+    Parameters
+    ----------
+    segment
+        The spin.
+    machine
+        Its pole pairs.
+
+    Returns
+    -------
+    dict of float
+        Empty where the voltage itself is the angle. From half a turn off a fit would put the magnet
+        to nothing before it had turned it.
+
+    """
+    if _VOLTAGE_FRAME in segment.fixed:
+        return {}
+    theta = segment.recorded["theta_mech_rad"]
+    lines = vector_of_lines(
+        {name: segment.recorded[name] for name in LINES_V if name in segment.recorded}
+    )
+    turned = lines * np.gradient(theta) * np.exp(-1j * machine.pole_pairs * theta)
+    back_emf = complex(np.nanmean(turned)) / 1j
+    return {"bench_angle_rad": -float(np.angle(back_emf))} if back_emf else {}
+
+
 def _recorded_eps(segment: Segment, signals: Signals, model: Model, values: Values) -> Array:
     eps: Array = model.machine.pole_pairs * signals["theta_mech_rad"]
     return eps if _VOLTAGE_FRAME in segment.fixed else eps - values["bench_angle_rad"]
@@ -270,6 +298,7 @@ EQUATION = Equation(
         hooks=frozenset({"flux"}),
         sensors=frozenset({"angle", "voltage", "clock"}),
     ),
+    begins=begins,
     recorder="open",
     sensing=Sensing(_reading, sensors=LINES_V, sensed=_sensed),
     use=Use(turns=True, warms=frozenset({"flux"}), angle_maps=True),

@@ -16,6 +16,7 @@ import numpy as np
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment, rows_where
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import PHYSICAL, Model, base_of, zero
 from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine
@@ -182,7 +183,7 @@ def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = 
     model
         Machine and effects.
     known
-        Values to begin with; orders of magnitude where not given.
+        Values to begin with; where not given, what signals show at once, else orders of magnitude.
 
     Returns
     -------
@@ -194,7 +195,11 @@ def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = 
     By its noise floor, an equation that is far off would be given up before the constants are near.
 
     """
-    values = {**start_values(model, model.machine), **(known or {})}
+    values = start_values(model, model.machine)
+    for segment in segments:
+        if (begins := equation_of(segment).begins) is not None:
+            values |= begins(segment, model.machine)
+    values |= known or {}
     thinned = tuple(sparse(s, model.policy.cutting.rough_windows) for s in segments)
     rough = tuple(rough_floor(segment, model, values) for segment in thinned)
     fitted = gauss_newton(Fit(thinned, _pinned(model), values, rough, values)).fit
