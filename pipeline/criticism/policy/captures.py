@@ -161,6 +161,11 @@ class Cutting:
         why="drives of motors switch at 8 to 40 kHz; without one, eight of thirteen sound logs of "
         "a foreign bench had a delay as a name or were unknown",
     )  # fmt: skip
+    one_zero_rad: float = chosen(
+        0.3, "rad", "electrical angle between the zeros of a bench's encoder in two spins, beyond "
+        "which it was switched on anew",
+        why="a filter of 0.1 ms lags so at 3,000 rad/s; of zeros by chance a tenth are nearer",
+    )  # fmt: skip
     instant_rad: float = chosen(
         0.2, "rad", "turn of the highest order in a coasting sample that is as good as an instant",
         why="its mean is off by 0.2 %",

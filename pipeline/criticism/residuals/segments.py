@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -64,6 +65,7 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
             gain = gains[recorded.path]
             cut = (_by_encoder(s, machine) for s in _cut(capture, machine))
             cut_segments += [_by_instruments(segment, gain) for segment in cut]
+    cut_segments = _from_one_zero(cut_segments, machine)
     kinds = {segment.kind for segment in cut_segments}
     # what other captures can predict is held out as a whole
     whole = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
@@ -72,6 +74,27 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
         replace(s, fixed={**s.fixed, **_shares_of_repeats(s, cut_segments), **_early(s)})
         for s in cut_segments
     )
+
+
+def _from_one_zero(cut_segments: Sequence[Segment], machine: Machine) -> list[Segment]:
+    """The segments with angles from one zero of the bench's encoder, that of the first.
+
+    An incremental encoder counts from where it was switched on. What zeros differ by less than
+    `one_zero_rad` may be the lag of a filter, and stays.
+    """
+    turned, first = list(cut_segments), None
+    for place, segment in enumerate(cut_segments):
+        begins = equation_of(segment).begins
+        zero = None if begins is None else begins(segment, machine).get("bench_angle_rad")
+        if zero is None:
+            continue
+        first = zero if first is None else first
+        apart = math.remainder(zero - first, 2.0 * math.pi)
+        if abs(apart) > machine.policy.cutting.one_zero_rad:
+            theta = segment.recorded["theta_mech_rad"] - apart / machine.pole_pairs
+            recorded = {**segment.recorded, "theta_mech_rad": theta}
+            turned[place] = replace(segment, recorded=recorded, cache=Cache())
+    return turned
 
 
 def mixed_setups(campaign: Campaign, machine: Machine) -> tuple[Setup, ...]:
