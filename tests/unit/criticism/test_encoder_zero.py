@@ -20,10 +20,10 @@ def turned(campaign: Campaign, zeros: Iterable[float]) -> Campaign:
     left = iter(zeros)
     captures = []
     for c in campaign.captures:
-        if c.meta.test == "open_circuit":
-            angle = pl.col("theta_mech_rad") + next(left) / MOTOR.pole_pairs
-            c = replace(c, tables=tuple(t.with_columns(angle) for t in c.tables))
-        captures.append(c)
+        spin = c.meta.test == "open_circuit"
+        angle = pl.col("theta_mech_rad") + (next(left) / MOTOR.pole_pairs if spin else 0.0)
+        tables = tuple(t.with_columns(angle) for t in c.tables) if spin else c.tables
+        captures.append(replace(c, tables=tables))
     return replace(campaign, captures=tuple(captures))
 
 
