@@ -16,7 +16,7 @@ import numpy as np
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import significant_groups
+from pipeline.criticism.regression.goodness import leave_out, significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.acceptance import Baseline, is_determined, matters
 from pipeline.criticism.selection.candidates import Candidate, placed
@@ -82,8 +82,8 @@ def best_pair(
     Returns
     -------
     LinearSystem or None
-        The newest effect is the one that explains less alone. None where no pair lowers the
-        deviance by its penalties, predicts captures that are held out, and is sure of both sizes.
+        The newest effect is the one that explains less alone. None where no pair predicts captures
+        that are held out to the floor, and is sure of both sizes.
 
     """
     policy = wide.policy.selection
@@ -105,7 +105,11 @@ def best_pair(
 
 
 def _holds(baseline: Baseline, tried: LinearSystem, pair: Pair) -> bool:
-    """Whether both effects matter, are needed and sure, and predict captures that are held out."""
+    """Whether both effects matter, are needed and sure, and predict captures that are held out to
+    the floor. Of two that leave something, neither may be what it looks like.
+    """
+    if leave_out(tried).total ** 2 - 1.0 > tried.policy.goodness.over:
+        return False
     for effect, score in zip(tried.fit.model.effects[-2:], pair.scores, strict=True):
         without = gauss_newton(tried.fit.without(effect.name), before=tried)
         if (

@@ -164,20 +164,29 @@ def _with_pair(
 ) -> LinearSystem | None:
     """The fit with two effects that hold together where none joins the last step alone, and that
     step is over its floors; the `steps` get one with the first of them.
+
+    They may be two behind an earlier step, if that explains more than the last one: beside an
+    effect that took a part of another one's, neither shows.
     """
-    last = steps[-1]
-    if len(steps) + 1 >= last.fit.policy.selection.most_steps:
+    last = steps[-1].system
+    if not significant_groups(last).any():
         return None
-    if not significant_groups(last.system).any():
-        return None
-    scores = [s for s in last.scores if s.candidate.effect.name not in unsure]
-    offered = candidates(library, last.fit.model)
-    both = best_pair(last.system, offered, scores, last.fit.model.effects[base:])
-    if both is not None:
+    for place in range(len(steps) - 1, -1, -1):
+        step = steps[place]
+        model, policy = step.fit.model, step.fit.policy.selection
+        scores = [s for s in step.scores if s.candidate.effect.name not in unsure]
+        both = best_pair(step.system, candidates(library, model), scores, model.effects[base:])
+        if both is None or place + 2 >= policy.most_steps:
+            continue
+        if place < len(steps) - 1 and both.deviance > last.deviance - policy.tie:
+            continue
         first, second = (effect.name for effect in both.fit.model.effects[-2:])
         alone = _refloored(gauss_newton(both.fit.without(second), before=both), base)
-        steps.append(LadderStep((*last.added, first), *_scored(alone, library, last.system)))
-    return both
+        steps[place + 1 :] = [
+            LadderStep((*step.added, first), *_scored(alone, library, step.system))
+        ]
+        return both
+    return None
 
 
 def _scored(

@@ -1,0 +1,69 @@
+"""Two effects of which neither predicts what is held out while the other is missing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.selection import stepwise
+from pipeline.criticism.selection.pairs import Pair
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from tests.unit.criticism.coasts import Shaft
+from tests.unit.estimation.signals import capture
+
+SHAFT = Shaft(
+    dry=200.0,
+    excess=100.0,
+    slow_rad_s=40.0,
+    viscous=0.15,
+    windage=1e-4,
+    top_rad_s=1170.0,
+    end_rad_s=6.0,
+    row_s=2e-3,
+)
+"""Friction falls over 40 rad/s, and grows by the square of speed above."""
+
+
+def two_drags() -> Campaign:
+    """Coasts of both senses."""
+    coasts = (capture("spin_down", f"coast{s}", **SHAFT.coast(s)) for s in (1.0, -1.0))
+    return Campaign("m", tuple(coasts))
+
+
+def test_two_drags_are_found_together() -> None:
+    found = diagnose(two_drags(), ModelSpec(), Constants())
+    assert sorted(found.missing) == ["stribeck", "windage"]
+    assert len(found.ladder) == 3
+    assert found.ladder[-1].held_out < 1.0 < found.ladder[0].held_out
+
+
+def test_neither_joins_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stepwise, "best_pair", lambda *_: None)
+    found = diagnose(two_drags(), ModelSpec(), Constants())
+    assert sorted(found.missing) != ["stribeck", "windage"]
+
+
+@pytest.mark.parametrize(("fall", "needed"), [(30.0, True), (19.0, False), (14.0, False)])
+def test_a_pair_is_worth_both_penalties_beside_each_other(fall: float, needed: bool) -> None:
+    class Alone:
+        """A score of one effect."""
+
+        def __init__(self, fall: float, penalty: float) -> None:
+            self.fall, self.penalty = fall, penalty
+
+    pair = Pair((Alone(15.0, 6.0), Alone(8.0, 5.0)), fall, {})  # type: ignore[arg-type]
+    assert pair.both_needed is needed
+    assert pair.penalty == 11.0
+
+
+def test_the_coasts_are_what_they_say() -> None:
+    """Deceleration from the angle's second difference, over fifty rows."""
+    rows = SHAFT.coast(1.0)
+    theta, period = rows["theta_mech_rad"], 50.0 * SHAFT.row_s
+    speed = (theta[100:] - theta[:-100]) / (2.0 * period)
+    slowed = -(theta[100:] - 2.0 * theta[50:-50] + theta[:-100]) / period**2
+    law = np.array([SHAFT.slowed(omega) for omega in speed])
+    assert slowed[speed > 100.0] == pytest.approx(law[speed > 100.0], rel=1e-3)
