@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -46,17 +48,22 @@ def test_neither_joins_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sorted(found.missing) != ["stribeck", "windage"]
 
 
-@pytest.mark.parametrize(("fall", "needed"), [(30.0, True), (19.0, False), (14.0, False)])
-def test_a_pair_is_worth_both_penalties_beside_each_other(fall: float, needed: bool) -> None:
-    class Alone:
-        """A score of one effect."""
-
-        def __init__(self, fall: float, penalty: float) -> None:
-            self.fall, self.penalty = fall, penalty
-
-    pair = Pair((Alone(15.0, 6.0), Alone(8.0, 5.0)), fall, {})  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("first", "second", "fall", "needed"),
+    [
+        ((15.0, 6.0), (8.0, 5.0), 21.0, True),
+        ((15.0, 6.0), (8.0, 5.0), 19.0, False),
+        ((10.0, 6.0), (9.0, 2.0), 14.0, False),
+        ((10.0, 6.0), (9.0, 2.0), 16.0, True),
+    ],
+)
+def test_a_pair_is_worth_both_penalties_beside_each_other(
+    first: tuple[float, float], second: tuple[float, float], fall: float, needed: bool
+) -> None:
+    both = tuple(SimpleNamespace(fall=own, penalty=cost) for own, cost in (first, second))
+    pair = Pair(both, fall, {})  # type: ignore[arg-type]
     assert pair.both_needed is needed
-    assert pair.penalty == 11.0
+    assert pair.penalty == first[1] + second[1]
 
 
 def test_the_coasts_are_what_they_say() -> None:

@@ -10,6 +10,7 @@ import polars as pl
 import pytest
 from scipy import signal
 
+from pipeline.estimation.electrical.voltage_filter import left_by_filter
 from pipeline.estimation.estimators import (
     hand_turn,
     open_circuit,
@@ -81,6 +82,11 @@ def test_flux_is_that_of_a_standstill_where_a_filter_takes_some_of_the_voltage(t
     assert found.number == pytest.approx(4e-3, rel=3e-4)
     assert "as behind a filter" in found.note
     assert found.u < 3e-3 * found.number
+
+
+def test_a_filter_of_first_order_leaves_half_the_power_at_its_corner():
+    left = left_by_filter(np.array([0.0, 1e3, -2e3]), 1e-6)
+    assert left == pytest.approx([1.0, 0.5**0.5, 0.2**0.5])
 
 
 def test_two_speeds_that_disagree_beyond_chance_are_no_better_known_than_they_agree():
