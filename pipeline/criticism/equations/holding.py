@@ -42,14 +42,14 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     Notes
     -----
     Friction of a rotor at rest is whatever holds it, up to stiction, and not that of one that
-    turns. So the difference of the current between the senses is that of running friction to
-    1/√3 of itself, as of anything between none and twice as much (GUM 4.3.7).
+    turns. So the difference of the current between the senses is that of running friction to a
+    share `rest_share` of itself.
 
     """
     cells = holding_cells(capture, machine.policy)
     if cells is None:
         return None
-    half = float(np.mean(cells.sense * cells.iq_a))
+    half = machine.policy.tables.rest_share * float(np.mean(cells.sense * cells.iq_a))
     return segment_of(
         capture,
         "standing",
@@ -59,7 +59,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         Sensors({"iq_a": cells.noise_a}),
         channels=("iq_a",),
         blocks=cells.sector,
-        offsets=(cells.sense * half / math.sqrt(3.0))[None],
+        offsets=(cells.sense * half)[None],
     )
 
 

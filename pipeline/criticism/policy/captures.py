@@ -301,6 +301,11 @@ class Tables:
         0.5, "1", "share of the cells that must have them",
         why="where a pass turns round, and the rotor stays, it scatters otherwise than elsewhere",
     )  # fmt: skip
+    rest_share: float = chosen(
+        0.3, "1", "friction of a rotor that a current holds over that of one that turns, less one",
+        why="stiction is up to half as much again (Armstrong-Hélouvry, Control of Machines with "
+        "Friction, 1991); a rotor that comes to rest may leave as much of it unused",
+    )  # fmt: skip
     orders: int = chosen(12, "1", "orders of a holding current at the most", why=COST)
     order_u: float = chosen(
         3.0, "standard errors", "mean gain of the sectors by which an order must predict them",
