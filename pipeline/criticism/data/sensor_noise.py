@@ -86,12 +86,13 @@ def sensor_noise(
     level = _of_blocks(third, width, quantile)
     if not steady:
         widths = [width >> n for n in range((width // policy.shortest_block).bit_length())]
-        clean = [_of_blocks(third, one, quantile) for one in widths[1:]]
+        clean = min((_of_blocks(third, one, quantile) for one in widths[1:]), default=level)
+        level = clean if clean * policy.steps_growth < level else level
         if waves is not None:
             fitted = [one for one in widths if one >= waves.shortest()]
-            clean += [_of_blocks(waves.remainder(third, one), one, quantile) for one in fitted]
-        least = min(clean, default=level)
-        level = least if least * policy.steps_growth < level else level
+            beside = (_of_blocks(waves.remainder(third, one), one, quantile) for one in fitted)
+            clean = min(beside, default=level)
+            level = clean if clean * policy.steps_growth < level else level
     return max(level, _rounding(third) / math.sqrt(12.0))
 
 
