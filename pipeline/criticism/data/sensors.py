@@ -74,7 +74,7 @@ def noise_and_steps(
     policy
         Constants of judgement.
     orders
-        Waves a turn of `theta_mech_rad` that are no noise.
+        Waves a turn of `theta_mech_rad` that are no noise, but of currents.
 
     Returns
     -------
@@ -85,6 +85,8 @@ def noise_and_steps(
     angles = {name: name.startswith("theta") for name in columns}
     theta = columns.get("theta_mech_rad")
     waves = LockedWaves.of(theta, orders, policy) if orders and theta is not None else None
-    noise = {n: sensor_noise(column, policy, angles[n], waves) for n, column in columns.items()}
+    # a wave of the current is what straight lines between its rows miss
+    beside = {name: None if name.endswith("_a") else waves for name in columns}
+    noise = {n: sensor_noise(column, policy, angles[n], beside[n]) for n, column in columns.items()}
     steps = {n: coarse_step(c, noise[n], policy) for n, c in columns.items() if not angles[n]}
     return noise, {name: step for name, step in steps.items() if step > 0.0}

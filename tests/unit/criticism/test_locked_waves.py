@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.criticism.data.locked_waves import LockedWaves
 from pipeline.criticism.data.sensor_noise import sensor_noise
+from pipeline.criticism.data.sensors import noise_and_steps
 from pipeline.criticism.policy.policy import DEFAULT
 
 SENSORS = DEFAULT.sensor_noise
@@ -52,3 +53,13 @@ def test_a_rotor_at_rest_has_no_waves():
     third = np.diff(np.random.default_rng(2).normal(0.0, 1.0, 960), 3)
     still = LockedWaves.of(np.full(960, 1.3), ORDERS, SENSORS)
     assert still.remainder(third, 48) == pytest.approx(third[: third.size // 48 * 48])
+
+
+def test_a_wave_of_a_current_stays_in_its_noise():
+    """Between the rows it is not known: straight lines miss it."""
+    rng, theta = np.random.default_rng(8), turning(4000, 1.6)
+    wave = 2.0 * np.cos(ORDERS[0] * theta) + rng.normal(0.0, 0.1, theta.size)
+    columns = {"theta_mech_rad": theta, "iq_a": wave, "vq_v": wave}
+    noise, _ = noise_and_steps(columns, SENSORS, ORDERS)
+    assert noise["vq_v"] < 0.135
+    assert noise["iq_a"] > 0.25
