@@ -29,8 +29,7 @@ MOST_ROWS = 100_000
 BLOCKS = 2000
 """Most means that a recording is cut into; a few thousand say all, and take no time."""
 ROUNDS = 4
-"""Times that the frame is turned to where the back-EMF was found: a saliency of a third turns it by
-a few hundredths of what is left."""
+"""Times that the frame is turned to where the back-EMF was found; a saliency is taken along it."""
 SPEED_WINDOW_S = 0.005
 """Over which an angle's slope is taken: short against a motion, long against an encoder's steps."""
 

@@ -87,19 +87,19 @@ def best_pair(
 
     """
     policy = wide.policy.selection
-    pairs: dict[frozenset[str], Pair] = {}
-    for pair in pairs_of(wide, offered, scores):
-        known = pairs.setdefault(pair.names, pair)
-        pairs[pair.names] = max(known, pair, key=lambda one: one.fall)
-    best_first = sorted(pairs.values(), key=lambda pair: pair.penalty - pair.fall)
-    baseline = Baseline.of(wide, added) if pairs else None
-    for pair in best_first[: policy.refits]:
+    best_first: dict[frozenset[str], Pair] = {}
+    for pair in sorted(pairs_of(wide, offered, scores), key=lambda pair: pair.penalty - pair.fall):
+        best_first.setdefault(pair.names, pair)
+    if not best_first:
+        return None
+    baseline = Baseline.of(wide, added)
+    for pair in list(best_first.values())[: policy.refits]:
         tried = gauss_newton(_begun(wide.fit, pair))
         if wide.deviance - tried.deviance < pair.penalty:
             continue
         tried = gauss_newton(with_all_terms(tried.fit), before=tried)
         tried = reshaped(trimmed(tried, [e.name for e in tried.fit.model.effects]))
-        if baseline is not None and _holds(baseline, tried, pair):
+        if _holds(baseline, tried, pair):
             return linear_system(tried.fit)
     return None
 

@@ -20,6 +20,7 @@ from pipeline.criticism.machine.sample_period import ripple
 from pipeline.criticism.operating import Array, Complex, Operating, Recorded, Signals, Values
 from pipeline.criticism.signals.true_current import ahead_in
 from pipeline.criticism.signals.voltage import central
+from pipeline.records.row_means import row_means
 
 TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
 """Nuisances of the current's ripple that are in the torque (`model.BASE`)."""
@@ -228,13 +229,21 @@ def sensed_torque(
     """
     finer, torque = x.theta_rad.size // segment.size, torque_nm
     if finer > 1:
-        means = segment.instrument.timing == "centred"
-        of_held = row_means(torque_nm, finer) if means else torque_nm[::finer]
-        torque = of_held if x.shaft.held else averaged(torque_nm, finer)
+        torque = _of_held(segment, torque_nm, finer) if x.shaft.held else averaged(torque_nm, finer)
     if not segment.instrument.stator and not segment.sensors.held_speed:
         acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
         torque = torque - values["j_kgm2"] * acceleration
     return as_sensed(torque, model, values)
+
+
+def _of_held(segment: Segment, torque_nm: Array, finer: int) -> Array:
+    """Torque [n] of the rows of a held shaft from that of `finer` points a row, which are its mean
+    over half a row either side or its instant.
+    """
+    if segment.instrument.timing != "centred":
+        return torque_nm[::finer]
+    points = np.arange(torque_nm.size, dtype=np.float64)
+    return row_means(points[::finer], points, torque_nm)
 
 
 def as_sensed(torque_nm: Array, model: Model, values: Values) -> Array:
@@ -337,27 +346,4 @@ def averaged(fine: Array, finer: int) -> Array:
     before, after = cells @ (1.0 / finer - ramp), cells @ ramp
     mean: Array = before.copy()
     mean[1:] += after[:-1]
-    return mean
-
-
-def row_means(fine: Array, finer: int) -> Array:
-    """Means of a signal over half a sample either side of each sample.
-
-    Parameters
-    ----------
-    fine
-        A signal at some points a sample [n·m], m even.
-    finer
-        Points m a sample [1].
-
-    Returns
-    -------
-    array [n]
-        Of straight lines between points; of the first and the last sample a part.
-
-    """
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (fine[1:] + fine[:-1]))])
-    at = np.arange(0, fine.size, finer)
-    first, last = np.maximum(at - finer // 2, 0), np.minimum(at + finer // 2, fine.size - 1)
-    mean: Array = (total[last] - total[first]) / (last - first)
     return mean

@@ -13,7 +13,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from pipeline.io.maps.source_map import FieldMap, SourceMap
-from pipeline.io.maps.units import scale_to
+from pipeline.io.maps.units import scale_of
 from pipeline.io.tables.raw_table import RawTable
 from pipeline.physics.glossary import COLUMNS, suffix_of
 from pipeline.records.errors import CaptureError
@@ -268,7 +268,7 @@ def _converted(values: NDArray[Any], part: FieldMap, units: Mapping[str, str]) -
         raise CaptureError("unknown_unit", words, "write its unit into the source map")
     factor, shift = part.sign * part.scale, part.offset
     if unit is not None:
-        scale = scale_to(unit, COLUMNS[part.column].unit)
+        scale = scale_of(unit, part.column)
         shift += factor * scale.shift
         factor *= scale.factor
     with np.errstate(over="ignore"):

@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
 from typing import Literal
 
-from pipeline.io.maps.units import scale_to
+from pipeline.io.maps.units import scale_of
 from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT, CsvDialect
 from pipeline.physics.glossary import COLUMNS
 from pipeline.records.parse import number
@@ -265,7 +265,7 @@ class SourceMap:
             meant, value = column_of(key), number(word.replace(",", "."))
             if meant is not None and value is not None:
                 column, unit, sign = meant
-                scale = scale_to(unit, COLUMNS[column].unit)
+                scale = scale_of(unit, column)
                 columns.setdefault(column, sign * value * scale.factor + scale.shift)
         return columns
 

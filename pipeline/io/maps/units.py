@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from pipeline.physics.glossary import COLUMNS
 from pipeline.physics.units import TURN_RAD
 from pipeline.records.errors import CaptureError
 
@@ -74,6 +75,8 @@ def _prefixed(unit: str, *prefixes: str) -> dict[str, Scale]:
 
 _RMS = Scale(math.sqrt(2.0))
 """Of a rotor frame that is scaled to rms: an amplitude is √2 times as much."""
+_OF_FRAME = frozenset({"id_a", "iq_a", "vd_v", "vq_v"})
+"""Columns that may be in rms; a wave has instants."""
 _SHARE = {"percent": Scale(0.01), "%": Scale(0.01), "1": Scale(1.0)}
 _ANGLE = {
     "rad": Scale(1.0),
@@ -171,3 +174,33 @@ def scale_to(unit: str, target: str) -> Scale:
             f"use one of: {', '.join(sorted(known))}",
         )
     return scale
+
+
+def scale_of(unit: str, column: str) -> Scale:
+    """The scale from a foreign unit to that of a column.
+
+    Parameters
+    ----------
+    unit
+        As it is written.
+    column
+        Of the glossary.
+
+    Returns
+    -------
+    Scale
+        Factor and shift.
+
+    Raises
+    ------
+    CaptureError
+        As `scale_to`; and of an rms value of a column that is in no rotor frame (`unknown_unit`).
+
+    """
+    if normal_unit(unit) in ("A_rms", "V_rms") and column not in _OF_FRAME:
+        raise CaptureError(
+            "unknown_unit",
+            f"{column} is a wave, and {unit!r} is the unit of an amplitude",
+            "write the unit of its instants, such as A or V",
+        )
+    return scale_to(unit, COLUMNS[column].unit)

@@ -283,7 +283,7 @@ def test_times_count_alike_at_one_point_a_sample_or_eight():
 
 @pytest.mark.parametrize(("timing", "share"), [("centred", None), ("held", 1.0)])
 def test_a_held_shaft_s_torque_is_the_mean_of_a_row_of_means(timing, share):
-    """Of a wave that turns by 5 rad in a row its mean is a quarter, and the wrong way round."""
+    """Of a wave that turns by 5 rad in a row its mean is a quarter."""
     turn, order = 5.0 / 12.0, 84
     segment = as_cut(replace(slow_log(turn, timing), test="torque_map"))
     assert segment.instrument.points > 1

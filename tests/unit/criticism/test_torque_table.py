@@ -66,7 +66,7 @@ def test_its_noise_is_the_scatter_about_a_curve_of_each_angle():
 
 
 def test_the_torque_of_its_d_currents_is_no_noise():
-    """By the scatter at each angle, that of d currents was 180 times the transducer's noise."""
+    """A foreign bench's made a noise floor of 8.86 N·m, where the model missed by 0.05."""
     random, campaign = np.random.default_rng(1), table()
     (capture,) = campaign.captures
     rows = capture.arrays("iq_a", "theta_mech_rad")

@@ -48,7 +48,7 @@ def drive(first_step: int, limit_a: float):
 @pytest.mark.parametrize("first_step", [1, 3, 5, 9])
 @pytest.mark.parametrize(("limit_a", "u"), [(3.0, 0.015), (9.0, 0.06)])
 def test_a_jump_may_be_anywhere_between_its_rows(first_step: int, limit_a: float, u: float) -> None:
-    """As straight lines between rows, steps just behind a row made J 3 to 8 % too small.
+    """As straight lines, steps just behind a row made J 7 % too small, just before one 6 % large.
 
     Pulses of one shape leave open whether they jump or are late, and so the inertia.
     """

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from pipeline.io.maps.units import FOREIGN_UNITS, scale_to
+from pipeline.io.maps.units import FOREIGN_UNITS, scale_of, scale_to
 from pipeline.physics.glossary import COLUMNS
 from pipeline.records.errors import CaptureError
 
@@ -60,3 +60,10 @@ def test_anything_else_is_an_unknown_unit_with_the_known_ones(unit: str, target:
         scale_to(unit, target)
     assert refused.value.code == "unknown_unit"
     assert target in refused.value.remedy
+
+
+def test_a_wave_is_in_no_rms() -> None:
+    assert scale_of("Arms", "iq_a").factor == pytest.approx(math.sqrt(2.0))
+    for column in ("ia_a", "vab_v"):
+        with pytest.raises(CaptureError, match="is a wave"):
+            scale_of("A rms" if column == "ia_a" else "Vrms", column)
