@@ -192,6 +192,8 @@ class Hooks:
     shaft(t, q): recorded shaft torque from the true one [N·m].
     clock(recorder, q): recorded time over true time, less one [1], of a `RECORDERS` name.
 
+    coupling: the torque is of a far mass, and by the drags of all other effects, `x.drag_nm`.
+
     linear: its linear form, from which it is fitted where no tangent leads to it.
 
     discriminator(logs, q): which of the effects that share this very function it is;
@@ -212,6 +214,7 @@ class Hooks:
     shaft: Callable[[Array, Values], Array] | None = None
     speed: Callable[[Array, Values, float], Array] | None = None
     clock: ClockHook | None = None
+    coupling: bool = False
     linear: LinearForm | None = None
     discriminator: DiscriminatorHook | None = None
     shown: ShownHook | None = None

@@ -133,7 +133,7 @@ class Operating(Samples):
     `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit, `ts_s` is the sample period. `inverter`: the
     machine is fed and logged by a drive, so that inverter and drive-sensor effects apply; `supply`
     says how. `psi_wb` [n] (complex, d + jq) and `torque_em_nm` [n] are there for drop and torque
-    hooks. `cache` is what `once` made.
+    hooks, `drag_nm` [n] of all other effects for a coupling. `cache` is what `once` made.
     """
 
     machine: Machine
@@ -144,6 +144,7 @@ class Operating(Samples):
     shaft: ShaftState = ShaftState()
     psi_wb: Complex | None = None
     torque_em_nm: Array | None = None
+    drag_nm: Array | float = 0.0
     cache: dict[tuple[int, Hashable], tuple[Any, Any]] = field(default_factory=dict)
 
     def fed(self, **supply: Any) -> Operating:
@@ -299,6 +300,7 @@ class Operating(Samples):
             supply=replace(self.supply, volts_v=None),
             psi_wb=None,
             torque_em_nm=None,
+            drag_nm=0.0,
             cache={},
         )
 

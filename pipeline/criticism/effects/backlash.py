@@ -17,7 +17,7 @@ def _torque(x: Operating, q: Values) -> Array:
     share, gap = q["share"], q["gap_rad"]
 
     def twist() -> Array:
-        through = passed_on(x, share)
+        through = passed_on(x, share, q["far_friction"])
         return 0.5 * gap * side_of(through, q["torque_nm"]) + spring_twist(x, q, through)
 
     return far_drag(x, share, q["between"], twist)
@@ -39,6 +39,7 @@ EFFECT = Effect(
         Parameter("gap_rad", "rad", 0.005, 0.0002, low=0.0, high=0.3, scan=(0.0005, 0.005)),
         Parameter("twist_rad", "rad", 0.005, 0.0, low=1e-5, high=3.0, scan=(0.003,)),
         Parameter("damping_s", "s", 1.0, 0.0, "period_s", 0.0, 5.0, scan=(0.0,), optional=1),
+        Parameter("far_friction", "1", 0.5, 0.0, low=0.0, high=1.0, scan=(0.0,), optional=2),
         Parameter("torque_nm", "N·m", 0.03, 0.0, "torque_nm", scan=(0.01,), choice=True),
         choice("between", (0.0, 1.0, -1.0)),
     ),
@@ -48,6 +49,7 @@ EFFECT = Effect(
         "presliding": "an angle on the load side: friction moves no far mass",
     },
     torque=_torque,
+    coupling=True,
     discriminator=discriminator,
     shown=shown,
 )

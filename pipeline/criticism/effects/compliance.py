@@ -15,7 +15,7 @@ from pipeline.criticism.machine.two_masses import (
 
 def _torque(x: Operating, q: Values) -> Array:
     def twist() -> Array:
-        return spring_twist(x, q, passed_on(x, q["share"]))
+        return spring_twist(x, q, passed_on(x, q["share"], q["far_friction"]))
 
     return far_drag(x, q["share"], q["between"], twist)
 
@@ -35,6 +35,7 @@ EFFECT = Effect(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),
         Parameter("twist_rad", "rad", 0.01, 0.0005, low=1e-5, high=3.0, scan=(0.002, 0.01, 0.1)),
         Parameter("damping_s", "s", 1.0, 0.0, "period_s", 0.0, 5.0, scan=(0.0,), optional=1),
+        Parameter("far_friction", "1", 0.5, 0.0, low=0.0, high=1.0, scan=(0.0,), optional=2),
         choice("between", (0.0, 1.0, -1.0)),
     ),
     signals=("torque_shaft_nm",),
@@ -43,6 +44,7 @@ EFFECT = Effect(
         "backlash": "a drive log whose torque changes its sign: only a gap opens then",
     },
     torque=_torque,
+    coupling=True,
     linear=LINEAR_COUPLING,
     discriminator=discriminator,
     shown=shown,

@@ -445,12 +445,46 @@ def lead_ohm(x: Operating, values: Values) -> float:
 
 
 def _drags(model: Model, x: Operating, values: Values) -> Array:
-    """Torque [n, N·m] of friction and of every effect that has a drag."""
-    drag: Array = values["b_nm_s_rad"] * x.omega_rad_s
+    """Torque [n, N·m] of friction and of every effect that has a drag; those of couplings are by
+    the others, which are stored in the state.
+    """
+    x.drag_nm = values["b_nm_s_rad"] * x.omega_rad_s + _torques(model, x, values, couplings=False)
+    return x.drag_nm + _torques(model, x, values, couplings=True)
+
+
+def _torques(model: Model, x: Operating, values: Values, *, couplings: bool) -> Array:
+    """Torque [n, N·m] of the effects that are couplings, or of all others."""
+    torque = np.zeros(x.omega_rad_s.shape)
     for effect in model.effects:
-        if effect.torque is not None:
-            drag = drag + effect.torque(x, values_of(effect, model.machine, values))
-    return drag
+        if effect.torque is not None and effect.coupling is couplings:
+            torque = torque + effect.torque(x, values_of(effect, model.machine, values))
+    return torque
+
+
+def passed_on_drag(model: Model, x: Operating, values: Values, change_nm: Array) -> Array:
+    """A small change of the drags, with what the couplings of a model make of it.
+
+    Parameters
+    ----------
+    model
+        Base and effects.
+    x
+        True state [n] that was evaluated.
+    values
+        Parameters by full name.
+    change_nm
+        Of the drags of all effects but couplings [n, N·m].
+
+    Returns
+    -------
+    array [n, N·m]
+
+    """
+    if not change_nm.any() or not any(effect.coupling for effect in model.effects):
+        return change_nm
+    moved = replace(x, drag_nm=x.drag_nm + change_nm)
+    after, before = (_torques(model, at, values, couplings=True) for at in (moved, x))
+    return change_nm + after - before
 
 
 def zero(effect: Effect, model: Model, at: Iterable[tuple[str, float]] = ()) -> dict[str, float]:

@@ -18,18 +18,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.effect import Discrimination, Effect, FullLog, LinearForm, Shown
 from pipeline.criticism.machine.torsion import Law, Shaft, law_of_twist
 from pipeline.criticism.operating import Array, Operating, Values
-from pipeline.criticism.parameter import Machine, Parameter
+from pipeline.criticism.parameter import Machine, Parameter, choice
 from pipeline.criticism.policy.machine import Torsion
 
 
-def passed_on(x: Operating, share: float) -> Array:
-    """Torque that the motor's side of a coupling passes on, drags left out, which change slowly.
+def passed_on(x: Operating, share: float, far_friction: float) -> Array:
+    """Torque that the motor's side of a coupling passes on.
 
     Parameters
     ----------
@@ -37,11 +38,14 @@ def passed_on(x: Operating, share: float) -> Array:
         State of the machine, with its torque [N·m] and angle [rad] at one or more points a sample.
     share
         Of the inertia that is at the far end [1].
+    far_friction
+        Of the drags that is at the far end [1].
 
     Returns
     -------
     array [n, N·m]
-        S = T − (1 − share) J θ″ at the samples; 0 at either end, where the means do not reach.
+        S = T − (1 − far_friction) drags − (1 − share) J θ″ at the samples; 0 at either end, where
+        the means do not reach.
 
     Notes
     -----
@@ -53,15 +57,16 @@ def passed_on(x: Operating, share: float) -> Array:
     J. W. Tukey, Exploratory Data Analysis, Addison-Wesley, 1977, ch. 16 (twicing).
 
     """
-    torque, theta = _sampled(x)
+    torque, theta = _sampled(x, far_friction)
     near_kgm2 = (1.0 - share) * x.base["j_kgm2"]
     return _smoothed(x, torque[1:-1] - near_kgm2 * np.diff(theta, 2) / x.ts_s**2)
 
 
-def _sampled(x: Operating) -> tuple[Array, Array]:
-    """Torque [N·m] and angle [rad] at the samples alone [n] of a state of more points."""
+def _sampled(x: Operating, far_friction: float) -> tuple[Array, Array]:
+    """Torque less the near drags [N·m] and angle [rad] at the samples [n] of a state of more."""
     finer = x.shaft.finer
-    return x.torque_nm[::finer], x.theta_rad[::finer]
+    torque = x.torque_nm - (1.0 - far_friction) * x.drag_nm
+    return torque[::finer], x.theta_rad[::finer]
 
 
 def _at_points(x: Operating, signal: Array) -> Array:
@@ -120,13 +125,14 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
         State of the machine.
     q
         `torque_s2` = f J/k and `angle_s2` = f J/k (1 − f) J/J0 [s²], with J0 of `inertia_scale`;
-        `torque_s3` and `angle_s3` [s³] are c/k times these.
+        `torque_s3` and `angle_s3` [s³] are c/k times these; `far_friction` is that of `passed_on`.
 
     Returns
     -------
     array [n·m, N·m]
-        −f J twist″ = −(torque_s2 T″ − angle_s2 J0 θ⁗) + (torque_s3 T″ − angle_s3 J0 θ⁗)′; 0 of a
-        shaft that no inverter drives, and at the stator.
+        −f J twist″ = −(torque_s2 T″ − angle_s2 J0 θ⁗) + (torque_s3 T″ − angle_s3 J0 θ⁗)′, with the
+        torque T less the drags at the near end; 0 of a shaft that no inverter drives, and at the
+        stator.
 
     Notes
     -----
@@ -136,7 +142,7 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
     """
     if not x.inverter or x.shaft.stator:
         return np.zeros(x.theta_rad.size)
-    torque, theta = _sampled(x)
+    torque, theta = _sampled(x, q["far_friction"])
     bend = np.diff(theta, 2) / x.ts_s**2
     bend *= inertia_scale(x.machine)
     twist = _smoothed(x, q["torque_s2"] * torque[1:-1] - q["angle_s2"] * bend)
@@ -188,7 +194,13 @@ def spring_of(q: Values, base: Values, machine: Machine) -> Values | None:
     share = 1.0 - bent / (soft * j_kgm2)
     twist_rad = machine.scales["torque_nm"] * soft / (share * j_kgm2)
     late_s = max(q["torque_s3"] / soft, 0.0)
-    return {"share": share, "twist_rad": twist_rad, "damping_s": late_s, "between": -1.0}
+    return {
+        "share": share,
+        "twist_rad": twist_rad,
+        "damping_s": late_s,
+        "far_friction": q["far_friction"],
+        "between": -1.0,
+    }
 
 
 LINEAR_COUPLING = LinearForm(
@@ -204,8 +216,10 @@ LINEAR_COUPLING = LinearForm(
             Parameter("angle_s2", "s²", 1e-5, 0.0),
             Parameter("torque_s3", "s³", 1e-9, 0.0),
             Parameter("angle_s3", "s³", 1e-9, 0.0),
+            choice("far_friction", (0.0, 1.0)),
         ),
         torque=linear_far_drag,
+        coupling=True,
     ),
     "torque_shaft_nm",
     spring_of,
@@ -328,11 +342,12 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
     between, share = q["between"] > 0.0, q["share"]
     if share <= 0.0 or not logs:
         return None
-    law = _law(logs, between, share)
-    if law is None or not between:
-        if law is not None and _excluded(law, logs[0], share, q):
-            return Discrimination(None, {})
-        return None if law is None else _discriminated(law, logs[0], share)
+    law = _law(logs, between, share, _half_wave_s(logs[0], q))
+    if law is None or not (between or _turns_both(law, logs[0])):
+        return None
+    if not between:
+        excluded = _excluded(law, logs[0], share, q)
+        return Discrimination(None, {}) if excluded else _discriminated(law, logs[0], share)
     return _in_coupling(law, logs[0], (1.0 - share) * logs[0].x.base["j_kgm2"])
 
 
@@ -355,11 +370,27 @@ def _excluded(law: Law, log: FullLog, part: float, q: Values) -> bool:
     )
 
 
-def _law(logs: Sequence[FullLog], between: bool, share: float) -> Law | None:
-    """The law of twist in logs, of enough windows; None without. Where the transducer is `between`,
-    of logs with a transducer.
+def _turns_both(law: Law, log: FullLog) -> bool:
+    """Whether a law has the inertia of both parts, as the fit has. A log that has not obeys another
+    one, and what that says of the twist is nothing.
+    """
+    least = log.x.machine.policy.torsion.least_shown
+    return least < law.mobility * log.x.base["j_kgm2"] < 1.0 / least
+
+
+def _half_wave_s(log: FullLog, q: Values) -> float:
+    """Half a period of the resonance of a fit's spring: of less, a parabola is most."""
+    share, j_kgm2 = q["share"], log.x.base["j_kgm2"]
+    softness = q.get("twist_rad", 0.0) / log.x.machine.scales["torque_nm"]
+    return math.pi * math.sqrt(share * max(1.0 - share, 0.0) * j_kgm2 * softness)
+
+
+def _law(logs: Sequence[FullLog], between: bool, share: float, window_s: float = 0.0) -> Law | None:
+    """The law of twist in logs, of enough windows, which are of such a length at the least; None
+    without. Where the transducer is `between`, of logs with a transducer.
     """
     policy = logs[0].x.machine.policy.torsion
+    policy = replace(policy, window_s=max(policy.window_s, window_s))
     used = (one for one in logs if not (between and one.x.shaft.alone))
     law = law_of_twist((_shaft(one, between, share) for one in used), policy)
     return None if law is None or law.windows < policy.windows else law

@@ -68,7 +68,7 @@ class Torsion:
         why="chance passes it once in four thousand",
     )  # fmt: skip
     least_shown: float = chosen(
-        0.5, "1", "share of a fit's twist or gap that full logs show at the least",
+        0.5, "1", "share of a fit's twist or gap, and of its 1/J, that full logs show at the least",
         why="damping and drags move what they show by some per cent; another cause than a twist "
         "leaves a tenth of it",
     )  # fmt: skip

@@ -21,6 +21,7 @@ from pipeline.criticism.machine.model import (
     Pieces,
     clock_gain,
     evaluate,
+    passed_on_drag,
     values_of,
     zero,
 )
@@ -147,7 +148,8 @@ class Sampler:
         x = replace(self.x, base=moved)
         pieces = self.pieces
         if column.name == "b_nm_s_rad":
-            pieces = replace(pieces, drag_nm=pieces.drag_nm + step * x.omega_rad_s)
+            drag = passed_on_drag(self.model, self.x, self.values, step * x.omega_rad_s)
+            pieces = replace(pieces, drag_nm=pieces.drag_nm + drag)
         elif column.name == "lead_ohm":
             lead = step * self.mean.i_a * float(x.inverter and not x.supply.measured)
             pieces = replace(pieces, drop_v=pieces.drop_v + lead)
@@ -240,6 +242,9 @@ class Sampler:
             )
         else:
             change = self._pieces({name: hook(q) for name, hook in self._hooks_of(effect)})
+        if not effect.coupling:
+            passed = passed_on_drag(self.model, self.x, self.values, change.drag_nm)
+            change = replace(change, drag_nm=passed)
         parts = (change.psi_wb, change.slope_wb, change.drop_v, change.drag_nm)
         if not any(part.any() for part in parts):
             return None

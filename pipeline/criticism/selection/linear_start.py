@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import rows_where
 from pipeline.criticism.effect import Effect, LinearForm
-from pipeline.criticism.regression.columns import effect_columns
+from pipeline.criticism.machine.model import zero
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton, summed_error
-from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.candidates import Candidate, first_of_each, searched
 from pipeline.criticism.selection.improvement import FitQuality, clears, fall_below_floor, share_of
 from pipeline.criticism.selection.score_test import Score, paid_for, ranked
@@ -66,9 +66,10 @@ def with_linear_start(
         form = candidate.effect.linear
         if form is None or not _exceeds_floor(wide, significant, form.channel):
             continue
-        begun = _fit_from_form(wide.fit, candidate.effect, form)
-        if begun is not None:
-            end = min(map(_fitted, _by_choices(begun)), key=summed_error)
+        begun = _fits_from_form(wide.fit, candidate.effect, form)
+        ends = [_fitted(one) for start in begun for one in _by_choices(start)]
+        if ends:
+            end = min(ends, key=summed_error)
             so_far = with_better(so_far, _score_of(wide, candidate, end), offered)
     return tuple(so_far)
 
@@ -154,8 +155,16 @@ def _fitted(begun: Fit) -> LinearSystem:
 
 
 def _score_of(wide: LinearSystem, candidate: Candidate, end: LinearSystem) -> Score:
-    """The score of an effect at its fit, over one without it by the same noise floors."""
-    return score_between(_reweighted(wide.fit, end.fit), end, candidate)
+    """The score of an effect at its fit, over one without it by the same noise floors; its moves
+    are from the fit that there is.
+    """
+    score = score_between(_reweighted(wide.fit, end.fit), end, candidate)
+    return replace(score, moves=_moves(wide.fit, end.fit))
+
+
+def _moves(fit: Fit, end: Fit) -> dict[str, float]:
+    """How far the parameters of a fit are from those of another one."""
+    return {name: end.values[name] - value for name, value in fit.values.items()}
 
 
 def score_between(base: LinearSystem, end: LinearSystem, candidate: Candidate) -> Score:
@@ -186,7 +195,7 @@ def score_between(base: LinearSystem, end: LinearSystem, candidate: Candidate) -
         before.deviance - after.deviance,
         0.0,
         {name: values[name] for name in amplitudes},
-        {n: end.fit.values[n] - v for n, v in base.fit.values.items()},
+        _moves(base.fit, end.fit),
         share_of(base, effect, before, after),
         size_of(end.fit, effect, parameters),
         fall_below_floor(base, before.reduced_chi2, after.reduced_chi2),
@@ -207,8 +216,8 @@ def _quality(system: LinearSystem) -> FitQuality:
     return FitQuality(system.deviance, chi2, float(system.prior_costs().sum()))
 
 
-def _fit_from_form(fit: Fit, effect: Effect, form: LinearForm) -> Fit | None:
-    """Where a fit with the effect begins: at the values that its linear form gives.
+def _fits_from_form(fit: Fit, effect: Effect, form: LinearForm) -> list[Fit]:
+    """Where fits with the effect begin: at the values that its linear form gives, by its choices.
 
     At an order of the angle the torque's fourth derivative of an angle is noise. These rows are
     left out. None where the linear form does not take most of the signal's power over the floor:
@@ -223,19 +232,19 @@ def _fit_from_form(fit: Fit, effect: Effect, form: LinearForm) -> Fit | None:
         )
         for segment, sigma in zip(fit.segments, fit.sigma, strict=True)
     )
-    columns = tuple(effect_columns(form.effect, fit.model, ()))
-    system = linear_system(replace(fit, sigma=sigmas), columns)
-    known, effort = system.normal_equations(), fit.policy.selection.thorough
-    end = known.only(np.arange(len(system.columns))).best(*effort)
-    rigid = known.only(system.model_columns).best(*effort)
-    acting = np.array([channel == form.channel for _, channel, _ in system.labels])
-    if not clears(system, acting, rigid.reduced_chi2, end.reduced_chi2):
-        return None
-    steps = zip((c.name for c in system.columns), end.step.tolist(), strict=True)
-    moved = {name: fit.values.get(name, 0.0) + step for name, step in steps}
-    linear = {p.name: moved.pop(f"{form.effect.name}.{p.name}") for p in form.effect.parameters}
-    values = form.values(linear, moved, machine)
-    if values is None:
-        return None
-    start = {f"{effect.name}.{name}": value for name, value in values.items()}
-    return replace(fit, model=fit.model.with_effects(effect)).at({**moved, **start})
+    rigid = gauss_newton(replace(fit, sigma=sigmas))
+    acting = np.array([channel == form.channel for _, channel, _ in rigid.labels])
+    model = fit.model.with_effects(form.effect)
+    begun = replace(
+        fit, model=model, values={**fit.values, **zero(form.effect, model)}, sigma=sigmas
+    )
+    starts = []
+    for end in map(gauss_newton, _by_choices(begun)):
+        moved = dict(end.fit.values)
+        linear = {p.name: moved.pop(f"{form.effect.name}.{p.name}") for p in form.effect.parameters}
+        values = form.values(linear, moved, machine)
+        chi2 = [one.reduced_chi2(one.residual) for one in (rigid, end)]
+        if values is not None and clears(end, acting, *chi2):
+            start = {f"{effect.name}.{name}": value for name, value in values.items()}
+            starts.append(replace(fit, model=fit.model.with_effects(effect)).at({**moved, **start}))
+    return starts
