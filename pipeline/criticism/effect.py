@@ -159,6 +159,7 @@ class Evidence:
     """What shows an effect: `signals` are the capture columns without which it cannot be seen,
     `tests` those that excite it, the best first, and `experiment` the one to record.
 
+    `of_phases`: it goes with the electrical angle, which is not known without the pole pairs.
     `alternatives`: other effects, each with the test or calibration that discriminates it from
     this. `rare`: benches seldom have it, so that of two that tie the other is named. `in_place_of`:
     a nuisance, zero in a model with the effect, and the parameter that is it at an unusual size.
@@ -169,6 +170,7 @@ class Evidence:
     experiment: str
     signals: tuple[str, ...] = ()
     rare: bool = False
+    of_phases: bool = False
     in_place_of: tuple[str, str] | None = None
     friction: bool = False
     alternatives: Mapping[str, str] = field(default_factory=dict)
@@ -265,7 +267,8 @@ class Effect(Description, Evidence, Hooks):
         return self.expand(machine) if self.expand is not None else self.parameters
 
     def gone_through(self, machine: Machine) -> bool:
-        """Whether some capture goes through a whole period of a wave of the effect over the angle.
+        """Whether some capture goes through an eighth of a wave of the effect over the angle: what a
+        parabola leaves of it is 3 per cent, and of less soon nothing.
 
         Parameters
         ----------
@@ -279,7 +282,7 @@ class Effect(Description, Evidence, Hooks):
 
         """
         orders = [p.order for p in self.parameters_of(machine) if p.order]
-        return not orders or max(orders) * machine.travel_turns >= 1.0
+        return not orders or max(orders) * machine.travel_turns >= 0.125
 
     def dof(self, machine: Machine) -> int:
         """How many parameters are fitted.

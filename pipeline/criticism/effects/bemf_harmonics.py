@@ -38,6 +38,7 @@ EFFECT = Effect(
     "of the torque from their slope reaches the shaft's sensor",
     signature="orders 6ε and 12ε: proportional to speed in voltage, to current in torque",
     tests=("open_circuit", "torque_map"),
+    of_phases=True,
     experiment="an open-circuit spin",
     headline=tuple(
         f"back-EMF that is no pure sine, {{{axis}{order}_cos & {axis}{order}_sin %}} of the flux "

@@ -41,6 +41,7 @@ EFFECT = Effect(
     "|γ|/2 as well; bench: how far the bench's line currents come from the same sensors",
     signature="second electrical order in current, voltage and torque, proportional to current",
     tests=("torque_map",),
+    of_phases=True,
     experiment="a torque map at two speeds",
     headline="phase current sensors that differ, by {cosine & sine %} of the current",
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",

@@ -19,6 +19,7 @@ EFFECT = Effect(
     words="recorded stationary current = true one + constant α + jβ",
     signature="first electrical order in dq currents, voltages and torque, at any current",
     tests=("torque_map", "drive"),
+    of_phases=True,
     experiment="a log with the current loop off: the sensors should read zero",
     headline="phase current sensors off zero by {alpha_a & beta_a}",
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",

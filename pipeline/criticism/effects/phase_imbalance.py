@@ -17,6 +17,7 @@ EFFECT = Effect(
     words="phase k has resistance R (1 + 2 Re(γ e^{−j4πk/3})), γ = cosine + j sine",
     signature="second electrical order in the dq voltages, proportional to current, at any speed",
     tests=("resistance", "torque_map"),
+    of_phases=True,
     experiment="resistance through all three terminal pairs, or current at low speed",
     headline="phase resistances that differ, by up to {phases cosine & sine %} of their mean",
     reference="Fortescue, Trans. AIEE 37 (1918), symmetrical co-ordinates",

@@ -46,13 +46,15 @@ def candidates(library: Mapping[str, Effect], model: Model) -> tuple[Candidate, 
     library
         Every effect by name.
     model
-        The model; effects whose wave of the angle no capture goes through are left out.
+        The model; effects whose wave of the angle no capture goes through are left out, as are
+        those of the phases where nothing gives the pole pairs.
 
     """
     inside = {effect.name for effect in model.effects}
     candidates = []
     for effect in library.values():
-        if effect.name in inside or not effect.gone_through(model.machine):
+        unknown = effect.of_phases and not model.machine.pairs_known
+        if effect.name in inside or unknown or not effect.gone_through(model.machine):
             continue
         shapes = [p for p in effect.parameters_of(model.machine) if not p.amplitude]
         tried = [(p, p.scan[:1] if p.optional else p.scan) for p in shapes]

@@ -300,7 +300,7 @@ def _floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
     time. An encoder off its centre drives J to next to nothing, an unbalance to six times what it
     is, and the floors were made with that J.
     """
-    policy, changed = fit.policy.selection, floors_changed(fit)
+    changed = floors_changed(fit)
     if changed:
         floor = floors(fit.segments, fit.model, fit.values)
         fit = replace(fit, sigma=floor, near=fit.values)
@@ -308,8 +308,7 @@ def _floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
     if not changed and not significant_groups(refitted).any():
         return refitted.fit
     rough = rough_anew(fit)
-    lighter, heavier = sorted(fit.values["j_kgm2"] for fit in (rough, fit))
-    if heavier < policy.inertia_ratio * lighter:
+    if not _other_inertia(rough, fit):
         return refitted.fit
     return min(refitted, first_fit(rough), key=lambda end: end.deviance).fit
 
@@ -408,13 +407,26 @@ def _refitted(wide: LinearSystem, score: Score) -> LinearSystem:
     """The fit with a candidate, started from the step that its score predicts.
 
     If that fit is no better than the one without it, a second one begins with all other parameters
-    where they are: the linear step overshoots where parameters are strongly correlated.
+    where they are: the linear step overshoots where parameters are strongly correlated. A third one
+    with a drag begins from orders of magnitude, if these have another inertia: without the weight
+    of an arm no inertia is large enough for a free shaft's acceleration, and no step leads back.
     """
-    tried = gauss_newton(begin_from(wide.fit, score), before=wide)
+    begun = begin_from(wide.fit, score)
+    tried = gauss_newton(begun, before=wide)
     if tried.deviance + score.penalty < wide.deviance:
         return tried
-    restarted = gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)
-    return min(tried, restarted, key=lambda end: end.deviance)
+    ends = [tried, gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)]
+    if score.candidate.effect.hook == "torque":
+        rough = rough_anew(begun)
+        if _other_inertia(rough, wide.fit):
+            ends.append(gauss_newton(replace(rough, sigma=wide.fit.sigma, near=wide.fit.near)))
+    return min(ends, key=lambda end: end.deviance)
+
+
+def _other_inertia(rough: Fit, fit: Fit) -> bool:
+    """Whether a rough fit finds an inertia far from that of a fit."""
+    lighter, heavier = sorted(one.values["j_kgm2"] for one in (rough, fit))
+    return heavier >= fit.policy.selection.inertia_ratio * lighter
 
 
 def begin_from(fit: Fit, score: Score) -> Fit:

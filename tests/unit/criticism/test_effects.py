@@ -398,8 +398,10 @@ def test_an_order_is_offered_where_some_capture_goes_through_one_of_its_waves():
     short = replace(machine(), travel_turns=0.04)
     assert cogging.orders(short) == (84,)
     assert LIBRARY["cogging"].gone_through(short)
-    shorter = replace(machine(), travel_turns=0.01)
+    shorter = replace(machine(), travel_turns=0.001)
     for name in ("cogging", "unbalance", "angle_eccentricity"):
         assert not LIBRARY[name].gone_through(shorter)
         assert LIBRARY[name].gone_through(machine())
     assert LIBRARY["coulomb_friction"].gone_through(shorter)
+    arm = replace(machine(), travel_turns=0.2)
+    assert LIBRARY["unbalance"].gone_through(arm)

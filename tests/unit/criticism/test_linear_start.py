@@ -87,6 +87,7 @@ def test_a_far_end_that_a_stiff_dynamometer_holds_is_found_from_the_same_start(n
 def test_a_start_is_tried_with_the_transducer_wherever_it_may_stand():
     model = Model(machine(), (effects()["compliance"],))
     spring = {"share": 0.4, "twist_rad": 0.02, "damping_s": 0.0, "between": -1.0}
+    spring |= {"far_friction": 0.0}
     values = {**BASE, **{f"compliance.{name}": value for name, value in spring.items()}}
     starts = _by_choices(Fit((), model, values, (), values))
     assert [one.values["compliance.between"] for one in starts] == [0.0, 1.0, -1.0]
@@ -111,20 +112,21 @@ def test_the_linear_form_is_the_spring_and_its_damper_and_gives_them_back(late_s
         "angle_s2": soft * (1.0 - share) * j / inertia_scale(x.machine),
     }
     linear |= {"torque_s3": late_s * linear["torque_s2"], "angle_s3": late_s * linear["angle_s2"]}
+    linear |= {"far_friction": 0.0}
     spring = {"share": share, "twist_rad": torque / stiffness, "damping_s": late_s}
-    twist = spring_twist(x, spring, passed_on(x, share))
+    twist = spring_twist(x, spring, passed_on(x, share, 0.0))
     both = far_drag(x, share, -1.0, lambda: twist), linear_far_drag(x, linear)
     inside = slice(60, -60)
     assert both[1][inside] == pytest.approx(both[0][inside], rel=1e-6, abs=1e-9)
     assert np.abs(both[0][inside]).max() > 0.01
     found = spring_of(linear, {"j_kgm2": j}, x.machine)
     assert found == pytest.approx(
-        {"share": share, "twist_rad": torque / stiffness, "damping_s": late_s, "between": -1.0}
+        {**spring, "far_friction": 0.0, "between": -1.0}
     )
 
 
 @pytest.mark.parametrize(("soft", "bent"), [(-1e-6, 1e-6), (1e-6, -1e-6), (1e-6, 1.0)])
 def test_no_two_masses_have_such_parameters(soft, bent):
     x = operating(4)
-    undamped = {"torque_s3": 0.0, "angle_s3": 0.0}
+    undamped = {"torque_s3": 0.0, "angle_s3": 0.0, "far_friction": 0.0}
     assert spring_of({"torque_s2": soft, "angle_s2": bent, **undamped}, BASE, x.machine) is None

@@ -100,6 +100,7 @@ def test_a_compliant_shaft_is_two_masses_and_a_spring(between: float):
     x = replace(shaft(theta), torque_em_nm=torque, inverter=True)
     twist_rad = softness * x.machine.scales["torque_nm"]
     q = {"share": share, "twist_rad": twist_rad, "damping_s": 0.0, "between": between}
+    q |= {"far_friction": 0.0}
     drag = LIBRARY["compliance"].torque(x, q)
     rigid = torque.copy()
     rigid[1:-1] -= BASE["j_kgm2"] * np.diff(theta, 2) / TS**2
@@ -114,7 +115,7 @@ def test_a_twist_smoothed_twice_stays_within_the_samples_around_a_window():
     x = operating(400)
     theta = np.where(np.arange(400) < 200, 0.0, 3.0)
     x = replace(x, theta_rad=theta, torque_em_nm=np.zeros(400), inverter=True)
-    drag = two_masses.far_drag(x, 0.3, False, lambda: two_masses.passed_on(x, 0.3))
+    drag = two_masses.far_drag(x, 0.3, False, lambda: two_masses.passed_on(x, 0.3, 0.0))
     drag = np.abs(drag[60:-60])
     touched = np.flatnonzero(drag > 1e-6 * drag.max()) + 60
     assert touched.size and touched.min() >= 200 - PAD and touched.max() < 200 + PAD

@@ -285,7 +285,7 @@ def test_an_effect_is_material_by_its_amplitude_and_by_shapes_that_have_a_least(
         full = {f"{name}.{k}": v for k, v in values.items()}
         return material(Fit((), Model(machine(), (library[name],)), full, (), full), library[name])
 
-    rigid = {"damping_s": 0.0, "between": 0.0}
+    rigid = {"damping_s": 0.0, "far_friction": 0.0, "between": 0.0}
     assert judged("compliance", share=0.3, twist_rad=0.005, **rigid)
     assert not judged("compliance", share=0.3, twist_rad=1e-4, **rigid)
     assert not judged("compliance", share=0.01, twist_rad=0.005, **rigid)

@@ -216,7 +216,7 @@ def test_a_fit_leaves_the_shape_that_a_look_told_and_its_uncertainty():
     assert gap.choice and gap.u == 1e-4
     columns = effect_columns(known, Model(machine(), (known,)))
     assert [c.name for c in columns] == [
-        f"backlash.{name}" for name in ("share", "twist_rad", "damping_s")
+        f"backlash.{name}" for name in ("share", "twist_rad", "damping_s", "far_friction")
     ]
 
 

@@ -30,7 +30,7 @@ def gain(frequency_hz: float) -> float:
     t = TS * np.arange(4000)
     wave = np.sin(2 * math.pi * frequency_hz * t)
     inside = slice(200, -200)
-    passed = passed_on(carrying(wave), SHARE)[inside]
+    passed = passed_on(carrying(wave), SHARE, 0.0)[inside]
     return float(passed @ wave[inside] / (wave[inside] @ wave[inside]))
 
 
@@ -49,7 +49,7 @@ def load_error(damping_s: float) -> float:
     t = TS * np.arange(angle.size)
     x = replace(operating(t.size), theta_rad=angle, torque_em_nm=driving(t))
     torque = x.machine.scales["torque_nm"]
-    values = {"share": SHARE, "twist_rad": SOFTNESS * torque, "between": 0.0}
+    values = {"share": SHARE, "twist_rad": SOFTNESS * torque, "between": 0.0, "far_friction": 0.0}
     drag = effects()["compliance"].torque(x, values | {"damping_s": damping_s})
     bend = np.zeros(t.size)
     bend[1:-1] = np.diff(angle, 2) / TS**2
