@@ -267,8 +267,9 @@ class Effect(Description, Evidence, Hooks):
         return self.expand(machine) if self.expand is not None else self.parameters
 
     def gone_through(self, machine: Machine) -> bool:
-        """Whether some capture goes through an eighth of a wave of the effect over the angle: what a
-        parabola leaves of it is 3 per cent, and of less soon nothing.
+        """Whether some capture goes through an eighth of a wave of the effect over the angle.
+
+        A parabola leaves 3 per cent of that, and of less soon nothing.
 
         Parameters
         ----------

@@ -27,7 +27,7 @@ from pipeline.criticism.data.traces import (
 )
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import OPEN_FLUX, Model, Pieces
-from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
@@ -73,6 +73,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         shaft_angle(columns, period, machine)
     else:
         keep &= _by_voltage(columns, machine, window, period)
+    columns |= _without_zeros(columns, machine, window)
     sensors = _beside_waves(prepared(columns, period, machine.policy), columns, machine, window)
     if not encoder:
         # of the phase alone, which the noise of the voltages makes anew
@@ -104,9 +105,7 @@ def _beside_waves(
 
     Of few samples a turn the seventh wave of a back-EMF bends between them as noise does.
     """
-    theta = smoothed(columns["theta_mech_rad"], 2 * (window // 2) + 1)
-    orders = machine.pole_pairs * np.arange(machine.policy.cutting.voltage_orders + 2)
-    waves = np.gradient(theta)[:, None] * np.exp(1j * orders * theta[:, None])
+    waves = _waves(columns["theta_mech_rad"], machine, window)
     basis = np.column_stack([waves.real, waves.imag[:, 1:]])
     inverse = np.linalg.pinv(basis.T @ basis, hermitian=True)
     noise, steps = dict(sensors.noise), dict(sensors.steps)
@@ -117,6 +116,31 @@ def _beside_waves(
             step = coarse_step(columns[name], noise[name], machine.policy.sensor_noise)
             steps |= {name: step} if step else {}
     return replace(sensors, noise=noise, steps=steps)
+
+
+def _without_zeros(columns: Mapping[str, Array], machine: Machine, window: int) -> dict[str, Array]:
+    """The line voltages [n, V] without the zeros of their probes, as no winding has a mean voltage.
+    None within two electrical turns, where a constant is a part of a wave.
+    """
+    inside = slice(window, -window)
+    theta = columns["theta_mech_rad"][inside]
+    if theta.size < 2 or float(np.ptp(theta)) * machine.pole_pairs < 4.0 * math.pi:
+        return {}
+    waves = _waves(columns["theta_mech_rad"], machine, window)[inside, 1:]
+    basis = np.column_stack([np.ones(theta.size), waves.real, waves.imag])
+    basis /= np.linalg.norm(basis, axis=0)
+    lines = [name for name in LINES_V if name in columns]
+    recorded = np.column_stack([columns[name][inside] for name in lines])
+    zeros = np.linalg.lstsq(basis, recorded, rcond=None)[0][0] / math.sqrt(theta.size)
+    return {name: columns[name] - zero for name, zero in zip(lines, zeros, strict=True)}
+
+
+def _waves(theta_rad: Array, machine: Machine, window: int) -> Complex:
+    """Waves [n, orders] of the electrical angle, of a size that goes with the speed."""
+    theta = smoothed(theta_rad, 2 * (window // 2) + 1)
+    orders = machine.pole_pairs * np.arange(machine.policy.cutting.voltage_orders + 2)
+    waves: Complex = np.gradient(theta)[:, None] * np.exp(1j * orders * theta[:, None])
+    return waves
 
 
 def _by_voltage(

@@ -14,7 +14,7 @@ from pipeline.estimation.electrical.magnet_temperature import (
 )
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.electrical.ripple_torque import RIPPLE, winding_of
-from pipeline.estimation.mechanical.drag import drag_of
+from pipeline.estimation.mechanical.drag import drag_by_current, drag_of
 from pipeline.estimation.mechanical.drag_fit import DragFit, drag_description
 from pipeline.estimation.mechanical.drag_forms import DRAG_FORMS, DRAG_NAMES
 from pipeline.estimation.mechanical.drag_over_time import DragOverTime, drag_over_time
@@ -35,7 +35,13 @@ from pipeline.estimation.mechanical.shaft_nuisances import (
     SAMPLED,
 )
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
-from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
+from pipeline.estimation.mechanical.shaft_rows import (
+    COAST,
+    CURRENT_NOISE,
+    DRIVE,
+    ShaftRows,
+    shaft_rows,
+)
 from pipeline.estimation.mechanical.slow_turns import leading_order
 from pipeline.estimation.mechanical.torque_constant import UNKNOWN, USES, torque_constant
 from pipeline.estimation.method import Method
@@ -201,10 +207,7 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
     if short := too_short(rows):
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
     law = acceleration(rows, driving)
-    drag = drag_of(rows, law, nuisances, options["level"])
-    if OFFSET in drag.names:
-        # an error of the current, or a load: in coasts of one sense that would be friction
-        drag = drag_of(rows, law, [*nuisances, COAST_LOAD], options["level"])
+    drag = _drag(rows, law, nuisances, options["level"], torque.kt_nm_a)
     if not torque_is_separable(drag.design, drag.sigma):
         note = f"the drive's torque cannot be separated from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
@@ -222,6 +225,36 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
         words = _setups_reason(setups)
         estimates = tuple(replace(e, note=f"{words}; {e.note}") for e in estimates)
     return Fit(_of_a_known_sign(estimates), _evidence(rows, y, drag))
+
+
+def _drag(
+    rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float, kt_nm_a: float
+) -> DragFit:
+    """The equation of motion fitted to the rows, whichever of its sides the noise is in."""
+    noise_nm = kt_nm_a * rows.columns[CURRENT_NOISE]
+    by_current = drag_by_current(rows, law, nuisances, level, noise_nm)
+    if by_current is not None:
+        return by_current
+    drag = drag_of(rows, law, nuisances, level)
+    if not _has_torque_of_its_own(drag):
+        # several nuisances of a current of one size are its torque together
+        nuisances = [name for name in nuisances if not name.startswith(OF_CURRENT)]
+        drag = drag_of(rows, law, nuisances, level)
+    if OFFSET in drag.names:
+        # an error of the current, or a load: in coasts of one sense that would be friction
+        drag = drag_of(rows, law, [*nuisances, COAST_LOAD], level)
+    return drag
+
+
+def _has_torque_of_its_own(drag: DragFit) -> bool:
+    """Whether nuisances of the current leave the torque a part of what friction leaves of it."""
+    torque, others = drag.design[:, 0], np.array([False, *(True for _ in drag.names[1:])])
+    of_current = np.array([name.startswith(OF_CURRENT) for name in drag.names])
+    own, beside_friction = (
+        float(np.linalg.norm(linear_fit(drag.design[:, columns], torque).residuals))
+        for columns in (others, others & ~of_current)
+    )
+    return own > policy().drag.least_own_share * beside_friction
 
 
 def _over_time(
@@ -293,8 +326,8 @@ def _is_apart(rows: ShaftRows, driving_nm: Array, name: str) -> bool:
 
 def _share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
     """Share of the drives' acceleration, squared, that follows the torque in no way: what is left
-    over what no column of the current explains. Where the d current has one size, its square times
-    the q current is the torque.
+    over what no column of the current explains, less the current's noise where the fit has it.
+    Where the d current has one size, its square times the q current is the torque.
 
     A torque that is not logged is an error of the driving torque, and where a speed loop fights it
     the current goes with it: it makes g too small, and J too large, by this share
@@ -305,6 +338,8 @@ def _share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
     others = [k for k, name in enumerate(drag.names) if not name.startswith(OF_CURRENT)]
     without = linear_fit(drag.design[drives][:, others], drag.target[drives])
     costs = [float(np.sum(r**2)) for r in (drag.residuals[drives], without.residuals)]
+    if drag.by_current:
+        costs[0] = max(costs[0] - float(np.sum(drag.sigma[drives] ** 2)), 0.0)
     return min(costs[0] / costs[1], 1.0) if costs[1] > 0.0 else 1.0
 
 
@@ -370,7 +405,7 @@ def _estimates(
     gains |= {RIPPLE: 1.0} if np.any(rows.u_ripple_nm) else {}
     type_b = contributions(values, gains)
     per_kt, per_rel, per_alpha = _slopes(values, torque)
-    logged = _load_logged(rows)
+    logged = _load_logged(rows) or drag.by_current
     constants = doubts.middle(logged) * drag.constants(drag.coefficients)
     scatter = drag.scatter()
     paths = sorted(c.path for c in rows.captures)

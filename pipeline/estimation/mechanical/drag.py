@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.special import fdtrc
 
-from pipeline.estimation.mechanical.drag_fit import Design, DragFit
+from pipeline.estimation.mechanical.drag_fit import Design, DragFit, over_inertia, torque_fit
 from pipeline.estimation.mechanical.drag_forms import (
     CURVE,
     DRAG_NAMES,
@@ -17,7 +18,7 @@ from pipeline.estimation.mechanical.drag_forms import (
     low_end,
 )
 from pipeline.estimation.mechanical.drive_windows import coasts_decide, drive_columns, freedom
-from pipeline.estimation.mechanical.shaft_nuisances import TIMING
+from pipeline.estimation.mechanical.shaft_nuisances import OF_CURRENT, TIMING
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.estimation.policy import policy
 from pipeline.numerics.clusters import cluster_covariance
@@ -74,6 +75,62 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
     return DragFit(
         design.names, fit.coefficients, covariance, fit.residuals, dof, free, u_form, reasons,
         design.columns, sigma, y, rows.fastest_rad_s,
+    )  # fmt: skip
+
+
+def drag_by_current(
+    rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float, noise_nm: Array
+) -> DragFit | None:
+    """Fits the rows with all noise in the torque, if that leaves the noise of the current alone.
+
+    Parameters
+    ----------
+    rows
+        Windows of drives.
+    law, nuisances, level
+        As `drag_of` takes them; nuisances that are made of the current have its noise too, and are
+        left out.
+    noise_nm
+        Standard deviation [w, N·m] that the noise of the current makes in the torque of a row.
+
+    Returns
+    -------
+    DragFit or None
+        None where coasts are among the rows, or something else than noise is left.
+
+    Notes
+    -----
+    Where a shaft is accelerated gently its torque is friction most of all. Noise of the current is
+    then much of what accelerates, and makes 1/J too small by its share of the square.
+
+    References
+    ----------
+    Fuller, Measurement Error Models, Wiley, 1987, section 1.1. doi:10.1002/9780470316665
+
+    """
+    others = [name for name in nuisances if not name.startswith(OF_CURRENT)]
+    names = [name for name in others if float(np.ptp(rows.columns[name])) > 0.0]
+    if np.any(rows.kind == COAST) or rows.disjoint(DRIVE) < len(names) + law.shape[1]:
+        return None
+    y, torque = rows.acceleration_rad_s2, law[:, 0]
+    candidates = {name: rows.columns[name] for name in names}
+    base = np.column_stack([y, -law[:, 1:]])
+    sigma = np.full(y.size, math.sqrt(float(np.mean(noise_nm**2))))
+    chosen = needed_columns(base, candidates, torque, sigma, level, _most_nuisances(rows), 1.0)
+    design = Design.of(
+        [law], ("torque", "coulomb", "viscous"), {n: -c for n, c in candidates.items()}, chosen
+    )
+    fit = torque_fit(design.columns, y, sigma)
+    inertia = float(fit.coefficients[0])
+    if inertia <= 0.0 or not sigma[0] or fit.chi2_dof > policy().drag.noise_alone:
+        return None
+    covariance, dof = _covariance(rows, np.column_stack([y, -design.columns[:, 1:]]), fit, sigma)
+    slope = np.eye(fit.coefficients.size) / inertia
+    slope[:, 0] = -over_inertia(fit.coefficients) / inertia
+    return DragFit(
+        design.names, over_inertia(fit.coefficients), slope @ covariance @ slope.T,
+        -fit.residuals / inertia, dof, False, np.zeros(3), ("", "", ""), design.columns,
+        sigma / inertia, y, rows.fastest_rad_s, by_current=True,
     )  # fmt: skip
 
 

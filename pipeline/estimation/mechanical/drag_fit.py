@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.estimation.mechanical.drag_forms import CURVE, DRAG_NAMES, KNOTS, low_end
 from pipeline.estimation.mechanical.shaft_rows import ShaftRows
 from pipeline.estimation.uncertainty.nuisances import allowed_for
-from pipeline.numerics.least_squares import Array, linear_fit
+from pipeline.numerics.least_squares import Array, LinearFit, linear_fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +80,8 @@ class DragFit:
         Columns [w, k], standard deviations [w] and accelerations [w] of the fit.
     fastest_rad_s
         Highest speed of the rows.
+    by_current
+        Whether the noise is in the torque, and the rows were fitted the other way round.
 
     """
 
@@ -95,6 +97,7 @@ class DragFit:
     sigma: Array
     target: Array
     fastest_rad_s: float
+    by_current: bool = False
 
     def refit(self, driving_nm: Array) -> Array:
         """The coefficients with another driving torque in the same columns.
@@ -112,6 +115,8 @@ class DragFit:
         """
         design = self.design.copy()
         design[:, 0] = driving_nm
+        if self.by_current:
+            return over_inertia(torque_fit(design, self.target, self.sigma).coefficients)
         return linear_fit(design, self.target, self.sigma).coefficients
 
     def constants(self, coefficients: Array) -> Array:
@@ -180,6 +185,43 @@ class DragFit:
         speed = rows.speed_rad_s[keep][order]
         drag = (-(modelled + self.residuals) * inertia)[keep][order]
         return speed, drag, level * np.sign(speed) + slope * speed
+
+
+def torque_fit(design: Array, target: Array, sigma: Array) -> LinearFit:
+    """The equation of motion with all noise in the torque: T = J A + Σ J c_m x_m.
+
+    Parameters
+    ----------
+    design
+        Columns of A = g T + Σ c_m x_m [w, k], the torque first.
+    target
+        Accelerations A [w, rad/s²].
+    sigma
+        Standard deviation of each row [w], of any unit.
+
+    Returns
+    -------
+    LinearFit
+        Coefficients J and J c_m [k], residuals in torque [w, N·m].
+
+    References
+    ----------
+    Fuller, Measurement Error Models, Wiley, 1987, section 1.1. doi:10.1002/9780470316665
+
+    """
+    return linear_fit(np.column_stack([target, -design[:, 1:]]), design[:, 0], sigma)
+
+
+def over_inertia(coefficients: Array) -> Array:
+    """Coefficients g and c_m [k] from J and J c_m [k].
+
+    Parameters
+    ----------
+    coefficients
+        Of `torque_fit`.
+
+    """
+    return np.array([1.0, *coefficients[1:]]) / coefficients[0]
 
 
 def drag_description(fit: DragFit) -> str:

@@ -71,6 +71,10 @@ class Drag:
         by=TRIED,
         on="ten simulated campaigns: half or twice of it moved no constant by a twentieth of its u",
     )  # fmt: skip
+    noise_alone: float = chosen(
+        2.0, "1", "χ²/n of a torque by the current's noise, at the most, where all noise is in it",
+        why="there another error is as large as the noise",
+    )  # fmt: skip
     least_own_share: float = chosen(
         0.05, "1", "part of a nuisance of the current that the torque does not hold, to count",
         why="as of the voltages' nuisances: what parts it is also what any other error follows",
