@@ -120,9 +120,7 @@ def test_the_linear_form_is_the_spring_and_its_damper_and_gives_them_back(late_s
     assert both[1][inside] == pytest.approx(both[0][inside], rel=1e-6, abs=1e-9)
     assert np.abs(both[0][inside]).max() > 0.01
     found = spring_of(linear, {"j_kgm2": j}, x.machine)
-    assert found == pytest.approx(
-        {**spring, "far_friction": 0.0, "between": -1.0}
-    )
+    assert found == pytest.approx({**spring, "far_friction": 0.0, "between": -1.0})
 
 
 @pytest.mark.parametrize(("soft", "bent"), [(-1e-6, 1e-6), (1e-6, -1e-6), (1e-6, 1.0)])
