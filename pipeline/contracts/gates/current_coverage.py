@@ -87,8 +87,10 @@ def _torque_map(capture: Capture, options: Mapping[str, float]) -> Passed:
         return Passed()
     raise CaptureError(
         CODE,
-        "iq_a stays at one level: torque against current has no slope",
-        "record steps of q current at held speed, of both signs",
+        "iq_a holds no two levels that differ beyond its scatter from row to row: torque against "
+        "current has no slope",
+        "record steps of q current at held speed, of both signs; if every row is a settled point "
+        "of its own, state test: torque_table",
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -250,23 +251,31 @@ def _coasts(capture: Capture) -> list[Coast]:
     data = capture.arrays("t_s", column)
     finite = np.isfinite(data["t_s"]) & np.isfinite(data[column])
     t, y = data["t_s"][finite], data[column][finite]
-    if t.size < 3 * LEAST_SAMPLES:
+    if t.size < LEAST_SAMPLES:
         return []
-    angle = y if of_angle else trapezoid(t, y)
+    angle, limits = y if of_angle else trapezoid(t, y), policy().coast_down
     try:
-        speed = smooth_speed(t, angle, max(0.01, 20.0 * float(np.median(np.diff(t)))))
+        rows = min(max(t.size / limits.smoothed_part, limits.least_smoothed), limits.most_smoothed)
+        speed = smooth_speed(t, angle, max(0.01, rows * float(np.median(np.diff(t)))))
     except ValueError:
         return []
     return [
         _coast(capture.path, t[rows], y[rows], sense, sense * speed[rows], of_angle)
         for rows, sense in coasting_rows(speed)
-        if rows.stop - rows.start >= 3 * LEAST_SAMPLES
+        if rows.stop - rows.start >= LEAST_SAMPLES
     ]
+
+
+def _step(signal: Array) -> float:
+    """Step of a signal [n] of which most samples repeat others; 0 where they do not."""
+    scale = float(np.ptp(signal)) or 1.0
+    values = scale * np.unique(np.round(signal / scale, 9))
+    return float(np.median(np.diff(values))) if 1 < values.size < signal.size / 2 else 0.0
 
 
 def _coast(path: str, t: Array, y: Array, sense: int, speed: Array, of_angle: bool) -> Coast:
     block = -(-t.size // policy().coast_down.most_samples)
-    sigma = white_noise_sigma(y) / np.sqrt(block)
+    sigma = max(white_noise_sigma(y), _step(y) / math.sqrt(12.0)) / math.sqrt(block)
     start = float(t[0])
     t, y = block_means(t - start, block), block_means(y, block)
     travelled = (y - y[0]) * sense if of_angle else y * sense

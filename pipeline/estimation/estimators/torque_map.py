@@ -122,7 +122,8 @@ def _too_few(table: PointTable, points: Sequence[Point]) -> str:
     if 2 * table.settled_rows < table.rows:
         return (
             f"{len(table.points)} levels of current hold still for {policy().evidence.rows} rows "
-            "once settled: hold each level for longer, or log at a higher rate"
+            "once settled: hold each level for longer, or log at a higher rate; if every row is a "
+            "settled point or a mean of one, state test: torque_table"
         )
     groups = len({p.group for p in points})
     return f"{len(points)} settled points at {groups} speeds; {EXPERIMENT}"

@@ -147,6 +147,17 @@ class CoastDown:
     most_samples: int = chosen(
         4000, "1", "block means that a coast is thinned to", why="the time of the fit goes with it"
     )
+    most_smoothed: float = chosen(
+        20.0, "rows", "rows that a coast's speed is smoothed over, at the most",
+        why="enough for an encoder's rounding",
+    )  # fmt: skip
+    least_smoothed: float = chosen(
+        4.0, "rows", "rows that it is smoothed over, at the least", why="fewer show rounding"
+    )
+    smoothed_part: float = derived(
+        12.0, "1", "of its rows, a part of which it is smoothed over",
+        source="the smoothed ends of a coast are flat, and go with what was held: a sixth of it",
+    )  # fmt: skip
     unexplained: float = chosen(
         3.0, "1", "residual over the encoder's noise, above which drag's form is open",
         why="the halves of the coasts then say how far",
