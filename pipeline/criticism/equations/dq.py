@@ -95,9 +95,11 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if held and torque:
         # a noisy speed that is differenced, times J, would be a torque
         noise_rad = speed.noise_rad_s * period if speed is not None else 0.0
-        still = held_speed(columns["theta_mech_rad"], noise_rad, window, policy)
+        rows = min(window, max(round(policy.held_s / period), policy.held_rows))
+        still = held_speed(columns["theta_mech_rad"], noise_rad, rows, policy)
         torque = bool(2 * np.count_nonzero(still) > size)
         keep = keep & still if torque else keep
+        window = window_between_gaps(period, keep, policy)
         sensors = replace(sensors, held_speed=torque)
     channels: tuple[str, ...] = ("vd_v", "vq_v")
     if torque and turned > policy.turning_rad:

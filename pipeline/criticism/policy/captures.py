@@ -75,6 +75,13 @@ class Cutting:
         5, "samples", "samples of the shortest parabola",
         source="the shortest that leaves less noise than there is",
     )  # fmt: skip
+    held_s: float = chosen(
+        1.0, "s", "time in which a speed that is held scatters no more than its noise, at the most",
+        why="a level of a map is held for some seconds",
+    )  # fmt: skip
+    held_rows: int = chosen(
+        8, "rows", "rows of that time, at the least", why="a mean of fewer shows no change"
+    )
     change_u: float = chosen(
         8.0, "standard deviations of noise",
         "change of a terminal's voltage or current from which on it is a step",

@@ -44,6 +44,12 @@ from pipeline.estimation.mechanical.shaft_rows import (
 )
 from pipeline.estimation.mechanical.slow_turns import leading_order
 from pipeline.estimation.mechanical.torque_constant import UNKNOWN, USES, torque_constant
+from pipeline.estimation.mechanical.torque_share import (
+    has_torque_of_its_own,
+    is_apart,
+    share_of_no_torque,
+    words_of_no_torque,
+)
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -57,7 +63,6 @@ from pipeline.estimation.uncertainty.instruments import (
 )
 from pipeline.numerics.coast_setups import Setup, setup_words
 from pipeline.numerics.identifiability import within
-from pipeline.numerics.least_squares import linear_fit
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
@@ -203,7 +208,7 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
     y, driving = rows.acceleration_rad_s2, driving_torque(rows, torque, {})
     if float(np.ptp(driving)) == 0.0:
         return METHOD.nothing(GIVES, f"the drive log holds no torque; {EXPERIMENT}")
-    nuisances = [name for name in nuisances if _is_apart(rows, driving, name)]
+    nuisances = [name for name in nuisances if is_apart(rows, driving, name)]
     if short := too_short(rows):
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
     law = acceleration(rows, driving)
@@ -211,15 +216,15 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
     if not torque_is_separable(drag.design, drag.sigma):
         note = f"the drive's torque cannot be separated from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
-    strange = _share_of_no_torque(rows, drag)
+    strange = share_of_no_torque(rows, drag)
     if strange > policy().drag.loaded_share and not _load_logged(rows):
-        return METHOD.nothing(GIVES, f"{_of_no_torque(strange)}; {LOAD}")
+        return METHOD.nothing(GIVES, f"{words_of_no_torque(strange)}; {LOAD}")
     regimes = drag_disagreements(rows, drag, options["level"])
     doubts = Doubts(strange, regimes, _over_time(rows, driving, drag, options["level"]))
     sampled = () if coasts_decide(rows) else sampling_drag(rows.captures, torque.kt_nm_a, known)
     estimates = _estimates(rows, torque, drag, doubts, _left_out(rows, campaign), sampled)
     if strange > policy().drag.unexplained_share and not _load_logged(rows):
-        drags = METHOD.nothing(GIVES[1:], f"{_of_no_torque(strange)}; {LOAD}").estimates
+        drags = METHOD.nothing(GIVES[1:], f"{words_of_no_torque(strange)}; {LOAD}").estimates
         estimates = (estimates[0], *drags)
     if len(setups) > 1:
         words = _setups_reason(setups)
@@ -236,7 +241,7 @@ def _drag(
     if by_current is not None:
         return by_current
     drag = drag_of(rows, law, nuisances, level)
-    if not _has_torque_of_its_own(drag):
+    if not has_torque_of_its_own(drag):
         # several nuisances of a current of one size are its torque together
         nuisances = [name for name in nuisances if not name.startswith(OF_CURRENT)]
         drag = drag_of(rows, law, nuisances, level)
@@ -244,17 +249,6 @@ def _drag(
         # an error of the current, or a load: in coasts of one sense that would be friction
         drag = drag_of(rows, law, [*nuisances, COAST_LOAD], level)
     return drag
-
-
-def _has_torque_of_its_own(drag: DragFit) -> bool:
-    """Whether nuisances of the current leave the torque a part of what friction leaves of it."""
-    torque, others = drag.design[:, 0], np.array([False, *(True for _ in drag.names[1:])])
-    of_current = np.array([name.startswith(OF_CURRENT) for name in drag.names])
-    own, beside_friction = (
-        float(np.linalg.norm(linear_fit(drag.design[:, columns], torque).residuals))
-        for columns in (others, others & ~of_current)
-    )
-    return own > policy().drag.least_own_share * beside_friction
 
 
 def _over_time(
@@ -310,44 +304,6 @@ def _loadless(capture: Capture) -> bool:
 
 def _load_logged(rows: ShaftRows) -> bool:
     return not any(_loadless(capture) for capture in rows.captures)
-
-
-def _is_apart(rows: ShaftRows, driving_nm: Array, name: str) -> bool:
-    """Whether a nuisance of the current is another column than the torque. Where the d current has
-    one size, its square times the q current is not: it would take the torque's place, and J with
-    it.
-    """
-    if not name.startswith(OF_CURRENT) or name not in rows.columns:
-        return True
-    column = rows.columns[name]
-    own = linear_fit(driving_nm[:, None], column).residuals
-    return bool(np.linalg.norm(own) > policy().drag.least_own_share * np.linalg.norm(column))
-
-
-def _share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
-    """Share of the drives' acceleration, squared, that follows the torque in no way: what is left
-    over what no column of the current explains, less the current's noise where the fit has it.
-    Where the d current has one size, its square times the q current is the torque.
-
-    A torque that is not logged is an error of the driving torque, and where a speed loop fights it
-    the current goes with it: it makes g too small, and J too large, by this share
-    (`Doubts.middle`).
-    Reference: Fuller, Measurement Error Models, 1987, 1.1 (attenuation).
-    """
-    drives = rows.kind == DRIVE
-    others = [k for k, name in enumerate(drag.names) if not name.startswith(OF_CURRENT)]
-    without = linear_fit(drag.design[drives][:, others], drag.target[drives])
-    costs = [float(np.sum(r**2)) for r in (drag.residuals[drives], without.residuals)]
-    if drag.by_current:
-        costs[0] = max(costs[0] - float(np.sum(drag.sigma[drives] ** 2)), 0.0)
-    return min(costs[0] / costs[1], 1.0) if costs[1] > 0.0 else 1.0
-
-
-def _of_no_torque(share: float) -> str:
-    return (
-        f"no drive logs its load, and {100.0 * share:.2g} % of the square of the acceleration "
-        "does not follow the current, as with a load"
-    )
 
 
 def _left_out(rows: ShaftRows, campaign: Campaign) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from pipeline.numerics.least_squares import (
     gauss_newton,
 )
 from pipeline.numerics.plateaus import block_means, white_noise_sigma
+from pipeline.numerics.quantisation import resolution
 from pipeline.numerics.selection import needed_columns
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed
 from pipeline.physics.glossary import Term
@@ -266,16 +267,9 @@ def _coasts(capture: Capture) -> list[Coast]:
     ]
 
 
-def _step(signal: Array) -> float:
-    """Step of a signal [n] of which most samples repeat others; 0 where they do not."""
-    scale = float(np.ptp(signal)) or 1.0
-    values = scale * np.unique(np.round(signal / scale, 9))
-    return float(np.median(np.diff(values))) if 1 < values.size < signal.size / 2 else 0.0
-
-
 def _coast(path: str, t: Array, y: Array, sense: int, speed: Array, of_angle: bool) -> Coast:
     block = -(-t.size // policy().coast_down.most_samples)
-    sigma = max(white_noise_sigma(y), _step(y) / math.sqrt(12.0)) / math.sqrt(block)
+    sigma = max(white_noise_sigma(y), resolution(y) / math.sqrt(12.0)) / math.sqrt(block)
     start = float(t[0])
     t, y = block_means(t - start, block), block_means(y, block)
     travelled = (y - y[0]) * sense if of_angle else y * sense

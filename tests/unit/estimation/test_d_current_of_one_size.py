@@ -7,9 +7,9 @@ import pytest
 
 from pipeline.estimation.estimators.drive_voltage import ESTIMATOR as VOLTAGE
 from pipeline.estimation.estimators.inertia import ESTIMATOR as INERTIA
-from pipeline.estimation.estimators.inertia import _is_apart
 from pipeline.estimation.mechanical.drag_forms import DRAG_FORMS
 from pipeline.estimation.mechanical.shaft_rows import shaft_rows
+from pipeline.estimation.mechanical.torque_share import is_apart
 from pipeline.records.capture import Capture
 from pipeline.records.constants import Constants
 from tests.unit.estimation.signals import capture, estimates, known_value
@@ -74,7 +74,7 @@ def test_a_nuisance_that_is_the_torque_does_not_take_its_place(name: str, counts
     """With it 92 % of the acceleration "did not follow the current", or J was a quarter."""
     rows = shaft_rows((drive(),), DRAG_FORMS)
     assert rows is not None
-    assert _is_apart(rows, KT_NM_A * rows.q_current_a, name) == counts
+    assert is_apart(rows, KT_NM_A * rows.q_current_a, name) == counts
 
 
 def test_inertia_and_friction_beside_such_a_current() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.estimation.estimators import inertia
+from pipeline.estimation.mechanical.torque_share import has_torque_of_its_own
 from pipeline.records.constants import Constants
 from tests.unit.estimation.signals import capture, estimates, known_value
 
@@ -71,4 +72,4 @@ def test_nuisances_of_a_current_of_one_size_leave_its_torque_a_part(beside: str,
     column = current**3 if beside.startswith("q") else rng.normal(0.0, 1.0, 400)
     design = np.column_stack([KT * current, -np.sign(speed), -speed, column])
     drag = SimpleNamespace(design=design, names=("torque", "coulomb", "viscous", beside))
-    assert inertia._has_torque_of_its_own(drag) == own
+    assert has_torque_of_its_own(drag) == own

@@ -114,3 +114,17 @@ def test_each_sense_may_have_a_drag_of_its_own(apart: float) -> None:
         assert found[name].number == pytest.approx(value, rel=1e-3)
         assert found[name].u < 1e-2 * value
         assert ("no one drag" in found[name].note) is (apart > 0.0)
+
+
+def test_a_coast_of_a_rounded_speed_has_the_law_that_it_has() -> None:
+    """Thirty rows of whole revolutions a minute gave nothing, and longer ones 'another form'."""
+    step = 2.0 * np.pi / 60.0
+    t = np.arange(0.0, 12.0, 0.4)
+    speed = (40.0 + 50.0) * np.exp(-t / 20.0) - 50.0
+    row = capture("spin_down", t_s=t, omega_mech_rad_s=step * np.rint(speed / step))
+    found = estimates(ESTIMATOR, row)
+    for name, true in (("coast_coulomb_rad_s2", 2.5), ("coast_viscous_1_s", 0.05)):
+        assert found[name].known, found[name].note
+        assert abs(found[name].number - true) < 3.0 * found[name].u
+        assert found[name].u < 0.1 * true
+    assert "another form" not in found["coast_coulomb_rad_s2"].note

@@ -12,7 +12,6 @@ from pipeline.estimation.estimators import drive_voltage, inertia, torque_map
 from pipeline.estimation.estimators.inertia import (
     Torque,
     _orders,
-    _share_of_no_torque,
     _slopes,
     _torque,
     driving_torque,
@@ -20,6 +19,7 @@ from pipeline.estimation.estimators.inertia import (
 from pipeline.estimation.mechanical.drag_fit import DragFit
 from pipeline.estimation.mechanical.locked_rotor import angle_doubt, ripple_share, standstill_words
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
+from pipeline.estimation.mechanical.torque_share import share_of_no_torque
 from pipeline.estimation.uncertainty.agreement import judges, reconciled
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.records.capture import Campaign
@@ -177,7 +177,7 @@ def test_the_share_of_the_acceleration_that_follows_no_torque() -> None:
                    blank, ("", "", ""), design, np.ones(60), y, 1.0)  # fmt: skip
     left = y[:40] - y[:40].mean()
     expected = float(fit.residuals[:40] @ fit.residuals[:40]) / float(left @ left)
-    assert _share_of_no_torque(rows, made) == pytest.approx(expected)
+    assert share_of_no_torque(rows, made) == pytest.approx(expected)
 
 
 # A rotor that is held
