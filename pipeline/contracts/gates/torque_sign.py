@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -12,14 +13,16 @@ from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
 BLOCKS = 100
+LEAST_ROWS, MOST = 4, 0.95
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Refuses a torque map or a drive log whose shaft torque falls as i_q grows.
+    """Refuses a torque map, a torque table or a drive log whose shaft torque falls as i_q grows.
 
     Notes
     -----
-    The correlation of `BLOCKS` block means below −`correlation` [1] refuses. In a map the
+    The correlation of `BLOCKS` block means below −`correlation` [1] refuses; of n < `BLOCKS` rows
+    one as many standard deviations 1/√n below zero, and −0.95 of a few. In a map the
     dynamometer holds the speed, and the torque is the current's alone. In a drive log inertia and
     friction take their share, and a shaft that carries nothing shows the transducer's drift: there
     a curve of second order in time is taken off, and the torque must also fall by `least_share` [1]
@@ -32,10 +35,11 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
         return Passed()
     rows = np.column_stack(list(capture.arrays(*names).values()))
     rows = rows[np.isfinite(rows).all(axis=1)]
-    size = rows.shape[0] // BLOCKS
-    if size == 0:
+    blocks = min(BLOCKS, rows.shape[0])
+    if blocks < LEAST_ROWS:
         return Passed()
-    means = rows[: size * BLOCKS, :2].reshape(BLOCKS, size, 2).mean(axis=1)
+    size = rows.shape[0] // blocks
+    means = rows[: size * blocks, :2].reshape(blocks, size, 2).mean(axis=1)
     least = 0.0
     if drive:
         means = _without_drift(means)
@@ -44,7 +48,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
         return Passed()
     correlation = float(np.corrcoef(means.T)[0, 1])
     slope = correlation * float(means[:, 1].std() / means[:, 0].std())
-    if correlation < -options["correlation"] and slope < -least:
+    limit = min(options["correlation"] * math.sqrt(BLOCKS / blocks), MOST)
+    if correlation < -limit and slope < -least:
         raise CaptureError(
             "torque_sign",
             f"torque_shaft_nm falls as iq_a grows (correlation {correlation:.2f})",
@@ -69,7 +74,7 @@ def _promised_nm_a(vq_v: Array, omega_rad_s: Array) -> float:
 
 GATE = Gate(
     "torque_sign",
-    ("torque_map", "drive"),
+    ("torque_map", "torque_table", "drive"),
     check,
     {
         # A healthy map correlates near +1; -0.5 over 100 blocks is five standard deviations from 0.

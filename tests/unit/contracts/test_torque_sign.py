@@ -53,8 +53,16 @@ def test_a_parabola_in_time_is_taken_off() -> None:
     assert torque_sign._promised_nm_a(np.full(5, -2.0), np.full(5, 30.0)) == pytest.approx(0.1)
 
 
-def test_fewer_rows_than_blocks_say_nothing_of_the_torque() -> None:
-    for rows, expected in ((99, ""), (100, "refused")):
-        x = np.cos(np.arange(rows) * 0.7)
-        made = capture("torque_map", iq_a=x, torque_shaft_nm=-x)
-        assert said("torque_sign", made) == expected
+@pytest.mark.parametrize("test", ["torque_map", "torque_table"])
+@pytest.mark.parametrize(
+    ("rows", "correlation", "expected"),
+    [(3, -1.0, ""), (4, -1.0, "refused"), (50, -0.69, ""), (50, -0.72, "refused"),
+     (20, -0.94, ""), (20, -0.96, "refused")],
+)  # fmt: skip
+def test_fewer_rows_than_blocks_fall_more_surely(
+    test: str, rows: int, correlation: float, expected: str
+) -> None:
+    """A table of the wrong sign was no finding, and missed its floor by hundreds."""
+    x, other = np.linalg.qr(np.vander(np.arange(rows) ** 1.1, 3)[:, ::-1])[0][:, 1:].T
+    y = correlation * x + math.sqrt(1.0 - correlation**2) * other
+    assert said("torque_sign", capture(test, iq_a=x, torque_shaft_nm=y)) == expected
