@@ -14,6 +14,7 @@ from pipeline.records.errors import CaptureError
 
 BLOCKS = 100
 LEAST_ROWS, MOST = 4, 0.95
+_PROMISING = ("vq_v", "omega_mech_rad_s")
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
@@ -26,11 +27,13 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     dynamometer holds the speed, and the torque is the current's alone. In a drive log inertia and
     friction take their share, and a shaft that carries nothing shows the transducer's drift: there
     a curve of second order in time is taken off, and the torque must also fall by `least_share` [1]
-    of the torque per ampere that follows from the voltage at speed, Kt = 1.5 v_q/ω.
+    of the torque per ampere that follows from the voltage at speed, Kt = 1.5 v_q/ω. Without a
+    voltage nothing but a correlation below −0.95 refuses a drive log.
 
     """
     drive = capture.meta.test == "drive"
-    names = ("iq_a", "torque_shaft_nm", *(("vq_v", "omega_mech_rad_s") if drive else ()))
+    promised = drive and capture.has(*_PROMISING)
+    names = ("iq_a", "torque_shaft_nm", *(_PROMISING if promised else ()))
     if not capture.has(*names):
         return Passed()
     rows = np.column_stack(list(capture.arrays(*names).values()))
@@ -43,12 +46,14 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     least = 0.0
     if drive:
         means = _without_drift(means)
+    if promised:
         least = options["least_share"] * _promised_nm_a(rows[:, 2], rows[:, 3])
     if not means.std(axis=0).all():
         return Passed()
     correlation = float(np.corrcoef(means.T)[0, 1])
     slope = correlation * float(means[:, 1].std() / means[:, 0].std())
     limit = min(options["correlation"] * math.sqrt(BLOCKS / blocks), MOST)
+    limit = MOST if drive and not promised else limit
     if correlation < -limit and slope < -least:
         raise CaptureError(
             "torque_sign",

@@ -39,6 +39,17 @@ def test_a_drive_falls_by_a_fifth_of_what_its_voltage_promises(share: float, exp
     assert said("torque_sign", made) == expected
 
 
+@pytest.mark.parametrize(("correlation", "expected"), [(-0.94, ""), (-0.96, "refused")])
+def test_a_drive_without_a_voltage_falls_with_next_to_no_doubt(
+    correlation: float, expected: str
+) -> None:
+    k = np.arange(100)
+    x, other = np.cos(TURN * 7 * k / 100.0), np.cos(TURN * 11 * k / 100.0)
+    y = correlation * x + math.sqrt(1.0 - correlation**2) * other
+    made = blocks(x, y, theta_mech_rad=k / 10.0)
+    assert said("torque_sign", made) == expected
+
+
 def test_a_parabola_in_time_is_taken_off() -> None:
     t = np.linspace(-1.0, 1.0, 50)
     wave = np.sin(40.0 * t)
