@@ -87,7 +87,7 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
             return None
     target = weak.integral(theta, order=2)[complete]
     noise = log.sensors.noise["theta_mech_rad"] * weak.noise_gain(2)
-    spring, mounting = _spring(log, weak), _mounting(theta, omega, weak)
+    spring, mounting = _spring(log, weak, omega), _mounting(theta, omega, weak)
     shares: list[float] = []
     for extra in ([], mounting):
         if extra and len(chosen) + len(extra) > most_columns:
@@ -147,10 +147,12 @@ def _regressed(columns: Array, target: Array, policy: Cutting) -> tuple[Array, A
     return coefficients / size, target - scaled @ coefficients, int(rank)
 
 
-def _spring(log: DriveLog, weak: WeakRows) -> list[Array]:
-    """Window means [w] of what a spring between two masses adds: d²i_q/dt² and d⁴θ/dt⁴."""
+def _spring(log: DriveLog, weak: WeakRows, omega: Array) -> list[Array]:
+    """Window means [w] of what a spring between two masses adds: the second derivatives of dry
+    friction, of i_q and of d²θ/dt².
+    """
     bend = np.pad(np.diff(log.columns["theta_mech_rad"], 2), 1) / log.period_s**2
-    return [weak.integral(log.columns["iq_a"], order=2), weak.integral(bend, order=2)]
+    return [weak.integral(one, order=2) for one in (np.sign(omega), log.columns["iq_a"], bend)]
 
 
 def _two_masses(of_current: float, of_bend: float, of_fourth: float, policy: Cutting) -> bool:

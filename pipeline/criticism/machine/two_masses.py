@@ -353,10 +353,13 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
 
 def _excluded(law: Law, log: FullLog, part: float, q: Values) -> bool:
     """Whether a law, `part` of the twist in it, shows less of the fit's twist and gap than a share,
-    and nothing of what the fit has not.
+    and nothing of what the fit has not. One with a gap or softness below zero is of something else.
     """
     machine = log.x.machine
     policy = machine.policy.torsion
+    pairs = ((law.softness, law.u_softness), (law.gap_rad, law.u_gap_rad))
+    if any(value < -policy.sure_u * u for value, u in pairs):
+        return False
     softness = part * q.get("twist_rad", 0.0) / machine.scales["torque_nm"]
     gap = part * q.get("gap_rad", 0.0)
     return all(

@@ -14,7 +14,7 @@ from pipeline.criticism.effect import Discrimination, FullLog
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.machine.torsion import Law, Shaft, law_of_twist
-from pipeline.criticism.machine.two_masses import discriminator, side_of
+from pipeline.criticism.machine.two_masses import _excluded, discriminator, side_of
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.selection.discrimination import settled
@@ -226,3 +226,14 @@ def test_a_gap_is_crossed_slowly_at_first():
     wanted = [1.0, 1.0, 1 - 2 / 16, 1 - 8 / 16, 1 - 18 / 16, -1.0, -1.0, -1.0, -1.0]
     assert side_of(torque, 0.1) == pytest.approx(wanted)
     assert side_of(np.zeros(5), 0.1) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(("gap", "excluded"), [(0.0, True), (-4e-3, False)])
+def test_a_law_with_a_gap_below_zero_excludes_no_twist(gap: float, excluded: bool) -> None:
+    """It is of another shaft: a coupling of 12 Hz was found, and then not believed."""
+    x = replace(operating(4), base={**BASE})
+    log = FullLog(x, np.zeros(4), np.zeros(4), np.ones(4, dtype=bool), 1e-4, 0.0, 1e-3)
+    law = Law(0.004, 0.002, gap, 1e-5, 0.2, 31, 1.0 / BASE["j_kgm2"], 1.0)
+    torque = x.machine.scales["torque_nm"]
+    fit = {"share": 0.7, "twist_rad": 2.0 * torque, "damping_s": 0.0, "between": 0.0}
+    assert _excluded(law, log, 0.7, fit) is excluded
