@@ -181,9 +181,7 @@ def _inverter(capture: Capture, estimate: Estimate) -> float:
 
 def _fastest_rad_s(capture: Capture) -> float:
     """The speed that the angle reaches, over pieces of a hundredth of the capture [rad/s]."""
-    columns = capture.arrays("t_s", "theta_mech_rad")
-    finite = np.isfinite(columns["theta_mech_rad"])
-    t_s, angle = columns["t_s"][finite], columns["theta_mech_rad"][finite]
+    t_s, angle = capture.finite("t_s", "theta_mech_rad", needed=("theta_mech_rad",)).values()
     step = max(1, t_s.size // 100)
     speed = np.abs(np.diff(angle[::step]) / np.diff(t_s[::step]))
     return float(np.percentile(speed, 95.0)) if speed.size else 0.0

@@ -74,8 +74,7 @@ def _cycles(capture: Capture) -> float:
     names = [n for group in TERMINAL_VOLTAGES.alternatives if len(group) == 1 for n in group]
     most = 0.0
     for name in (n for n in names if capture.has(n)):
-        voltage = capture.arrays(name)[name]
-        voltage = voltage[np.isfinite(voltage)]
+        voltage = capture.finite(name)[name]
         clear = voltage[np.abs(voltage) > 0.3 * np.percentile(np.abs(voltage), 95.0)]
         changes = int(np.count_nonzero(np.diff(np.sign(clear))))
         most = max(most, 0.5 * (changes - 1))
@@ -92,8 +91,8 @@ def _hand_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _locked_angles(capture: Capture, options: Mapping[str, float]) -> Passed:
-    angles = capture.arrays("theta_elec_deg")["theta_elec_deg"]
-    folded = np.unique(np.mod(np.round(angles[np.isfinite(angles)], 3), 180.0))
+    angles = capture.finite("theta_elec_deg")["theta_elec_deg"]
+    folded = np.unique(np.mod(np.round(angles, 3), 180.0))
     if folded.size >= options["rotor_angles"] or capture.has("lab_h", "lbc_h", "lca_h"):
         return Passed()
     remedy = "record at least three rotor angles spread over 180° electrical, or all three pairs"

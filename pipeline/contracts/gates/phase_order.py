@@ -86,9 +86,7 @@ def _common_share(capture: Capture) -> float:
     """Mean of the three line currents over one of them (rms); 0 where not all three are there."""
     if not capture.has(*LINE_CURRENTS):
         return 0.0
-    columns = capture.arrays(*LINE_CURRENTS)
-    currents = np.column_stack([columns[name] for name in LINE_CURRENTS])
-    currents = currents[np.isfinite(currents).all(axis=1)]
+    currents = np.column_stack(list(capture.finite(*LINE_CURRENTS).values()))
     size = float(np.sqrt(np.mean(currents**2))) if currents.size else 0.0
     if size == 0.0:
         return 0.0
@@ -133,9 +131,7 @@ def back_emf_slope(capture: Capture) -> tuple[float, float]:
 
 
 def _block_means(capture: Capture, names: list[str]) -> Array | None:
-    columns = capture.arrays(*names)
-    rows = np.column_stack([columns[name] for name in names])
-    rows = rows[np.isfinite(rows).all(axis=1)]
+    rows = np.column_stack(list(capture.finite(*names).values()))
     size = rows.shape[0] // BLOCKS
     if size == 0:
         return None

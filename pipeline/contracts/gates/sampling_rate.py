@@ -48,8 +48,7 @@ def _judge(capture: Capture, samples: float, refuse: float, warn: float, per: st
 def _step(capture: Capture, options: Mapping[str, float]) -> Passed:
     samples = math.inf
     for name in (n for n in LINE_CURRENTS if capture.has(n)):
-        current = capture.arrays(name)[name]
-        current = current[np.isfinite(current)]
+        current = capture.finite(name)[name]
         if current.size and np.ptp(current) > 20.0 * noise_of(current):
             samples = min(samples, samples_per_time_constant(current))
     least, good = options["step_refuse"], options["step_warn"]
@@ -85,8 +84,7 @@ def _rotor_frame(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 def _slow_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
     pole_pairs, slots = capture.meta.pole_pairs, capture.meta.slots
-    angle = capture.arrays("theta_mech_rad")["theta_mech_rad"]
-    angle = angle[np.isfinite(angle)]
+    angle = capture.finite("theta_mech_rad")["theta_mech_rad"]
     travel = float(np.abs(np.diff(angle)).sum())
     if pole_pairs is None or slots is None or travel == 0.0:
         return Passed()

@@ -61,9 +61,7 @@ def _speeds_of_parts(capture: Capture) -> NDArray[np.float64]:
     Fewer than a hundred rows are a part each.
     """
     column = "omega_mech_rad_s" if capture.has("omega_mech_rad_s") else "theta_mech_rad"
-    columns = capture.arrays("t_s", column)
-    fine = np.isfinite(columns["t_s"]) & np.isfinite(columns[column])
-    t_s, motion = columns["t_s"][fine], columns[column][fine]
+    t_s, motion = capture.finite("t_s", column).values()
     if column == "theta_mech_rad":
         ends = np.linspace(0, max(t_s.size - 1, 0), min(_PARTS + 1, t_s.size)).round().astype(int)
         travel, took = np.diff(motion[ends]), np.diff(t_s[ends])

@@ -36,8 +36,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     names = ("iq_a", "torque_shaft_nm", *(_PROMISING if promised else ()))
     if not capture.has(*names):
         return Passed()
-    rows = np.column_stack(list(capture.arrays(*names).values()))
-    rows = rows[np.isfinite(rows).all(axis=1)]
+    rows = np.column_stack(list(capture.finite(*names).values()))
     blocks = min(BLOCKS, rows.shape[0])
     if blocks < LEAST_ROWS:
         return Passed()

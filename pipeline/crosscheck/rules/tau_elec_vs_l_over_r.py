@@ -144,11 +144,8 @@ def _trace(capture: Capture) -> tuple[Array, Array, Array]:
     pair = capture.meta.pair or "ab"
     line = next((p for p in pair if capture.has(f"i{p}_a")), pair[0])
     names = ("t_s", f"v{pair}_v", f"i{line}_a")
-    columns = capture.arrays(*names)
-    t_s, v_v, i_a = (columns[name] for name in names)
-    finite = np.isfinite(v_v) & np.isfinite(i_a)
-    sign = 1.0 if line == pair[0] else -1.0
-    return t_s[finite], v_v[finite], sign * i_a[finite]
+    t_s, v_v, i_a = capture.finite(*names, needed=names[1:]).values()
+    return t_s, v_v, i_a if line == pair[0] else -i_a
 
 
 def _expected_s(capture: Capture, ld_h: float, lq_h: float, r_phase_ohm: float) -> float:

@@ -104,9 +104,7 @@ def pace(capture: Capture, turns: float) -> Pace | None:
     """
     if not capture.has(*COLUMNS):
         return None
-    columns = capture.arrays(*COLUMNS)
-    rows = np.column_stack([columns[name] for name in COLUMNS])
-    rows = rows[np.isfinite(rows).all(axis=1)]
+    rows = np.column_stack(list(capture.finite(*COLUMNS).values()))
     if rows.shape[0] < BLOCKS * LEAST_ROWS:
         return None
     blocks = _increments(rows, capture.meta.pause_s)

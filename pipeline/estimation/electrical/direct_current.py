@@ -156,11 +156,10 @@ def _of_ohmmeter(capture: Capture, index: int, temp_degc: float) -> Iterator[Poi
     logged = first_temperature(capture, "winding") is not None
     for column in (name for name in OHMMETER if capture.has(name)):
         names = (column, "temp_winding_degc") if logged else (column,)
-        ohms, *temps = capture.arrays(*names).values()
+        ohms, *temps = capture.finite(*names).values()
         degcs = temps[0] if temps else np.full(ohms.size, temp_degc)
-        read = np.isfinite(ohms) & np.isfinite(degcs)
-        u_ohm = _scatter_ohm(ohms[read], degcs[read])
-        for ohm, degc in zip(ohms[read], degcs[read], strict=True):
+        u_ohm = _scatter_ohm(ohms, degcs)
+        for ohm, degc in zip(ohms, degcs, strict=True):
             means = float(ohm), 1.0, float(degc)
             yield Point(index, column[1:3], *means, u_ohm, 0.0, capture.meta, logged)
 

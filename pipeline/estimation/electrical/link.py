@@ -33,6 +33,5 @@ def largest(capture: Capture, name: str) -> float:
         Of the column, in whose unit the size is.
 
     """
-    values = np.abs(capture.arrays(name)[name]) if capture.has(name) else np.zeros(0)
-    values = values[np.isfinite(values)]
+    values = np.abs(capture.finite(name)[name]) if capture.has(name) else np.zeros(0)
     return float(np.percentile(values, 95.0)) if values.size else 0.0

@@ -282,9 +282,7 @@ def mean_speed_rad_s(captures: Sequence[Capture]) -> float | None:
     for capture in captures:
         if not capture.has("t_s", "theta_mech_rad"):
             continue
-        columns = capture.arrays("t_s", "theta_mech_rad")
-        finite = np.isfinite(columns["t_s"]) & np.isfinite(columns["theta_mech_rad"])
-        t, theta = columns["t_s"][finite], columns["theta_mech_rad"][finite]
+        t, theta = capture.finite("t_s", "theta_mech_rad").values()
         every = max(1, t.size // 500)
         t, theta = t[::every], theta[::every]
         if t.size > 1:

@@ -241,14 +241,12 @@ def _speed_table(capture: Capture, pole_pairs: int) -> dict[str, Array]:
 
 def _columns(capture: Capture, *names: str) -> dict[str, Array]:
     """Columns without rows that lack one of them, and how much warmer than 25 °C magnets are."""
-    columns = capture.arrays(*names)
+    columns = capture.finite(*names)
     thermometer = magnet_column(capture)
     degc = assumed_temperature(capture, REFERENCE_DEGC)
     if thermometer is not None:
         degc = float(np.nanmean(capture.arrays(thermometer)[thermometer]))
-    finite = np.all([np.isfinite(one) for one in columns.values()], axis=0)
-    kept = {name: one[finite] for name, one in columns.items()}
-    return kept | {"excess_k": np.full(int(finite.sum()), degc - REFERENCE_DEGC)}
+    return columns | {"excess_k": np.full(columns[names[0]].size, degc - REFERENCE_DEGC)}
 
 
 def _widest(rows: _Rows, place: int, alpha_1_k: float, level: float) -> _Rows | None:

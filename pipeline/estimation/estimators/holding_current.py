@@ -87,9 +87,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     captures = [c for c in campaign.of("holding_current") if c.has("theta_mech_rad", "iq_a")]
     turns: list[Turn] = []
     for capture in captures:
-        columns = capture.arrays("theta_mech_rad", "iq_a")
-        finite = np.isfinite(columns["theta_mech_rad"])
-        turns += whole_turns(columns["theta_mech_rad"][finite], columns["iq_a"][finite])
+        columns = capture.finite("theta_mech_rad", "iq_a", needed=("theta_mech_rad",))
+        turns += whole_turns(columns["theta_mech_rad"], columns["iq_a"])
     highest = largest_order(turns, int(options["highest_order"]))
     if len(turns) < 2 or highest < 1:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"

@@ -249,9 +249,7 @@ def _coasts(capture: Capture) -> list[Coast]:
     column = "theta_mech_rad" if of_angle else "omega_mech_rad_s"
     if not capture.has("t_s", column):
         return []
-    data = capture.arrays("t_s", column)
-    finite = np.isfinite(data["t_s"]) & np.isfinite(data[column])
-    t, y = data["t_s"][finite], data[column][finite]
+    t, y = capture.finite("t_s", column).values()
     if t.size < LEAST_SAMPLES:
         return []
     angle, limits = y if of_angle else trapezoid(t, y), policy().coast_down

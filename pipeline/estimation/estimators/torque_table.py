@@ -178,11 +178,10 @@ class _Rows:
 
 def _table(capture: Capture) -> dict[str, Array]:
     names = ("iq_a", "torque_shaft_nm", "id_a", "temp_magnet_degc", "theta_mech_rad")
-    columns = capture.arrays(*(name for name in names if capture.has(name)))
-    finite = np.isfinite(columns["iq_a"]) & np.isfinite(columns["torque_shaft_nm"])
+    columns = capture.finite(*(name for name in names if capture.has(name)), needed=names[:2])
     warm = assumed_temperature(capture, REFERENCE_DEGC)
     usual = {"id_a": 0.0, "temp_magnet_degc": warm, "theta_mech_rad": np.nan}
-    columns = {n: columns.get(n, np.full(finite.size, usual.get(n, np.nan)))[finite] for n in names}
+    columns = {n: np.full(columns["iq_a"].size, value) for n, value in usual.items()} | columns
     return {
         "iq_a": columns["iq_a"],
         "id_a": np.nan_to_num(columns["id_a"]),

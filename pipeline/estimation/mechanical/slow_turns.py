@@ -29,9 +29,8 @@ def torque_turns(captures: Sequence[Capture]) -> list[Turn]:
     """
     turns: list[Turn] = []
     for capture in captures:
-        columns = capture.arrays("theta_mech_rad", "torque_shaft_nm")
-        finite = np.isfinite(columns["theta_mech_rad"])
-        turns += whole_turns(columns["theta_mech_rad"][finite], columns["torque_shaft_nm"][finite])
+        columns = capture.finite("theta_mech_rad", "torque_shaft_nm", needed=("theta_mech_rad",))
+        turns += whole_turns(columns["theta_mech_rad"], columns["torque_shaft_nm"])
     return turns
 
 
@@ -115,9 +114,7 @@ def _acceleration_turns(capture: Capture) -> list[Turn]:
     """The whole turns of the angle's second difference [rad/s²]; none without a clock."""
     if not capture.has("t_s"):
         return []
-    columns = capture.arrays("t_s", "theta_mech_rad")
-    finite = np.isfinite(columns["t_s"]) & np.isfinite(columns["theta_mech_rad"])
-    time, theta = columns["t_s"][finite], columns["theta_mech_rad"][finite]
+    time, theta = capture.finite("t_s", "theta_mech_rad").values()
     return whole_turns(theta, _second_difference(time, theta)) if time.size > 2 else []
 
 

@@ -143,10 +143,8 @@ def _variables(capture: Capture, t_s: Array) -> Iterator[tuple[str, Array]]:
     names = ("omega_mech_rad_s", "iq_a", "theta_mech_rad", "theta_elec_rad")
     for name in names:
         if capture.has("t_s", name):
-            columns = capture.arrays("t_s", name)
-            finite = np.isfinite(columns[name]) & np.isfinite(columns["t_s"])
-            if finite.sum() > 1:
-                known_s, values = columns["t_s"][finite], columns[name][finite]
+            known_s, values = capture.finite("t_s", name).values()
+            if known_s.size > 1:
                 yield name, np.interp(t_s, known_s, values, left=np.nan, right=np.nan)
     pole_pairs = capture.meta.pole_pairs
     if pole_pairs and capture.has("t_s", "theta_mech_rad") and not capture.has("theta_elec_rad"):
