@@ -184,7 +184,7 @@ class Method:
     def traces(
         self,
         captures: Sequence[Capture],
-        titles: Sequence[str],
+        titles: str | Sequence[str],
         column: str,
         rows: tuple[NDArray[np.int64], Array, Array, Array],
         caption: str,
@@ -196,7 +196,7 @@ class Method:
         captures
             By number.
         titles
-            One a capture.
+            One a capture, or one for all.
         column
             The name of what was measured.
         rows
@@ -206,6 +206,7 @@ class Method:
 
         """
         number, t_s, measured, fitted = rows
+        titles = [titles] * len(captures) if isinstance(titles, str) else titles
         plots = []
         for index, (capture, title) in enumerate(zip(captures, titles, strict=True)):
             chosen = np.flatnonzero(number == index)

@@ -16,12 +16,11 @@ from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import (
     contributions,
-    current_source,
     instrument_uncertainties,
+    shifted_gains,
+    shifted_offsets,
     temperature_source,
-    torque_source,
     unstated_note,
-    voltage_source,
 )
 from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.estimation.uncertainty.regimes import (
@@ -277,12 +276,10 @@ def _moved(
     blocks: Blocks, captures: Sequence[Capture], chosen: Sequence[str], shift: Mapping[str, float]
 ) -> Array:
     """The constants with instruments off by `shift`."""
-    metas = [capture.meta for capture in captures]
-    volts, amps, force = (
-        np.array([1.0 + shift.get(source(m), 0.0) for m in metas])[blocks.capture]
-        for source in (voltage_source, current_source, torque_source)
+    volts, amps, force = shifted_gains(
+        shift, captures, blocks.capture, "voltage", "current", "torque"
     )
-    warmer = np.array([shift.get(_thermometer(c), 0.0) for c in captures])[blocks.capture]
+    warmer = shifted_offsets(shift, map(_thermometer, captures), blocks.capture)
     moved = Blocks(
         volts * amps * blocks.dc_w, force * blocks.shaft_w, force * blocks.torque_nm,
         force**2 * blocks.torque2_nm2, blocks.speed_rad_s, blocks.speed2_rad2_s2,
@@ -369,12 +366,12 @@ def _plots(
     captures: Sequence[Capture], blocks: Blocks, solution: LinearFit
 ) -> tuple[Evidence, ...]:
     loss_w = blocks.dc_w - blocks.shaft_w
-    titles = ["Power that does not leave by the shaft, W"] * len(captures)
+    title = "Power that does not leave by the shaft, W"
     number = np.concatenate(
         [np.arange(np.count_nonzero(blocks.capture == n)) for n in range(len(captures))]
     ).astype(float)
     columns = blocks.capture, number, loss_w, loss_w - solution.residuals
-    return tuple(METHOD.traces(captures, titles, STANDBY.name, columns, "means over blocks"))
+    return tuple(METHOD.traces(captures, title, STANDBY.name, columns, "means over blocks"))
 
 
 ESTIMATOR = Estimator(

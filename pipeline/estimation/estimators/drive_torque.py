@@ -26,9 +26,9 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
     contributions,
-    current_source,
     instrument_uncertainties,
-    torque_source,
+    shifted_gains,
+    shifted_offsets,
     unstated_note,
 )
 from pipeline.estimation.uncertainty.nuisances import allowed_for
@@ -212,10 +212,8 @@ def _refit(
     shift: Mapping[str, float],
 ) -> float:
     """Kt with instruments off by `shift`."""
-    metas = [capture.meta for capture in rows.captures]
-    amps = np.array([1.0 + shift.get(current_source(m), 0.0) for m in metas])[rows.capture]
-    force = np.array([1.0 + shift.get(torque_source(m), 0.0) for m in metas])[rows.capture]
-    warmer = np.array([shift.get(magnet_source(c), 0.0) for c in rows.captures])[rows.capture]
+    amps, force = shifted_gains(shift, rows.captures, rows.capture, "current", "torque")
+    warmer = shifted_offsets(shift, map(magnet_source, rows.captures), rows.capture)
     base = torque(rows, alpha_1_k)
     base[:, 0] = amps * (base[:, 0] + alpha_1_k * rows.q_current_a * warmer)
     design = np.column_stack([base, *(pool[name] for name in chosen)])
@@ -235,10 +233,10 @@ def _instruments(
 
 
 def _plots(rows: ShaftRows, solution: LinearFit) -> tuple[Evidence, ...]:
-    titles = ["Torque by current and motion"] * len(rows.captures)
+    title = "Torque by current and motion"
     fitted = rows.load_nm - solution.residuals
     columns = rows.capture, rows.time_s, rows.load_nm, fitted
-    return tuple(METHOD.traces(rows.captures, titles, "torque_shaft_nm", columns, "window means"))
+    return tuple(METHOD.traces(rows.captures, title, "torque_shaft_nm", columns, "window means"))
 
 
 ESTIMATOR = Estimator(

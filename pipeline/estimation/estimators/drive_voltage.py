@@ -31,11 +31,11 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
     contributions,
-    current_source,
     instrument_uncertainties,
+    shifted_gains,
+    shifted_offsets,
     temperature_source,
     unstated_note,
-    voltage_source,
 )
 from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.estimation.uncertainty.regimes import (
@@ -160,11 +160,9 @@ def _partitions(rows: VoltageRows, information: Array) -> list[Partition]:
 
 
 def _gains(rows: VoltageRows, shift: Mapping[str, float]) -> tuple[Array, Array, Array]:
-    metas = [c.meta for c in rows.captures]
-    voltage = np.array([1.0 + shift.get(voltage_source(m), 0.0) for m in metas])
-    current = np.array([1.0 + shift.get(current_source(m), 0.0) for m in metas])
-    warmer = np.array([shift.get(temperature_source(m), 0.0) for m in metas])
-    return voltage[rows.capture], current[rows.capture], warmer[rows.capture]
+    voltage, current = shifted_gains(shift, rows.captures, rows.capture, "voltage", "current")
+    sources = (temperature_source(c.meta) for c in rows.captures)
+    return voltage, current, shifted_offsets(shift, sources, rows.capture)
 
 
 def q_voltage(
@@ -438,9 +436,9 @@ def _of_turn(
 
 
 def _evidence(rows: VoltageRows, fit: LinearFit) -> tuple[Evidence, ...]:
-    titles = ["Drive voltage and its parts"] * len(rows.captures)
+    title = "Drive voltage and its parts"
     columns = rows.capture, rows.time_s, rows.voltage_v, rows.voltage_v - fit.residuals
-    return tuple(METHOD.traces(rows.captures, titles, "vq_v", columns, "window means"))
+    return tuple(METHOD.traces(rows.captures, title, "vq_v", columns, "window means"))
 
 
 ESTIMATOR = Estimator(

@@ -348,9 +348,9 @@ def _hidden(parts: Sequence[Part]) -> dict[str, str]:
 def _plots(parts: Sequence[Part], solved: Solved) -> tuple[Evidence, ...]:
     rows = solved.rows
     captures = [part.capture for part in parts]
-    titles = ["Voltage by speed and acceleration"] * len(captures)
+    title = "Voltage by speed and acceleration"
     columns = rows.capture, rows.time_s, rows.voltage_v, rows.voltage_v - solved.fit.residuals
-    return tuple(METHOD.traces(captures, titles, "vq_v", columns, "window means"))
+    return tuple(METHOD.traces(captures, title, "vq_v", columns, "window means"))
 
 
 ESTIMATOR = Estimator(

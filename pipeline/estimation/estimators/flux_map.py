@@ -23,12 +23,11 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
     Shift,
-    clock_source,
     contributions,
-    current_source,
     instrument_uncertainties,
+    shifted_gains,
+    shifted_offsets,
     unstated_note,
-    voltage_source,
 )
 from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.physics.units import REFERENCE_DEGC
@@ -177,12 +176,9 @@ class _Rows:
 
     def shifted(self, shift: Shift) -> _Rows:
         """The rows as they were if instruments are off."""
-        sources = (current_source, voltage_source, clock_source)
-        amps, volts, fast = (
-            np.array([1.0 + shift.get(of(c.meta), 0.0) for c in self.captures])[self.table]
-            for of in sources
-        )
-        warmer = np.array([shift.get(magnet_source(c), 0.0) for c in self.captures])[self.table]
+        kinds = ("current", "voltage", "clock")
+        amps, volts, fast = shifted_gains(shift, self.captures, self.table, *kinds)
+        warmer = shifted_offsets(shift, map(magnet_source, self.captures), self.table)
         return replace(
             self,
             id_a=amps * self.id_a,

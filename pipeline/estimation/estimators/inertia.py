@@ -56,9 +56,9 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
     contributions,
-    current_source,
     instrument_uncertainties,
-    torque_source,
+    shifted_gains,
+    shifted_offsets,
     unstated_note,
 )
 from pipeline.numerics.coast_setups import Setup, setup_words
@@ -155,10 +155,8 @@ def driving_torque(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) 
     T = K (1 + α (T_m - 25)) i_q + K_rel i_d i_q + T_h - T_load, T_h by `ripple_torque`.
 
     """
-    metas = [capture.meta for capture in rows.captures]
-    current = np.array([1.0 + shift.get(current_source(m), 0.0) for m in metas])[rows.capture]
-    load = np.array([1.0 + shift.get(torque_source(m), 0.0) for m in metas])[rows.capture]
-    warmer = np.array([shift.get(magnet_source(c), 0.0) for c in rows.captures])[rows.capture]
+    current, load = shifted_gains(shift, rows.captures, rows.capture, "current", "torque")
+    warmer = shifted_offsets(shift, map(magnet_source, rows.captures), rows.capture)
     kt = torque.kt_nm_a * (1.0 + shift.get("kt", 0.0))
     reluctance = torque.reluctance_nm_a2 + shift.get("reluctance", 0.0)
     magnet = torque.magnet_1_k + shift.get("magnet", 0.0)

@@ -23,9 +23,9 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
     contributions,
-    current_source,
     instrument_uncertainties,
-    torque_source,
+    shifted_gains,
+    shifted_offsets,
     unstated_note,
 )
 from pipeline.numerics.least_squares import LinearFit, linear_fit
@@ -203,11 +203,8 @@ def _instruments(
     """What clamp, transducer and thermometer do to Kt, by refitting with each shifted."""
 
     def kt(shift: Mapping[str, float]) -> Array:
-        amps, force = (
-            np.array([1.0 + shift.get(source(c.meta), 0.0) for c in captures])[rows.table]
-            for source in (current_source, torque_source)
-        )
-        warmer = np.array([shift.get(magnet_source(c), 0.0) for c in captures])[rows.table]
+        amps, force = shifted_gains(shift, captures, rows.table, "current", "torque")
+        warmer = shifted_offsets(shift, map(magnet_source, captures), rows.table)
         moved = replace(
             rows,
             iq_a=amps * rows.iq_a,

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.records.capture import UNSTATED_U, Array, Capture, CaptureMeta
 from pipeline.records.estimate import Estimate
@@ -138,6 +139,43 @@ def instrument_uncertainties(
             if u is not None:
                 stated[source] = max(stated.get(source, 0.0), u)
     return dict(sorted((usual | stated).items()))
+
+
+def shifted_offsets(shift: Shift, sources: Iterable[str], part: NDArray[np.int64]) -> Array:
+    """What a shift adds to each of n rows of several captures.
+
+    Parameters
+    ----------
+    shift
+        By source [unit of its readings, or 1 for a gain].
+    sources
+        One a capture.
+    part
+        Number of each row's capture [n].
+
+    """
+    return np.array([shift.get(source, 0.0) for source in sources])[part]
+
+
+def shifted_gains(
+    shift: Shift, captures: Sequence[Capture], part: NDArray[np.int64], *kinds: str
+) -> tuple[Array, ...]:
+    """The gains [n, 1] of some kinds of instruments, by rows of several captures.
+
+    Parameters
+    ----------
+    shift
+        By source, relative.
+    captures
+        By number.
+    part
+        Number of each row's capture [n].
+    *kinds
+        Keys of `SOURCES`.
+
+    """
+    metas = [capture.meta for capture in captures]
+    return tuple(1.0 + shifted_offsets(shift, map(SOURCES[kind][0], metas), part) for kind in kinds)
 
 
 def unstated_note(
