@@ -139,8 +139,7 @@ def _beside(volts: Complex, current: Complex, frame_rad: Array, omega_rad_s: Arr
     rows = volts.size // size * size
 
     def means(values: NDArray[Any]) -> Complex:
-        blocks: Complex = values[:rows].reshape(-1, size).mean(axis=1)
-        return blocks
+        return values[:rows].reshape(-1, size).mean(axis=1)
 
     back = np.exp(-1j * frame_rad)
     i, omega = current * back, omega_rad_s

@@ -55,8 +55,7 @@ def row_means(row_s: Array, sample_s: Array, samples: Array) -> Array:
         within = t_s - sample_s[place]
         share = within / np.where(steps[place] > 0.0, steps[place], 1.0)
         rise = samples[place + 1] - samples[place]
-        part: Array = integral[place] + within * (samples[place] + 0.5 * share * rise)
-        return part
+        return integral[place] + within * (samples[place] + 0.5 * share * rise)
 
     begin = np.clip(row_s - half, sample_s[0], sample_s[-1])
     end = np.clip(row_s + half, sample_s[0], sample_s[-1])

@@ -112,7 +112,6 @@ def _heat_run(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _flux_map(capture: Capture, options: Mapping[str, float]) -> Passed:
-    del options
     # steady voltages of levels of d current carry no q current
     for name in ("id_a", "iq_a") if capture.has("iq_a") else ("id_a",):
         levels = np.unique(_finite(capture, name)[name].round(9))
@@ -127,7 +126,6 @@ def _flux_map(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 def _torque_table(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Refuses one current only; warns of one sense only, where an offset looks like a constant."""
-    del options
     current = _finite(capture, "iq_a")["iq_a"]
     if np.ptp(current) <= 1e-3 * np.abs(current).max(initial=0.0):
         raise CaptureError(CODE, "iq_a has one level only", "add rows at further currents")

@@ -22,7 +22,6 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     ISO 8601-1:2019, 5.4.2 (date and time of day in UTC).
 
     """
-    del options
     stated = capture.meta.started_at
     if stated is None or _in_utc(stated):
         return Passed()

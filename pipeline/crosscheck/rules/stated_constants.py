@@ -22,7 +22,6 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
     Each is the measured value over the stated one, judged by both uncertainties.
     """
-    del campaign
     judged = [
         _check(stated, measured, options["allowance"])
         for stated in constants.estimates

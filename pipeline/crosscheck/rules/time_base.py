@@ -54,7 +54,6 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     speed's own scale may be off by; `turns` [1], the least travel.
 
     """
-    del constants
     paces = [p for c in campaign.of(*TESTS) if (p := pace(c, options["turns"])) is not None]
     if not paces:
         return not_evaluated(NAME, MISSING)

@@ -25,8 +25,7 @@ def left_by_filter(speed_elec_rad_s: Array, tau2_s2: float) -> Array:
         1/√(1 + ω²τ²) [1].
 
     """
-    left: Array = np.maximum(1.0 + tau2_s2 * speed_elec_rad_s**2, 1e-3) ** -0.5
-    return left
+    return np.maximum(1.0 + tau2_s2 * speed_elec_rad_s**2, 1e-3) ** -0.5
 
 
 def behind_filter(
@@ -61,8 +60,7 @@ def behind_filter(
     start = linear_fit(design, psi_wb, sigma_wb).coefficients
 
     def residual(c: Array) -> Array:
-        missed: Array = (design @ c[:-1] * left_by_filter(share, c[-1]) - psi_wb) / sigma_wb
-        return missed
+        return (design @ c[:-1] * left_by_filter(share, c[-1]) - psi_wb) / sigma_wb
 
     end = least_squares(residual, np.append(start, 0.0), x_scale="jac", method="lm")
     columns, unit = end.jac * sigma_wb[:, None], np.append(np.ones(start.size), top**2)

@@ -40,7 +40,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     psi = Ke/p; Kt = 1.5 Ke in the amplitude-invariant frame. Each is a power of Ke, 1 or -1.
 
     """
-    del options
     ke = known.best(KE)
     if ke is None or ke.status != "measured" or set(ke.captures) <= _spins(campaign):
         return METHOD.nothing(GIVES, EXPERIMENT)

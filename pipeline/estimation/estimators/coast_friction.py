@@ -33,7 +33,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     JCGM 100:2008, 5.1.2.
 
     """
-    del campaign, options
     inertia = known.best("j_rotor_kgm2")
     if inertia is None or inertia.status != "stated":
         return METHOD.nothing(tuple(COASTS), f"no inertia is stated; {EXPERIMENT}")

@@ -149,7 +149,6 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
     Gains scale v and i, and L with v/i. References: Schwarz, Ann. Statist. 6(2), 1978 (BIC);
     Hoeting et al., Statist. Sci. 14(4), 1999, eq. 5 (variance between models).
     """
-    del known
     records, notes = _records(campaign.of("current_step"))
     axes = _axes_identified(records, options["least_share"])
     odd = disagreement(records)

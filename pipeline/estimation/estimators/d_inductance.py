@@ -31,7 +31,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     IEEE Std 1812-2014 (dq equations).
 
     """
-    del options
     return inductance_at_speed(METHOD, "d", campaign, known, EXPERIMENT)
 
 

@@ -135,7 +135,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     Both sides of the balance are measured, so that the gains of three instruments are in what is
     left; where that is a tenth of the power, one per cent of gain is a tenth of the losses.
     """
-    del known
     captures = [c for c in campaign.of("drive", "torque_map") if _usable(c)]
     parts = [one for n, c in enumerate(captures) if (one := _blocks(c, n)) is not None]
     if not parts:

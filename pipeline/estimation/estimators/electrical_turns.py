@@ -63,7 +63,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     motor's: v = jω p ψ e^{jpθ_m} turns p times a turn of a shaft that has a sensor of its own.
 
     """
-    del known, options
     looked = [turns_of(c) for c in campaign.of(*ESTIMATOR.tests) if c.has("t_s", SHAFT)]
     seen = [t for t in looked if t is not None and (t.slope is not None or t.voltage is not None)]
     if not seen:
@@ -122,8 +121,7 @@ def _stator_voltage(data: Mapping[str, Array]) -> Complex | None:
         if len(columns) > 1:
             return vector_of(columns)
     if {"vd_v", "vq_v", ANGLE} <= set(data):
-        turned: Complex = (data["vd_v"] + 1j * data["vq_v"]) * np.exp(1j * data[ANGLE])
-        return turned
+        return (data["vd_v"] + 1j * data["vq_v"]) * np.exp(1j * data[ANGLE])
     return None
 
 

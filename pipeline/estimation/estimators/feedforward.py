@@ -148,7 +148,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     the uncertainty. Nothing else is corrected: all hold at the winding's and the magnets'
     temperature of the log, and with whatever load it had. Logs count by what they leave.
     """
-    del known
     parts = [p for p in map(_part, campaign.of("drive")) if p is not None]
     if not parts:
         note = "of drives of voltage and motion alone; current tells j_rotor_kgm2 and more"

@@ -152,8 +152,7 @@ class _Rows:
     def reach(self) -> Array:
         """The larger of both currents, each over its largest [n]."""
         shares = [np.abs(i) / max(float(np.abs(i).max()), 1e-300) for i in (self.id_a, self.iq_a)]
-        reach: Array = np.maximum(*shares)
-        return reach
+        return np.maximum(*shares)
 
     def at(self, rows: NDArray[np.bool_]) -> _Rows:
         """Some of the rows."""

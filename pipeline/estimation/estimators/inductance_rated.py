@@ -65,7 +65,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     Armando, Bojoi, Guglielmi, Pellegrino and Pastorelli, IEEE Trans. Ind. Appl. 49(5), 2013.
 
     """
-    del options
     captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "vd_v", "vq_v")]
     pairs, rests = pole_pairs_to_use(known, campaign)
     table = operating_points(captures, pairs)
@@ -175,7 +174,6 @@ def _without_ripple(
 
 def _quadrature(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     """psi_q over i_q at the largest q current without d current."""
-    del magnet
     tolerance = policy().flux_pairs.same_current
     largest = max((f.iq_a for f in fluxes), default=0.0)
     without_d = [f for f in fluxes if abs(f.id_a) < tolerance * max(largest, 1e-300)]

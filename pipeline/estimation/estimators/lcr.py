@@ -97,7 +97,6 @@ def fit_lcr(campaign: Campaign, known: Constants, options: Mapping[str, float]) 
     within its own error of zero it is taken as zero, and A alone is fitted. With angles unknown
     the low inductance is taken as Ld, which holds for interior magnets; the note says so.
     """
-    del known
     captures = campaign.of("lcr")
     table = _table(captures)
     if np.isfinite(table.theta_rad).sum() >= 6:

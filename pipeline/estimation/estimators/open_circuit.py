@@ -113,7 +113,6 @@ def fit_open_circuit(campaign: Campaign, known: Constants, options: Mapping[str,
     Alpha is fitted where the magnets were at two temperatures, else assumed with its own
     uncertainty.
     """
-    del known
     captures = campaign.of("open_circuit")
     groups, notes = _groups(captures, options)
     if not groups:

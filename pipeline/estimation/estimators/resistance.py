@@ -251,7 +251,6 @@ def fit_resistance(campaign: Campaign, known: Constants, options: Mapping[str, f
     The published values are linear in the pairs' (`windings.phase_resistances_ohm`), and so is
     their scatter.
     """
-    del known
     points, notes = direct_current_points(campaign, options)
     if not points:
         return METHOD.nothing(GIVES, f"no settled plateau with current; {EXPERIMENT}")

@@ -39,7 +39,6 @@ def fit_soak(campaign: Campaign, known: Constants, options: Mapping[str, float])
     R25.
 
     """
-    del known
     points, notes = direct_current_points(campaign, options)
     spans = {
         pair: float(np.ptp([p.temp_degc for p in points if p.pair == pair]))

@@ -41,7 +41,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     Of several logs the one that knows p L best counts, of an axis. Both axes count by their
     uncertainties; axes that contradict each other tell nothing.
     """
-    del options
     stated = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
     logs = [rows_of_slope(campaign.of(test), stated) for test in ("drive", "torque_map")]
     found = []

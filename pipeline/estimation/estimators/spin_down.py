@@ -163,7 +163,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     mean is given, which is the part that is odd in speed. Coasts of several set-ups
     (`coast_setups`) have no common value; what each gives is in the note.
     """
-    del known
     captures = campaign.of("spin_down")
     setups = setups_of(captures)
     if len(setups) > 1:

@@ -180,8 +180,7 @@ def _ages(rows: ShaftRows) -> Array:
     """Time of every row since the first sample of its capture [w, s]."""
     clocks = (c.arrays("t_s", motion_column(c))["t_s"] for c in rows.captures)
     starts = np.array([float(np.nanmin(clock)) for clock in clocks])
-    age: Array = rows.time_s - starts[rows.capture]
-    return age
+    return rows.time_s - starts[rows.capture]
 
 
 @dataclass(frozen=True, slots=True)
