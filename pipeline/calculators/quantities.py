@@ -201,7 +201,8 @@ def parse(kind: str, calculator: Calculator, mapping: Mapping[str, str]) -> Give
         key = index.get(typed)
         if key is None:
             near = difflib.get_close_matches(typed, index, 1)
-            hint = f"did you mean {near[0]}=?" if near else _keys_hint(calculator)
+            known = ", ".join(calculator.shown_names())
+            hint = f"did you mean {near[0]}=?" if near else f"known are {known}"
             raise UsageError(f"calc {kind}: no key {typed!r}", hint)
         if key.name in numbers or key.name in texts:
             raise UsageError(f"calc {kind}: {key.name} is given twice", "give it once")
@@ -245,10 +246,6 @@ def _value(kind: str, key: Key, text: str) -> float:
         least = f"{key.low:g} {_unit(key.unit)}".rstrip()
         raise UsageError(f"calc {kind}: {key.name}={text}", f"it must be above {least}")
     return value
-
-
-def _keys_hint(calculator: Calculator) -> str:
-    return f"known are {', '.join(calculator.shown_names())}"
 
 
 def agreed(given: Given, values: Mapping[str, float], quantity: Quantity = "coupling") -> float:

@@ -267,12 +267,10 @@ def _example(words: str) -> list[str]:
 
 def _default(key: Field[Any]) -> str:
     if key.default is not MISSING:
-        return "null" if key.default is None else _lower(key.default)
+        if isinstance(key.default, bool):
+            return str(key.default).lower()
+        return "null" if key.default is None else str(key.default)
     if key.default_factory is not MISSING:
         default = key.default_factory()
         return "{}" if default == {} else str(default).replace("'", "")
     return "..."
-
-
-def _lower(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

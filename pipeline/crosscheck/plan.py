@@ -378,8 +378,8 @@ def _too_uncertain(name: str, estimate: Estimate, aims: Aims) -> tuple[DoubtKind
     reached, target = estimate.u, aims.u_of.get(name)
     unit = f" {estimate.unit}".replace(" 1", "")
     if target is None:
-        reached, target = 100.0 * reached / abs(estimate.number), 100.0 * _u_rel(name, aims)
-        unit = " %"
+        reached = 100.0 * reached / abs(estimate.number)
+        target, unit = 100.0 * aims.u_rel_of.get(name, aims.u_rel), " %"
     if reached <= target:
         return None
     words = (
@@ -390,10 +390,6 @@ def _too_uncertain(name: str, estimate: Estimate, aims: Aims) -> tuple[DoubtKind
         cure = "" if source.startswith(ASSUMED) else ": calibrate that"
         words += f"; most of it is {source}, which repeating does not reduce{cure}"
     return "uncertain", words
-
-
-def _u_rel(name: str, aims: Aims) -> float:
-    return aims.u_rel_of.get(name, aims.u_rel)
 
 
 def _largest_instrument(estimate: Estimate) -> str:

@@ -106,11 +106,14 @@ class Query:
                 code_version.startswith(one.text) or one.fits(code_version) for one in wanted
             ):
                 return False
-            if name == "date" and not any(_within(day, *_span(one.text)) for one in wanted):
+            spans = (
+                [_span(one.text) for one in wanted] if name in ("date", "since", "until") else []
+            )
+            if name == "date" and not any(low <= day < high for low, high in spans):
                 return False
-            if name == "since" and any(day < _span(one.text)[0] for one in wanted):
+            if name == "since" and any(day < low for low, _ in spans):
                 return False
-            if name == "until" and any(day >= _span(one.text)[1] for one in wanted):
+            if name == "until" and any(day >= high for _, high in spans):
                 return False
         return True
 
@@ -250,10 +253,6 @@ def _instant(when: str) -> datetime:
     if instant is None:
         raise ValueError(f"{when[:60]!r} is no date")
     return instant
-
-
-def _within(day: datetime, low: datetime, high: datetime) -> bool:
-    return low <= day < high
 
 
 ROW: Mapping[str, Callable[[Version, Wanted], bool]] = {

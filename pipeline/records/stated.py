@@ -52,9 +52,10 @@ def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:
     estimates = []
     names = {key for c in campaign.captures for key in c.meta.extra} | set(campaign.stated)
     for name in sorted(filter(may_be_stated, names)):
-        stated = _stated_value(campaign.stated, name)
         paths: tuple[str, ...] = ()
-        if stated is None:
+        if name in campaign.stated:
+            stated = campaign.stated[name], campaign.stated.get(f"u_{name}")
+        else:
             pairs = {c.path: _pair(c.meta.extra, name) for c in campaign.captures}
             counts = Counter(pair for pair in pairs.values() if pair is not None)
             if not counts:
@@ -63,10 +64,6 @@ def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:
             paths = tuple(path for path, pair in pairs.items() if pair == stated)
         estimates.append(_estimate(name, *stated, paths))
     return tuple(estimates)
-
-
-def _stated_value(stated: Mapping[str, float], name: str) -> tuple[float, float | None] | None:
-    return (stated[name], stated.get(f"u_{name}")) if name in stated else None
 
 
 def _pair(extra: Mapping[str, str], name: str) -> tuple[float, float | None] | None:

@@ -73,7 +73,11 @@ def folder(settings: InspectSettings) -> Outcome:
         The keys of `inspect`.
 
     """
-    paths = [path for path in list_files(Path(settings.file)).paths if _is_data(path)]
+    paths = [
+        path
+        for path in list_files(Path(settings.file)).paths
+        if PurePosixPath(path).name != MANIFEST and not path.endswith(SIDECAR_SUFFIX)
+    ]
     if not paths:
         raise UsageError(f"{settings.file} holds no files", "name a folder of recordings")
     limits = _read_limits(settings)
@@ -117,10 +121,6 @@ def _look_or_fault(task: InspectTask) -> Looked | str:
 
 def _read_limits(settings: InspectSettings) -> ReadLimits:
     return ReadLimits(settings.read_seconds, settings.read_memory_mb)
-
-
-def _is_data(path: str) -> bool:
-    return PurePosixPath(path).name != MANIFEST and not path.endswith(SIDECAR_SUFFIX)
 
 
 def finish(

@@ -76,7 +76,8 @@ def main(settings: ReviewSettings) -> Outcome:
 
 def _served(settings: ReviewSettings, chosen: Opened) -> Outcome:
     """Starts the servers and prints their addresses; then opens the window or serves the page."""
-    page, table = _ports(settings.port)
+    first = settings.port
+    page, table = (first, first + 1) if first else (free_port(), free_port())
     used = ([page] if settings.web else []) + ([table] if chosen.table else [])
     for port in used if settings.port else []:
         require_free(port)
@@ -162,11 +163,6 @@ def _refused(paths: Sequence[Path], output: Path) -> tuple[str, ...]:
         except RecordingError as error:
             lines.append(f"refused: {path.relative_to(output)}: {error} [recording_unverified]")
     return tuple(lines)
-
-
-def _ports(first: int) -> tuple[int, int]:
-    """Ports of the page and of the table."""
-    return (first, first + 1) if first else (free_port(), free_port())
 
 
 def _decided(output: Path, shown: Sequence[Path]) -> Iterator[str]:

@@ -41,7 +41,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 
     """
     ke = known.best(KE)
-    if ke is None or ke.status != "measured" or set(ke.captures) <= _spins(campaign):
+    spins = {capture.path for capture in campaign.of("open_circuit")}
+    if ke is None or ke.status != "measured" or spins.issuperset(ke.captures):
         return METHOD.nothing(GIVES, EXPERIMENT)
     estimates = [
         _named(name, coupling_as(as_name, ke.number), ke) for name, as_name in NAMES.items()
@@ -52,10 +53,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     else:
         flux = _named("psi_pm_wb", ke.number / pairs, ke, words)
     return Fit((flux, *estimates))
-
-
-def _spins(campaign: Campaign) -> set[str]:
-    return {capture.path for capture in campaign.of("open_circuit")}
 
 
 def _named(name: str, value: float, ke: Estimate, words: str = "") -> Estimate:

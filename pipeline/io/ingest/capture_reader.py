@@ -83,7 +83,9 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
             "run `inspect` on it for its fields and a source map to start from",
         )
     integrity: Integrity = "verified" if verified else "unverified"
-    return Capture(entry.capture_path, entry.sha256, integrity, meta, tuple(_sorted(frames)))
+    # an order that the order of topics in the file has no part in
+    tables = tuple(sorted(frames, key=lambda frame: (frame.columns, -frame.height)))
+    return Capture(entry.capture_path, entry.sha256, integrity, meta, tables)
 
 
 def _frame(table: RawTable, source: SourceMap | None, meta: CaptureMeta) -> pl.DataFrame | None:
@@ -121,11 +123,6 @@ def _cut(frames: list[pl.DataFrame], part: Part | None) -> list[pl.DataFrame]:
         words = f"there are no {part.name} in {frames[0].height} rows"
         raise CaptureError("bad_part", words, "correct `captures` in the source map")
     return [frames[0].slice(part.first, last - part.first + 1)]
-
-
-def _sorted(frames: list[pl.DataFrame]) -> list[pl.DataFrame]:
-    """Tables in an order that the order of topics in the file has no part in."""
-    return sorted(frames, key=lambda frame: (frame.columns, -frame.height))
 
 
 def wanted(source: SourceMap | None, name: str) -> bool:

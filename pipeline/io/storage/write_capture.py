@@ -102,16 +102,15 @@ def csv_bytes(meta: Mapping[str, str], table: Table) -> bytes:
     """
     columns = [column.tolist() for column in table.values()]
     rows = [",".join(table)]
-    rows += [",".join(map(_csv_number, row)) for row in zip(*columns, strict=True)]
+    rows += [
+        ",".join("" if math.isnan(value) else repr(value) for value in row)
+        for row in zip(*columns, strict=True)
+    ]
     body = ("\n".join(rows) + "\n").encode()
     digest = f"{hashlib.sha256(body).hexdigest()}/{len(rows) - 1}"
     words = {**meta, "sha256_rows": digest}
     head = "".join(f"# {key}: {value}\n" for key, value in words.items())
     return head.encode() + body
-
-
-def _csv_number(value: float) -> str:
-    return "" if math.isnan(value) else repr(value)
 
 
 def mcap_bytes(meta: Mapping[str, str], tables: Sequence[Table], form: Format) -> bytes:

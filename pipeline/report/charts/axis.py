@@ -82,7 +82,8 @@ def axis_for(name: str, low: float, high: float, start: float, end: float, count
     low, high = _open(low, high)
     unit = unit_of(name)
     step = _step((high - low) / count, degrees=unit == "deg")
-    ticks = tuple(i * step for i in range(math.ceil(low / step - 1e-9), _last(high, step) + 1))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    ticks = tuple(i * step for i in range(first, last + 1))
     scale = scale_for(max(abs(low), abs(high)), unit)
     return Axis(low, high, start, end, ticks, scale, f"{quantity_words(name)}{_bracket(scale)}")
 
@@ -143,10 +144,6 @@ def _step(rough: float, *, degrees: bool) -> float:
         return next(step for step in _ANGLE_STEPS if step >= rough)
     decade = 10.0 ** math.floor(math.log10(rough))
     return decade * next(step for step in _STEPS if step * decade >= rough * (1 - 1e-9))
-
-
-def _last(high: float, step: float) -> int:
-    return math.floor(high / step + 1e-9)
 
 
 def _decimals(number: float) -> int:
