@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.io.mcap.leaf import Leaf, Wanted, spread
+from pipeline.io.mcap.leaf import Leaf, Wanted, by_message, runs_of
 from pipeline.io.mcap.messages import Batch
 from pipeline.io.mcap.ros2msg import Field
 from pipeline.io.mcap.walk import Bytes, Integers, view_at_every_byte
@@ -22,7 +22,6 @@ from pipeline.records.errors import CaptureError
 
 _ENCAPSULATION = 4
 _PADDING = 8
-_SLICES_FROM = 32
 _MAX_ELEMENTS = 4096
 _KINDS = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
 """Representation identifier: byte order, and the largest alignment (CDR1 8, CDR2 4)."""
@@ -150,13 +149,8 @@ class _Pass:
             if not pieces:
                 leaves[name] = Leaf(np.empty(0), np.zeros(self.origin.size, np.int64))
                 continue
-            owner = np.concatenate([piece[0] for piece in pieces])
-            values = np.concatenate([piece[1] for piece in pieces])
-            if np.any(owner[1:] < owner[:-1]):
-                order = np.argsort(owner, kind="stable")
-                owner, values = owner[order], values[order]
-            counts = np.bincount(owner, minlength=self.origin.size).astype(np.int64)
-            leaves[name] = Leaf(values, counts, values.ndim == 2)
+            owner, values = (np.concatenate(part) for part in zip(*pieces, strict=True))
+            leaves[name] = by_message(owner, values, self.origin.size, places=values.ndim == 2)
         return leaves
 
     def field(self, part: Field, prefix: str, rows: Integers | None) -> None:
@@ -242,17 +236,7 @@ class _Pass:
             values = self.batch.table(_ENCAPSULATION + first, dtype, each)
             self.whole[prefix + part.name] = Leaf(values, count)
             return
-        if count.sum() >= _SLICES_FROM * max(count.size, 1):
-            values = np.concatenate(
-                [
-                    np.frombuffer(self.buffer, dtype, n, begin)
-                    for n, begin in zip(count.tolist(), start.tolist(), strict=True)
-                    if n
-                ]
-            )
-        else:
-            values = view_at_every_byte(self.raw, dtype)[spread(start, count, width)]
-        self.whole[prefix + part.name] = Leaf(values, count)
+        self.whole[prefix + part.name] = Leaf(runs_of(self.buffer, dtype, start, count), count)
 
     def elements(self, part: Field, prefix: str, rows: Integers | None) -> None:
         """An array of messages or strings, element by element over all messages at once."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 from pipeline.io.mcap.messages import Batch
 from pipeline.records.errors import CaptureError
@@ -39,7 +38,7 @@ def of_first_message(
     while refused - sound > 1:
         middle = (sound + refused) // 2
         try:
-            decode(_head(batch, middle))
+            decode(batch.rows(slice(middle)))
         except CaptureError as earlier:
             refused, fault = middle, earlier
         else:
@@ -48,13 +47,3 @@ def of_first_message(
     seconds = (int(batch.log_time[sound]) - first_ns) * NANOSECOND_S
     message = f"{fault.message} (message {number}, {seconds:.9g} s after the first of the file)"
     return CaptureError(fault.code, message, fault.remedy, (number, number))
-
-
-def _head(batch: Batch, count: int) -> Batch:
-    return replace(
-        batch,
-        start=batch.start[:count],
-        length=batch.length[:count],
-        channel=batch.channel[:count],
-        log_time=batch.log_time[:count],
-    )

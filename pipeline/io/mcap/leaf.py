@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.io.mcap.messages import Batch
-from pipeline.io.mcap.walk import Integers
+from pipeline.io.mcap.walk import Integers, view_at_every_byte
 
 Wanted = Callable[[str], bool]
 """Whether a field, by its dotted name, is worth decoding."""
+_SLICES_FROM = 32
+"""Numbers a run on average, from which on slices are faster than places."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,51 @@ class Decoder(Protocol):
 
         """
         ...
+
+
+def by_message(
+    whose: Integers, values: NDArray[Any], messages: int, *, places: bool = False
+) -> Leaf:
+    """The items of an array field, put in message order.
+
+    Parameters
+    ----------
+    whose
+        Number of each item's message [items].
+    values
+        The items.
+    messages
+        How many messages there are.
+    places
+        Whether the items are places of strings.
+
+    """
+    if np.any(whose[1:] < whose[:-1]):
+        order = np.argsort(whose, kind="stable")
+        whose, values = whose[order], values[order]
+    return Leaf(values, np.bincount(whose, minlength=messages).astype(np.int64), places)
+
+
+def runs_of(buffer: bytes, dtype: str, start: Integers, count: Integers) -> NDArray[Any]:
+    """The numbers of runs of bytes, one run after the other.
+
+    Parameters
+    ----------
+    buffer
+        All bytes.
+    dtype
+        Of the numbers.
+    start
+        First byte of each run [runs].
+    count
+        Numbers in each run [runs].
+
+    """
+    if count.sum() < _SLICES_FROM * max(count.size, 1):
+        width = np.dtype(dtype).itemsize
+        return view_at_every_byte(buffer, dtype)[spread(start, count, width)]
+    runs = zip(count.tolist(), start.tolist(), strict=True)
+    return np.concatenate([np.frombuffer(buffer, dtype, n, at) for n, at in runs if n])
 
 
 def spread(start: Integers, count: Integers, width: int) -> Integers:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -116,15 +116,19 @@ class Batch:
         if self.stride and int(self.channel[0]) in channels:
             return self
         keep = np.isin(self.channel, channels)
-        if keep.all():
-            return self
-        return Batch(
-            self.buffer,
-            self.start[keep],
-            self.length[keep],
-            self.channel[keep],
-            self.log_time[keep],
-        )
+        return self if keep.all() else replace(self.rows(keep), stride=0)
+
+    def rows(self, which: NDArray[np.bool_] | slice) -> Batch:
+        """Some of the messages, in file order.
+
+        Parameters
+        ----------
+        which
+            A mask or a slice of the messages; one that keeps gaps keeps no stride.
+
+        """
+        names = ("start", "length", "channel", "log_time")
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
 
 
 def batches(layout: Layout) -> Iterator[Batch]:

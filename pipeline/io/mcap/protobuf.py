@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.io.mcap.leaf import Leaf, Wanted, spread
+from pipeline.io.mcap.leaf import Leaf, Wanted, by_message, runs_of, spread
 from pipeline.io.mcap.messages import Batch
 from pipeline.io.mcap.protobuf_plan import FIXED32, FIXED64, LENGTH, VARINT, Message, Scalar
 from pipeline.io.mcap.protobuf_rows import even_shape, shaped_rows
@@ -20,7 +20,6 @@ from pipeline.io.mcap.walk import Bytes, Integers, view_at_every_byte
 from pipeline.records.errors import CaptureError
 
 _RUN_AFTER = 16
-_SLICES_FROM = 32
 _WIDTH = {FIXED64: 8, FIXED32: 4}
 
 
@@ -331,11 +330,7 @@ class _Pass:
         if not pieces:
             empty = np.empty(0, _storage(part.dtype))
             return Leaf(empty, np.zeros(rows, np.int64))
-        whose, values = np.concatenate(owners), np.concatenate(pieces)
-        if np.any(whose[1:] < whose[:-1]):
-            order = np.argsort(whose, kind="stable")
-            whose, values = whose[order], values[order]
-        return Leaf(values, np.bincount(whose, minlength=rows).astype(np.int64))
+        return by_message(np.concatenate(owners), np.concatenate(pieces), rows)
 
     def packed(
         self, part: Scalar, start: Integers, extent: Integers
@@ -347,15 +342,7 @@ class _Pass:
         if np.any(extent % width):
             raise _bad("has a packed array that ends inside an item")
         count: Integers = extent // width
-        if count.sum() >= _SLICES_FROM * max(count.size, 1):
-            slices = [
-                np.frombuffer(self.buffer, part.dtype, n, at)
-                for n, at in zip(count.tolist(), start.tolist(), strict=True)
-                if n
-            ]
-            return count, np.concatenate(slices)
-        places = spread(start, count, width)
-        return count, view_at_every_byte(self.raw, part.dtype)[places]
+        return count, runs_of(self.buffer, part.dtype, start, count)
 
     def packed_varints(
         self, part: Scalar, start: Integers, extent: Integers

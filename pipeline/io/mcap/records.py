@@ -229,19 +229,8 @@ def chunk_index(fields: Fields) -> ChunkIndex:
 
     """
     start_time, end_time, offset, length = (fields.u64() for _ in range(4))
-    places = tuple(sorted(fields.counts()))
-    index_length, compression = fields.u64(), fields.text()
-    return ChunkIndex(
-        start_time,
-        end_time,
-        offset,
-        length,
-        places,
-        index_length,
-        compression,
-        fields.u64(),
-        fields.u64(),
-    )
+    head = start_time, end_time, offset, length, tuple(sorted(fields.counts()))
+    return ChunkIndex(*head, fields.u64(), fields.text(), fields.u64(), fields.u64())
 
 
 def attachment(fields: Fields, offset: int, length: int) -> Located:
@@ -314,18 +303,6 @@ def statistics(fields: Fields) -> Statistics:
         Of the record.
 
     """
-    messages, schemas = fields.u64(), fields.u16()
-    channels, attachments, metadata_count, chunks = (fields.u32() for _ in range(4))
-    start_time, end_time = fields.u64(), fields.u64()
-    per_channel = tuple(sorted(fields.counts()))
-    return Statistics(
-        messages,
-        schemas,
-        channels,
-        attachments,
-        metadata_count,
-        chunks,
-        start_time,
-        end_time,
-        per_channel,
-    )
+    counts = fields.u64(), fields.u16(), fields.u32(), fields.u32(), fields.u32(), fields.u32()
+    times = fields.u64(), fields.u64()
+    return Statistics(*counts, *times, tuple(sorted(fields.counts())))
