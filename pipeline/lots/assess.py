@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -284,15 +284,17 @@ def _each(groups: Mapping[str, Sequence[float]]) -> float:
 def _shares(values: Sequence[Value], groups: Groups) -> dict[str, float]:
     """Share of each station in the candidate's mean less that in the baseline's."""
     shares: dict[str, float] = {}
-    for sign, side, lots in (
-        (1.0, "candidate", groups.candidate),
-        (-1.0, "baseline", groups.base),
-    ):
+    for value, part in _parts(values, groups):
+        shares[label(value)] = shares.get(label(value), 0.0) + part
+    return shares
+
+
+def _parts(values: Sequence[Value], groups: Groups) -> Iterator[tuple[Value, float]]:
+    """What each value counts in the candidate's mean of lot means less the baseline's."""
+    for sign, side, lots in ((1.0, "candidate", groups.candidate), (-1.0, "baseline", groups.base)):
         for value in values:
             if value.side == side and value.lot in lots:
-                part = sign / (len(lots) * len(lots[value.lot]))
-                shares[label(value)] = shares.get(label(value), 0.0) + part
-    return shares
+                yield value, sign / (len(lots) * len(lots[value.lot]))
 
 
 def _corrected_stations(shares: Mapping[str, float]) -> list[str]:
@@ -308,15 +310,8 @@ def _u_shared(values: Sequence[Value], groups: Groups, corrected: frozenset[str]
     """
     gone = {station for joined in corrected for station in joined.split("+")}
     sums: dict[str, float] = {}
-    for sign, side, lots in (
-        (1.0, "candidate", groups.candidate),
-        (-1.0, "baseline", groups.base),
-    ):
-        for value in values:
-            if value.side != side or value.lot not in lots:
-                continue
-            part = sign / (len(lots) * len(lots[value.lot]))
-            for source, u in value.shared.items():
-                if source.rpartition("@")[2] not in gone:
-                    sums[source] = sums.get(source, 0.0) + part * u
+    for value, part in _parts(values, groups):
+        for source, u in value.shared.items():
+            if source.rpartition("@")[2] not in gone:
+                sums[source] = sums.get(source, 0.0) + part * u
     return math.sqrt(sum(total**2 for total in sums.values()))
