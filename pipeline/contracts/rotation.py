@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES
+from pipeline.numerics.integrals import trapezoid
 from pipeline.physics.frames import space_vector
 from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Array, Capture
@@ -41,26 +42,6 @@ class Turning:
     top_hz: float
 
 
-def integral(t_s: Array, rate: Array) -> Array:
-    """Running integral of a rate by the trapezoidal rule.
-
-    Parameters
-    ----------
-    t_s
-        Instants [n].
-    rate
-        [n, unit/s].
-
-    Returns
-    -------
-    array [n]
-        From 0 [unit].
-
-    """
-    steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(t_s)
-    return np.concatenate(([0.0], np.cumsum(steps)))
-
-
 def shaft_angle(capture: Capture, t_s: Array) -> Array | None:
     """Angle of the shaft on another clock.
 
@@ -87,7 +68,7 @@ def shaft_angle(capture: Capture, t_s: Array) -> Array | None:
             if np.count_nonzero(finite) < 2:
                 continue
             clock, values = clock[finite], values[finite]
-            angle = values if name == "theta_mech_rad" else integral(clock, values)
+            angle = values if name == "theta_mech_rad" else trapezoid(clock, values)
             return np.interp(t_s, clock, angle, left=np.nan, right=np.nan)
     return None
 

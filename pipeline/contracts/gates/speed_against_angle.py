@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed, warning
-from pipeline.contracts.rotation import integral
 from pipeline.contracts.waveform import Array, noise_of
+from pipeline.numerics.integrals import trapezoid
 from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
@@ -101,7 +101,7 @@ def speed_over_angle(capture: Capture, turns: float) -> tuple[float, float] | No
         edges = np.linspace(0, rows.shape[0] - 1, BLOCKS + 1).astype(int)
         t_s, theta = _without_pauses(rows[:, 0], rows[:, 1], capture.meta.pause_s)
         by_angle = np.diff(theta[edges])
-        by_speed = np.diff(integral(t_s, rows[:, 2])[edges])
+        by_speed = np.diff(trapezoid(t_s, rows[:, 2])[edges])
         if max(np.abs(by_angle).sum(), np.abs(by_speed).sum()) < turns * TURN_RAD:
             continue
         if np.abs(by_angle).sum() < turns * TURN_RAD and is_noise(rows[:, 2]):

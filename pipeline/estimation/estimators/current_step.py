@@ -43,6 +43,7 @@ from pipeline.estimation.electrical.terminals import PAIRS, UNALIGNED
 from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import unstated_note
+from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import decimated
 from pipeline.physics.windings import unaligned_inductances_h
@@ -275,8 +276,7 @@ def _chord(record: StepRecord, drive: Drive) -> float:
     edges_s = drive.edges_s[0]
     areas = np.concatenate([[0.0], np.cumsum(drive.levels_v[0] * np.diff(edges_s))])
     volts = np.interp(record.t_s, edges_s, areas)
-    mean = 0.5 * (record.i_a[1:] + record.i_a[:-1])
-    amps = np.concatenate([[0.0], np.cumsum(mean * np.diff(record.t_s))])
+    amps = trapezoid(record.t_s, record.i_a)
     design = np.column_stack([volts, amps, np.ones(volts.size)])
     fit = linear_fit(design, record.i_a, 1.0 / np.sqrt(record.count))
     return 1.0 / float(fit.coefficients[0]) if fit.coefficients[0] != 0.0 else math.nan

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.integrals import trapezoid
 from pipeline.physics.machine import DqMeans, air_gap_torque, dq_voltages
 from pipeline.records.capture import Array, Capture
 from pipeline.records.datasheet import Datasheet
@@ -43,9 +44,7 @@ class _Windows:
 
     def mean(self, values: Array) -> Array:
         """Trapezoidal means [w] of samples [n]."""
-        steps = 0.5 * (values[1:] + values[:-1]) * np.diff(self.t_s)
-        total = np.concatenate([[0.0], np.cumsum(steps)])[self.edges]
-        return np.diff(total) / np.diff(self.t_s[self.edges])
+        return np.diff(trapezoid(self.t_s, values)[self.edges]) / np.diff(self.t_s[self.edges])
 
     def rate(self, values: Array) -> Array:
         """Rates [w, 1/s] from the ends of the windows; no derivative is taken."""

@@ -12,9 +12,7 @@ import pytest
 from pipeline.contracts.gates import (
     speed_against_angle,
 )
-from pipeline.contracts.rotation import (
-    integral,
-)
+from pipeline.numerics.integrals import trapezoid
 from tests.unit.contracts.test_gate_limits import TURN, capture, noise, said
 
 
@@ -89,7 +87,7 @@ def test_noise_of_a_resting_speed_is_no_motion() -> None:
     white -= white.mean()
     t_s = np.arange(4000) * 0.05
     resting = capture("drive", t_s=t_s, theta_mech_rad=np.zeros(4000), omega_mech_rad_s=white)
-    assert np.abs(integral(t_s, white)).max() > TURN
+    assert np.abs(trapezoid(t_s, white)).max() > TURN
     assert over_angle(resting) is None
     angle = 1.0 * t_s
     moving = capture("drive", t_s=t_s, theta_mech_rad=angle, omega_mech_rad_s=white)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from pipeline.contracts.rotation import (
-    integral,
     line_voltage_vector,
     shaft_angle,
     turned_rad,
     turning,
 )
+from pipeline.numerics.integrals import trapezoid
 from tests.unit.contracts.signals import VOLTS, turned
 from tests.unit.contracts.test_gate_limits import TURN, capture
 
@@ -39,7 +39,7 @@ def test_an_angle_on_another_clock_and_a_speed_instead() -> None:
     assert np.isnan(shaft_angle(made, np.array([-0.1, 4.1]))).all()
     speed = capture("drive", t_s=t, omega_mech_rad_s=np.array([1.0, 3.0, 3.0, 1.0]))
     assert shaft_angle(speed, t) == pytest.approx([0.0, 2.0, 8.0, 10.0])
-    assert integral(t, np.array([1.0, 3.0, 3.0, 1.0])) == pytest.approx([0.0, 2.0, 8.0, 10.0])
+    assert trapezoid(t, np.array([1.0, 3.0, 3.0, 1.0])) == pytest.approx([0.0, 2.0, 8.0, 10.0])
     assert turned_rad(speed) == pytest.approx(10.0)
     assert turned_rad(capture("drive", theta_mech_rad=-angle)) == pytest.approx(7.0)
     assert turned_rad(capture("drive", iq_a=t)) is None
