@@ -7,7 +7,7 @@ ignores: `autocorrelation_time` says how many samples count as one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -139,6 +139,41 @@ def linear_fit(design: Array, y: Array, sigma: Array | float | None = None) -> L
     sizes = max(float(np.linalg.norm(y * weight)), 1e-300) / scale
     rank = int(keep.sum())
     return LinearFit(coefficients, covariance, residuals, dof, rank, chi2_dof, rows, sizes)
+
+
+def fit_by_groups(
+    design: Array, y: Array, groups: Sequence[NDArray[np.bool_]], rounds: int, *, alone: bool = True
+) -> tuple[LinearFit, Array]:
+    """A weighted fit whose groups of rows have each the standard deviation that it leaves of them.
+
+    Parameters
+    ----------
+    design : array [n, k]
+        Columns of the model.
+    y : array [n]
+        What they explain.
+    groups
+        Rows [n] of each group.
+    rounds
+        How often the fit and the standard deviations are made of each other.
+    alone
+        Whether each group begins with what a fit of its own leaves, so that the better one leads.
+
+    Returns
+    -------
+    fit, sigma [n]
+        The last fit, and the standard deviation of each row by what it left [unit of y].
+
+    """
+    sigma, floor = np.ones(y.size), max(1e-6 * float(np.std(y)), 1e-300)
+    for rows in groups if alone else ():
+        residuals = linear_fit(design[rows], y[rows]).residuals
+        sigma[rows] = max(float(np.sqrt(np.mean(residuals**2))), floor)
+    for _ in range(rounds):
+        fit = linear_fit(design, y, sigma)
+        for rows in groups:
+            sigma[rows] = max(float(np.sqrt(np.mean(fit.residuals[rows] ** 2))), floor)
+    return fit, sigma
 
 
 def autocorrelation_time(residuals: Array, longest: int | None = None) -> float:

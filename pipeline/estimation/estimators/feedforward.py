@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.estimation.mechanical.shaft_rows import quiet_windows
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -26,10 +27,9 @@ from pipeline.estimation.uncertainty.regimes import (
     scatter,
     signs,
 )
-from pipeline.numerics.least_squares import LinearFit, linear_fit
-from pipeline.numerics.plateaus import noise_about_cubics
+from pipeline.numerics.least_squares import LinearFit, fit_by_groups, linear_fit
 from pipeline.numerics.shaft_log import shaft_log
-from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
+from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
@@ -198,24 +198,11 @@ def _part(capture: Capture) -> Part | None:
     if log is None or log.t_s.size < 3 * LEAST_SAMPLES:
         return None
     try:
-        weak, quiet = _windows(log.t_s, log.theta_rad, log.period_s)
+        weak, quiet = quiet_windows(log.t_s, log.theta_rad, 1.5 * LEAST_SAMPLES * log.period_s)
         speed = smooth_speed(log.t_s, log.theta_rad, max(0.005, 10.0 * log.period_s))
     except ValueError:
         return None
     return Part(capture, log.t_s, log.data["vq_v"], log.theta_rad, speed, weak, quiet)
-
-
-def _windows(t_s: Array, theta_rad: Array, period_s: float) -> tuple[WeakRows, bool]:
-    """The shortest windows in which the angle's noise is quiet beside the acceleration."""
-    limits = policy().shaft_rows
-    sigma, shortest = noise_about_cubics(t_s, theta_rad), 1.5 * LEAST_SAMPLES * period_s
-    slower = max(1.0, shortest / limits.drive_windows_s[0])
-    for usual in limits.drive_windows_s:
-        weak = weak_rows(t_s, slower * usual, limits.overlap)
-        noise = sigma * weak.noise_gain(2)
-        if noise < limits.quiet_share * float(np.std(weak.integral(theta_rad, 2))):
-            return weak, True
-    return weak, False
 
 
 def _rows(parts: Sequence[Part], delay_s: float, columns: Sequence[int]) -> Rows:
@@ -237,14 +224,8 @@ def _rows(parts: Sequence[Part], delay_s: float, columns: Sequence[int]) -> Rows
 
 def _noise_v(rows: Rows) -> Array:
     """Standard deviation [w] of each row: one a log, by what a fit of all leaves of it."""
-    sigma = np.ones(rows.voltage_v.size)
-    floor = max(1e-6 * float(np.std(rows.voltage_v)), 1e-300)
-    for _ in range(3):
-        residuals = linear_fit(rows.design, rows.voltage_v, sigma).residuals
-        for index in np.unique(rows.capture):
-            in_capture = rows.capture == index
-            sigma[in_capture] = max(float(np.sqrt(np.mean(residuals[in_capture] ** 2))), floor)
-    return sigma
+    captures = [rows.capture == index for index in np.unique(rows.capture)]
+    return fit_by_groups(rows.design, rows.voltage_v, captures, 3, alone=False)[1]
 
 
 def _partitions(rows: Rows, paths: Sequence[str], weights: Array) -> list[Partition]:

@@ -22,7 +22,13 @@ from pipeline.estimation.mechanical.shaft_nuisances import OF_CURRENT, TIMING
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.estimation.policy import policy
 from pipeline.numerics.clusters import cluster_covariance
-from pipeline.numerics.least_squares import Array, LinearFit, autocorrelation_time, linear_fit
+from pipeline.numerics.least_squares import (
+    Array,
+    LinearFit,
+    autocorrelation_time,
+    fit_by_groups,
+    linear_fit,
+)
 from pipeline.numerics.selection import needed_columns
 
 _UNSUPPORTED = (
@@ -178,21 +184,8 @@ def _covariance(rows: ShaftRows, design: Array, fit: LinearFit, sigma: Array) ->
 
 
 def _row_sigma(rows: ShaftRows, design: Array, y: Array) -> Array:
-    """Standard deviation [w] of each row: one for drives, one for coast-downs, from the fit.
-
-    Each kind starts from what a fit of its own leaves, so that the better one leads.
-    """
-    sigma = np.ones(y.size)
-    floor = max(1e-6 * float(np.std(y)), 1e-300)
-    kinds = [of_kind for of_kind in (rows.kind == DRIVE, rows.kind == COAST) if np.any(of_kind)]
-    for of_kind in kinds:
-        residuals = linear_fit(design[of_kind], y[of_kind]).residuals
-        sigma[of_kind] = max(float(np.sqrt(np.mean(residuals**2))), floor)
-    for _ in range(3):
-        residuals = linear_fit(design, y, sigma).residuals
-        for of_kind in kinds:
-            sigma[of_kind] = max(float(np.sqrt(np.mean(residuals[of_kind] ** 2))), floor)
-    return sigma
+    """Standard deviation [w] of each row: one for drives, one for coast-downs, from the fit."""
+    return fit_by_groups(design, y, rows.kinds(), 3)[1]
 
 
 def _form_fails(rows: ShaftRows, design: Design, curve: Design, y: Array, level: float) -> bool:

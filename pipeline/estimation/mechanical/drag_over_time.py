@@ -18,13 +18,13 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from pipeline.estimation.mechanical.drag_forms import CURVE
-from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
+from pipeline.estimation.mechanical.shaft_rows import COAST, ShaftRows
 from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import (
     Array,
     LinearFit,
     autocorrelation_time,
-    linear_fit,
+    fit_by_groups,
 )
 from pipeline.numerics.shaft_log import motion_column
 from pipeline.records.uncertainty import BETWEEN, Contribution
@@ -194,16 +194,7 @@ class _Ranked:
 
     @classmethod
     def of(cls, rows: ShaftRows, design: Array, y: Array) -> _Ranked:
-        floor = max(1e-6 * float(np.std(y)), 1e-300)
-        kinds = [k for k in (rows.kind == DRIVE, rows.kind == COAST) if np.any(k)]
-        sigma = np.ones(y.size)
-        for of_kind in kinds:
-            alone = linear_fit(design[of_kind], y[of_kind]).residuals
-            sigma[of_kind] = max(float(np.sqrt(np.mean(alone**2))), floor)
-        for _ in range(4):
-            fit = linear_fit(design, y, sigma)
-            for of_kind in kinds:
-                sigma[of_kind] = max(float(np.sqrt(np.mean(fit.residuals[of_kind] ** 2))), floor)
+        fit, sigma = fit_by_groups(design, y, rows.kinds(), 4)
         return cls(fit, sigma, float(2.0 * np.sum(np.log(sigma))), design.shape[1])
 
     def memory(self) -> float:

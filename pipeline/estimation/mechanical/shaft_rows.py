@@ -97,6 +97,10 @@ class ShaftRows:
         """Number of rows."""
         return int(self.sense.size)
 
+    def kinds(self) -> list[NDArray[np.bool_]]:
+        """Rows [w] of the drives and of the coast-downs, of those that there are."""
+        return [rows for rows in (self.kind == DRIVE, self.kind == COAST) if np.any(rows)]
+
     def disjoint(self, kind: int) -> int:
         """How many windows of a kind share no sample with another.
 
@@ -233,9 +237,7 @@ def _ripple(capture: Capture, winding: Winding | None, speed: Array) -> tuple[Ar
 
 
 def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
-    """Windows long enough for the encoder's noise to be a fiftieth of the acceleration, and for
-    the samples that a window needs.
-    """
+    """Windows of a coast, a share of it; of a drive, the shortest that are quiet."""
     if kind == COAST:
         share = policy().shaft_rows.coast_share * float(t_s[-1] - t_s[0])
         return weak_rows(
@@ -246,15 +248,34 @@ def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
             ),
             policy().shaft_rows.overlap,
         )
+    least_s = (LEAST_SAMPLES + 1) * float(np.median(np.diff(t_s)))
+    return quiet_windows(t_s, theta_rad, least_s)[0]
+
+
+def quiet_windows(t_s: Array, theta_rad: Array, least_s: float) -> tuple[WeakRows, bool]:
+    """The shortest windows in which the encoder's noise is a fiftieth of the acceleration.
+
+    Parameters
+    ----------
+    t_s, theta_rad
+        Time [n, s] and angle of the shaft [n, rad].
+    least_s
+        What the samples that a window needs take [s].
+
+    Returns
+    -------
+    windows, quiet
+        The longest that are tried, and False, where none are quiet.
+
+    """
     sigma, limits = noise_about_cubics(t_s, theta_rad), policy().shaft_rows
-    least = (LEAST_SAMPLES + 1) * float(np.median(np.diff(t_s)))
-    slower = max(1.0, least / limits.drive_windows_s[0])
+    slower = max(1.0, least_s / limits.drive_windows_s[0])
     for usual in limits.drive_windows_s:
         weak = weak_rows(t_s, slower * usual, limits.overlap)
         noise = sigma * weak.noise_gain(2)
         if noise < limits.quiet_share * float(np.std(weak.integral(theta_rad, 2))):
-            break
-    return weak
+            return weak, True
+    return weak, False
 
 
 def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:
