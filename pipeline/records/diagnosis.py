@@ -188,11 +188,8 @@ class StepRecord(PlainRecord):
             None where there is none of just these variables.
 
         """
-        for one in self.maps:
-            axes = (one.x.variable,) if one.y is None else (one.x.variable, one.y.variable)
-            if one.signal == signal and axes == variables:
-                return one
-        return None
+        maps = (m for m in self.maps if m.signal == signal and m.variables == variables)
+        return next(maps, None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,6 +71,11 @@ class ErrorMap(PlainRecord):
     p_map: ShareOrNull
 
     @property
+    def variables(self) -> tuple[str, ...]:
+        """The one variable, or those of x and y."""
+        return tuple(bins.variable for bins in (self.x, self.y) if bins is not None)
+
+    @property
     def reach(self) -> float:
         """The largest mean, without its sign [unit]; 0 where no cell has one."""
         finite = np.abs(self.mean[np.isfinite(self.mean)])

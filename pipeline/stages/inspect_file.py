@@ -90,9 +90,7 @@ def render(report: InspectReport) -> str:
         lines.append("in the form of the contract: no source map is needed")
     lines += [f"  {key}: {value}" for key, value in report.metadata]
     for stream in report.streams:
-        rate = "" if stream.rate_hz is None else f", {stream.rate_hz:.6g} Hz"
-        clock = f" ({stream.clock})" if stream.clock else ""
-        lines.append(f"{stream.name}: {counted(stream.rows, 'row')}{rate}{clock}")
+        lines.append(f"{stream.name}: {counted(stream.rows, 'row')}{stream.pace}")
         lines += [f"  {field_line(seen)}" for seen in stream.fields]
     if report.streams:
         when = "tests, once a source map reads it" if report.starter else "tests"

@@ -6,7 +6,7 @@ import shlex
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from pipeline.execution.jobs import OfFile
 from pipeline.execution.tasks.inspect_tasks import InspectTask, Looked, in_workers, look_into
 from pipeline.io.ingest.files import list_files, size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading
-from pipeline.io.ingest.metadata import MANIFEST, SIDECAR_SUFFIX
+from pipeline.io.ingest.metadata import is_about_others
 from pipeline.io.storage.publish import write_whole
 from pipeline.physics.glossary import METADATA, OHMMETER, TESTS_WITHOUT_CLOCK
 from pipeline.records.errors import CaptureError, UsageError
@@ -73,11 +73,7 @@ def folder(settings: InspectSettings) -> Outcome:
         The keys of `inspect`.
 
     """
-    paths = [
-        path
-        for path in list_files(Path(settings.file)).paths
-        if PurePosixPath(path).name != MANIFEST and not path.endswith(SIDECAR_SUFFIX)
-    ]
+    paths = [path for path in list_files(Path(settings.file)).paths if not is_about_others(path)]
     if not paths:
         raise UsageError(f"{settings.file} holds no files", "name a folder of recordings")
     limits = _read_limits(settings)
@@ -240,9 +236,7 @@ def _shape_lines(groups: Sequence[tuple[Shape, list[str]]], names: NamePatterns)
         more = f" and {len(files) - 8} more" if len(files) > 8 else ""
         lines.append(f"shape {number}: {counted(len(files), 'file')} ({listed}{more})")
         for stream in shape.streams:
-            rate = "" if stream.rate_hz is None else f", {stream.rate_hz:.6g} Hz"
-            clock = f" ({stream.clock})" if stream.clock else ""
-            lines.append(f"  {counted(stream.rows, 'row')} in the first{rate}{clock}")
+            lines.append(f"  {counted(stream.rows, 'row')} in the first{stream.pace}")
             lines += [f"    {field_line(seen)}" for seen in stream.fields]
             lines += part_lines(stream.parts)
     if names.keys:

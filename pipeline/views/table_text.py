@@ -23,6 +23,20 @@ def safe(text: str) -> str:
     )
 
 
+def shortened(text: str, most: int) -> str:
+    """A text of so many characters at most, cut at its end.
+
+    Parameters
+    ----------
+    text
+        The text.
+    most
+        Characters, the ellipsis counted.
+
+    """
+    return text if len(text) <= most else f"{text[: most - 1]}…"
+
+
 def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
     """Columns of text, left-aligned but for those named.
 

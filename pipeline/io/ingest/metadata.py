@@ -19,6 +19,20 @@ from pipeline.records.stated import may_be_stated
 
 MANIFEST = "manifest.csv"
 SIDECAR_SUFFIX = ".meta.yaml"
+
+
+def is_about_others(path: str) -> bool:
+    """Whether a file holds metadata of other files.
+
+    Parameters
+    ----------
+    path
+        Its path.
+
+    """
+    return PurePosixPath(path).name == MANIFEST or path.endswith(SIDECAR_SUFFIX)
+
+
 CONTRACT_VERSION = "1"
 MAX_MANIFEST_BYTES = 2**22
 MAX_SIDECAR_BYTES = 2**17

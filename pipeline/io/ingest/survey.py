@@ -19,6 +19,7 @@ from pipeline.io.ingest.metadata import (
     MANIFEST,
     MAX_MANIFEST_BYTES,
     SIDECAR_SUFFIX,
+    is_about_others,
     manifest,
 )
 from pipeline.io.maps.source_map import SourceMap
@@ -91,7 +92,7 @@ def survey(
     questions = [
         Question(path, _sidecar(path, listed), tuple(manifests.get(path, {}).items()))
         for path in listing.paths
-        if PurePosixPath(path).name != MANIFEST and not path.endswith(SIDECAR_SUFFIX)
+        if not is_about_others(path)
     ]
     if ask is None:
         answers: Sequence[Answer] = [

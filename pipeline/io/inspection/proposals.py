@@ -64,6 +64,12 @@ class StreamSeen:
     clock: str = ""
     parts: tuple[PartSeen, ...] = ()
 
+    @property
+    def pace(self) -> str:
+        """Rate and clock behind a number of rows, as far as they are known."""
+        rate = "" if self.rate_hz is None else f", {self.rate_hz:.6g} Hz"
+        return f"{rate} ({self.clock})" if self.clock else rate
+
 
 def answer_key(name: str) -> str:
     """The name of a field as it is written in an answer, such as `unit.Motor_Strom=A`.

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from pipeline.report.charts.svg import line, picture, text
 from pipeline.views.names import quantity_words
+from pipeline.views.table_text import shortened
 
 WIDTH, HEIGHT, LEFT, TOP, BOTTOM = 760.0, 250.0, 56.0, 22.0, 44.0
 LABEL_PITCH, COLOURS = 14.0, 6
@@ -36,7 +37,7 @@ def step_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
     low = min(math.floor(math.log10(min(finite)) * 2) / 2, -0.5)
     high = max(math.ceil(math.log10(max(finite)) * 2) / 2, 0.5)
     bottom = TOP + HEIGHT
-    ends = {name: _short(quantity_words(name)) for name in over}
+    ends = {name: shortened(quantity_words(name), LONGEST) for name in over}
     right = WIDTH - 24.0 - END_LETTER * max(map(len, ends.values()))
 
     def y(value: float) -> float:
@@ -68,10 +69,6 @@ def step_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
     title = text("title", 2, 12, "held-out error over noise floor")
     floor = text("tick", LEFT + 8, y(1.0) + 14, "noise floor")
     return picture("ladder", WIDTH, bottom + BOTTOM, words, title, floor, *parts)
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 
 
 def _levels(names: Sequence[str], wide: float) -> int:

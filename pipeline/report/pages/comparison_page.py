@@ -10,7 +10,6 @@ import numpy as np
 
 from pipeline.records.comparison import Comparison, Trace
 from pipeline.records.comparison_history import Earlier
-from pipeline.records.error_map import ErrorMap
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.charts.chart import chart
 from pipeline.report.charts.heatmap import angle_bars, heatmap
@@ -67,21 +66,13 @@ def _maps(result: Comparison) -> list[Figure]:
     pictures = []
     for signal in dict.fromkeys(one.signal for one in result.maps):
         own = [one for one in result.maps if one.signal == signal]
-        flat = next((one for one in own if _axes(one) == (SPEED, CURRENT)), None)
-        turn = next((one for one in own if _axes(one) == (angle_of(signal),)), None)
+        flat = next((one for one in own if one.variables == (SPEED, CURRENT)), None)
+        turn = next((one for one in own if one.variables == (angle_of(signal),)), None)
         svg = "" if flat is None else heatmap(flat, flat.reach)
         svg += "" if turn is None else angle_bars(turn, turn.reach)
         if svg:
             pictures.append(Figure(quantity_words(signal), "mean error", "", svg))
     return pictures
-
-
-def _axes(error_map: ErrorMap) -> tuple[str, ...]:
-    return (
-        (error_map.x.variable,)
-        if error_map.y is None
-        else (error_map.x.variable, error_map.y.variable)
-    )
 
 
 def _worst_traces(result: Comparison) -> list[Trace]:

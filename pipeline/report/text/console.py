@@ -12,7 +12,7 @@ from pipeline.records.naming import counted, printable
 from pipeline.views.fleet import Column, FleetView, MotorRow, fleet_view, lacking_alike
 from pipeline.views.model_words import model_words
 from pipeline.views.status_text import status_lines
-from pipeline.views.table_text import NONE, blocks
+from pipeline.views.table_text import NONE, blocks, shortened
 
 MOST_GROUPS = 5
 """So many lines say what models lack."""
@@ -135,8 +135,8 @@ def _heading(column: Column) -> str:
 def _row(row: MotorRow) -> list[str]:
     sheet = row.sheet
     return [
-        _short(printable(sheet.motor_id)),
-        _short(printable(sheet.lot or NONE)),
+        shortened(printable(sheet.motor_id), LONGEST),
+        shortened(printable(sheet.lot or NONE), LONGEST),
         row.current.status,
         row.model.short.replace("error ", "").removesuffix(" floors"),
         *(cell.reading.value if cell.reading else NONE for cell in row.cells),
@@ -146,7 +146,3 @@ def _row(row: MotorRow) -> list[str]:
 def _spreads(row: MotorRow) -> list[str]:
     readings = (cell.reading for cell in row.cells)
     return [*[""] * 4, *(f"± {r.expanded}" if r and r.expanded else "" for r in readings)]
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
