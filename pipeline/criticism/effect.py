@@ -159,6 +159,7 @@ class Evidence:
     """What shows an effect: `signals` are the capture columns without which it cannot be seen,
     `tests` those that excite it, the best first, and `experiment` the one to record.
 
+    `exact`: its form is a law, of which nothing is left over for another effect to take up.
     `of_phases`: it goes with the electrical angle, which is not known without the pole pairs.
     `alternatives`: other effects, each with the test or calibration that discriminates it from
     this. `rare`: benches seldom have it, so that of two that tie the other is named. `in_place_of`:
@@ -170,6 +171,7 @@ class Evidence:
     experiment: str
     signals: tuple[str, ...] = ()
     rare: bool = False
+    exact: bool = False
     of_phases: bool = False
     in_place_of: tuple[str, str] | None = None
     friction: bool = False

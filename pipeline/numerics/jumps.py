@@ -1,4 +1,4 @@
-"""Jumps of a signal between its samples."""
+"""Jumps of a signal, or of a speed, between samples."""
 
 from __future__ import annotations
 
@@ -37,4 +37,37 @@ def jumps(signal: Array, least: float) -> Array:
         beside = np.median(np.stack([steps[:-2], steps[1:-1], steps[2:]]), axis=0)
         found[1:-1] = steps[1:-1] - beside
     found[np.abs(found) <= least] = 0.0
+    return found
+
+
+def speed_jumps(theta_rad: Array, share: float, times: float) -> NDArray[np.bool_]:
+    """Samples at which a shaft changes its speed from one to the next.
+
+    Parameters
+    ----------
+    theta_rad
+        Angle at even samples [n].
+    share
+        Least change of the speed over the highest [1].
+    times
+        Least change over the usual one [1], so that neither rounding nor a steady acceleration is
+        one.
+
+    Returns
+    -------
+    array [n]
+        What drove the shaft there happened between two samples, and is in none.
+
+    Examples
+    --------
+    >>> speed_jumps(np.array([0.0, 1.0, 2.0, 3.0, 6.0, 9.0, 12.0]), 0.1, 10.0).nonzero()[0]
+    array([3])
+
+    """
+    found = np.zeros(theta_rad.size, dtype=bool)
+    if theta_rad.size > 2:
+        speed = np.diff(theta_rad)
+        change = np.abs(np.diff(speed))
+        least = max(share * float(np.abs(speed).max()), times * float(np.median(change)))
+        found[1:-1] = change > max(least, 1e-300)
     return found

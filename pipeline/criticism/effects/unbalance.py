@@ -16,6 +16,7 @@ EFFECT = Effect(
     words="m g r sin(θ + φ) as a sine and a cosine",
     signature="torque once a turn, whatever the current",
     tests=("cogging",),
+    exact=True,
     experiment="a slow turn without current",
     headline="unbalance, a torque of {sin_nm & cos_nm} once a turn",
     reference="ISO 21940-11:2016, rotor balancing",

@@ -75,6 +75,10 @@ class Cutting:
         5, "samples", "samples of the shortest parabola",
         source="the shortest that leaves less noise than there is",
     )  # fmt: skip
+    jump_share: float = chosen(
+        0.1, "1", "of the highest speed, by which a speed that jumps changes between two samples",
+        why="less is as much in the samples as between them",
+    )  # fmt: skip
     held_s: float = chosen(
         1.0, "s", "time in which a speed that is held scatters no more than its noise, at the most",
         why="a level of a map is held for some seconds",

@@ -127,8 +127,9 @@ def form_tolerance(
     """
     group, _, valid, groups = row_index(segment)
     total = np.zeros(len(groups))
-    before = residual(segment, model, values) if added else np.zeros(0)
-    for effect in added:
+    inexact = [effect for effect in added if not effect.exact]
+    before = residual(segment, model, values) if inexact else np.zeros(0)
+    for effect in inexact:
         without = residual(segment, model, {**values, **zero(effect, model)})
         power = projected(segment, without - before)[valid] ** 2
         count = np.bincount(group[valid], minlength=len(groups))

@@ -28,7 +28,7 @@ from pipeline.estimation.mechanical.shaft_nuisances import (
 from pipeline.estimation.policy import policy
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
-from pipeline.numerics.jumps import jumps
+from pipeline.numerics.jumps import jumps, speed_jumps
 from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.shaft_log import SPEED, motion_column
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
@@ -132,6 +132,7 @@ class _Part:
     warm: Array
     load: Array
     ripple: tuple[Array, Array]
+    hidden: NDArray[np.bool_]
 
 
 def shaft_rows(
@@ -217,8 +218,16 @@ def _part(capture: Capture, winding: Winding | None) -> _Part | None:
         capture, kind, weak, theta, speed, current, columns.get("id_a", current * 0.0),
         columns.get("temp_magnet_degc", current * 0.0 + 25.0) - 25.0,
         columns.get("torque_shaft_nm", current * 0.0),
-        _ripple(capture, winding, weak.integral(theta, 1)),
+        _ripple(capture, winding, weak.integral(theta, 1)), _hidden(weak, theta, kind),
     )  # fmt: skip
+
+
+def _hidden(weak: WeakRows, theta: Array, kind: int) -> NDArray[np.bool_]:
+    """Windows [w] of a drive in which the speed jumps: what the current did there is in no row."""
+    limits = policy().shaft_rows
+    jumping = speed_jumps(theta, limits.jump_share, limits.jump_sigmas)
+    found: NDArray[np.bool_] = weak.integral(jumping.astype(float)) > 0.0
+    return found if kind == DRIVE else np.zeros(weak.count, dtype=bool)
 
 
 def _ripple(capture: Capture, winding: Winding | None, speed: Array) -> tuple[Array, Array]:
@@ -288,11 +297,14 @@ def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:
 
 
 def _undetermined(part: _Part, fastest: float) -> NDArray[np.bool_]:
-    """Windows [w] in which the shaft may stand, or in which a coast-down is no coast yet."""
+    """Windows [w] in which the shaft may stand, in which its speed jumps from row to row, or in
+    which a coast-down is no coast yet.
+    """
     weak = part.weak
     ends = zip(weak.starts, weak.starts + weak.sizes, strict=True)
     least = np.array([np.min(np.abs(part.speed[a:b])) for a, b in ends])
     slow: NDArray[np.bool_] = least < policy().shaft_rows.slowest_share * fastest
+    slow |= part.hidden
     if part.kind == COAST:
         gaining = weak.integral(part.theta, 2) * weak.integral(part.theta, 1) > 0.0
         slow |= np.convolve(gaining, np.ones(3), mode="same") > 1.5

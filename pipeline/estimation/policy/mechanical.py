@@ -26,6 +26,10 @@ class ShaftRows:
         10.0, "standard deviations of noise", "step of a current from which on it jumps",
         source="steps of white noise have 1.4, and come to five times that; their median as well",
     )  # fmt: skip
+    jump_share: float = chosen(
+        0.03, "1", "of the highest speed, by which a speed that jumps changes from row to row",
+        why="less is as much in the rows as between them",
+    )  # fmt: skip
     coast_share: float = calibrated(
         0.05, "1", "of a coast-down, that a window takes",
         by=TRIED,

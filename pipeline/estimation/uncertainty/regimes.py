@@ -242,6 +242,7 @@ def _of_partition(
         for k in range(len(partition.names))
         if np.sum(labels == k) >= policy().evidence.rows
         and weights[labels == k].sum() >= policy().regimes.least_share
+        and np.any(design[labels == k, column])
     ]
     if len(present) < 2:
         return None

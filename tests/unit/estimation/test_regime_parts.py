@@ -92,3 +92,12 @@ def test_what_regimes_say_has_no_unit(scale: float) -> None:
     assert 0.0 < one.between.p_value < 1.0
     assert same.between.p_value == pytest.approx(one.between.p_value)
     assert same.between.sd == pytest.approx(one.between.sd)
+
+
+def test_a_regime_without_the_column_has_no_value_of_it() -> None:
+    """Coasts have no torque: their viscous friction was read as the inertia of braking."""
+    made, labels = regressed([1.0, 1.0])
+    made.design[labels == 1, 0] = 0.0
+    y = 3.0 + made.design[:, 0] + 0.01 * np.random.default_rng(1).standard_normal(labels.size)
+    made, told = replace(made, y=y), np.full(labels.size, 1.0 / labels.size)
+    assert _of_partition(made, 0, told, Partition("half", labels, ("one", "other"))) is None

@@ -128,3 +128,11 @@ def test_a_coast_of_a_rounded_speed_has_the_law_that_it_has() -> None:
         assert abs(found[name].number - true) < 3.0 * found[name].u
         assert found[name].u < 0.1 * true
     assert "another form" not in found["coast_coulomb_rad_s2"].note
+
+
+def test_a_pendulum_that_swings_out_is_no_coast() -> None:
+    """Each swing passed for one, of fewer rows than a coast of a shaft has."""
+    t = np.arange(0.0, 20.0, 0.05)
+    swing = 1.2 * np.exp(-t / 15.0) * np.cos(2.0 * np.pi * 0.3 * t)
+    found = estimates(ESTIMATOR, capture("spin_down", t_s=t, theta_mech_rad=swing))
+    assert not any(one.known for one in found.values())
