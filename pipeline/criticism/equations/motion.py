@@ -30,8 +30,6 @@ from pipeline.numerics.jumps import speed_jumps
 from pipeline.numerics.projection import projection
 from pipeline.records.capture import Capture
 
-_BESIDE = 3
-"""Samples beside a jump that a window's derivatives reach."""
 TORQUE, RECORDER = "torque_shaft_nm", "log"
 _USED = ("theta_mech_rad", "iq_a", "id_a", "travel_rad", "run", "temp_magnet_degc")
 
@@ -93,7 +91,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 def _about_jumps(theta_rad: Array, policy: Cutting) -> NDArray[np.bool_]:
     """Samples [n] near which the speed jumps: what the current did there is in no sample."""
     jumping = speed_jumps(theta_rad, policy.jump_share, policy.change_u)
-    near: NDArray[np.bool_] = maximum_filter1d(jumping, 2 * _BESIDE + 1)
+    near: NDArray[np.bool_] = maximum_filter1d(jumping, 2 * policy.beside_jump + 1)
     return near
 
 

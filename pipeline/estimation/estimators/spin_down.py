@@ -260,13 +260,9 @@ def _coasts(capture: Capture) -> list[Coast]:
     return [
         _coast(capture.path, t[rows], y[rows], sense, sense * speed[rows], of_angle)
         for rows, sense in coasting_rows(speed)
-        if rows.stop - rows.start >= _least_rows(float(np.ptp(angle[rows])))
+        # a swing of less than a turn may be a pendulum's
+        if rows.stop - rows.start >= LEAST_SAMPLES * (1 if np.ptp(angle[rows]) > math.tau else 3)
     ]
-
-
-def _least_rows(travel_rad: float) -> int:
-    """Rows that a coast has at the least: a swing of less than a turn may be a pendulum's."""
-    return LEAST_SAMPLES if travel_rad > 2.0 * math.pi else 3 * LEAST_SAMPLES
 
 
 def _coast(path: str, t: Array, y: Array, sense: int, speed: Array, of_angle: bool) -> Coast:
