@@ -9,17 +9,20 @@ import numpy as np
 import pytest
 
 import pipeline
+from pipeline.criticism.data.drive_log import drive_log
+from pipeline.criticism.data.unlogged_load import unexplained_share
 from pipeline.criticism.diagnosis import base_fit
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import zero
 from pipeline.criticism.machine.two_masses import far_drag, linear_far_drag, passed_on, reach
 from pipeline.criticism.operating import ShaftState
 from pipeline.criticism.regression.goodness import significant_groups
-from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.discrimination import discriminate
 from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.score_test import Score
+from pipeline.criticism.selection.stepwise import begin_from
 from pipeline.execution.tasks.start import start_constants
 from pipeline.records.comparison import ModelSpec
 from pipeline.simulator.bench import campaign
@@ -42,17 +45,22 @@ VERY_SOFT = {**SOFT, "size": 1.0 / (MOTOR.j_rotor_kgm2 * 0.35 * 0.65 * (2.0 * np
 STICKY = replace(MOTOR, torque_coulomb_nm=0.1 * MOTOR.torque_rated_nm)
 
 
-@cache
-def base(coupled: bool, very: bool = False) -> LinearSystem:
-    """The fit of a rigid shaft to logs of current, voltage and angle, of two masses or of one."""
-    soft = STICKY.having(compliance=VERY_SOFT) if very else MOTOR.having(compliance=SOFT)
-    motor = soft if coupled else MOTOR
+def free_campaign(motor):
+    """A spin and two logs of a shaft without a transducer."""
     whole = campaign_of(campaign(motor, Bench(encoder_bits=15), 8, PLAN))
     captures = [
         replace(one, tables=tuple(t.drop("torque_shaft_nm", strict=False) for t in one.tables))
         for one in whole.captures
     ]
-    free = replace(whole, captures=tuple(captures))
+    return replace(whole, captures=tuple(captures))
+
+
+@cache
+def base(coupled: bool, very: bool = False) -> LinearSystem:
+    """The fit of a rigid shaft to logs of current, voltage and angle, of two masses or of one."""
+    soft = STICKY.having(compliance=VERY_SOFT) if very else MOTOR.having(compliance=SOFT)
+    motor = soft if coupled else MOTOR
+    free = free_campaign(motor)
     fitted = base_fit(free, ModelSpec("standard"), start_constants(free))
     assert not isinstance(fitted, str)
     return fitted.system
@@ -90,6 +98,32 @@ def test_a_very_soft_coupling_passes_on_what_friction_leaves_of_the_torque():
     torque = system.fit.machine.scales["torque_nm"]
     assert twist == pytest.approx(VERY_SOFT["size"] * torque, rel=0.1)
     assert score.candidate.values["compliance.far_friction"] < 0.3
+    begun = begin_from(system.fit, score)
+    assert begun.values["j_kgm2"] == pytest.approx(STICKY.j_rotor_kgm2, rel=0.05)
+
+
+def test_friction_moves_what_a_coupling_passes_on() -> None:
+    """The column of friction is the slope of the residual, that through the coupling included."""
+    fit, effect = base(coupled=True, very=True).fit, effects()["compliance"]
+    torque = fit.machine.scales["torque_nm"]
+    soft = {"compliance.share": 0.35, "compliance.twist_rad": VERY_SOFT["size"] * torque}
+    model = fit.model.with_effects(effect)
+    coupled = replace(fit, model=model).at({**zero(effect, model), **soft})
+    system = linear_system(coupled)
+    for name, step in (("coulomb_friction.torque_nm", 1e-4), ("b_nm_s_rad", 1e-7)):
+        moved = linear_system(coupled.at({name: coupled.values[name] + step}))
+        (place,) = (n for n, c in enumerate(system.columns) if c.name == name)
+        slope = (moved.residual - system.residual) / step
+        assert system.matrix[:, place] == pytest.approx(slope, abs=0.01 * np.abs(slope).max())
+
+
+def test_a_soft_coupling_with_friction_is_no_load_that_nothing_recorded() -> None:
+    """A coupling of 12 Hz was never tried: its motion was taken for that of a load."""
+    machine = base(coupled=True, very=True).fit.machine
+    drives = free_campaign(STICKY.having(compliance=VERY_SOFT)).of("drive")
+    logs = [drive_log(one, machine) for one in drives]
+    shares = [unexplained_share(one, machine) for one in logs if one is not None]
+    assert max(shares) < 1e-3
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,10 @@ from pipeline.criticism.machine.two_masses import (
     spring_twist,
 )
 from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.selection import linear_start
+from pipeline.criticism.selection.candidates import Candidate
 from pipeline.criticism.selection.linear_start import _by_choices
+from pipeline.criticism.selection.score_test import Score
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
@@ -128,3 +132,23 @@ def test_no_two_masses_have_such_parameters(soft, bent):
     x = operating(4)
     undamped = {"torque_s3": 0.0, "angle_s3": 0.0, "far_friction": 0.0}
     assert spring_of({"torque_s2": soft, "angle_s2": bent, **undamped}, BASE, x.machine) is None
+
+
+def test_what_moves_is_counted_from_the_fit_that_there_is(monkeypatch):
+    """By other noise floors the fit without the coupling has another inertia. From its own, a
+    refit began at a thousandth of the inertia that was found.
+    """
+    there, anew, found = ({"j_kgm2": j} for j in (8e-4, 1.2e-3, 3.6e-4))
+    fits = [
+        SimpleNamespace(fit=Fit((), None, values, (), values)) for values in (there, anew, found)
+    ]
+    wide, refitted, end = fits
+    made = Score(Candidate(effects()["compliance"], ()), 30.0, 10.0, {}, {}, 1.0, 2.0, policy=None)
+    monkeypatch.setattr(linear_start, "_reweighted", lambda *_: refitted)
+    monkeypatch.setattr(
+        linear_start,
+        "score_between",
+        lambda base, end, _: replace(made, moves=linear_start._moves(base.fit, end.fit)),
+    )
+    score = linear_start._score_of(wide, made.candidate, end)
+    assert score.moves["j_kgm2"] == pytest.approx(3.6e-4 - 8e-4)
