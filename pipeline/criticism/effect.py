@@ -269,9 +269,7 @@ class Effect(Description, Evidence, Hooks):
         return self.expand(machine) if self.expand is not None else self.parameters
 
     def gone_through(self, machine: Machine) -> bool:
-        """Whether some capture goes through an eighth of a wave of the effect over the angle.
-
-        A parabola leaves 3 per cent of that, and of less soon nothing.
+        """Whether some capture goes through enough of a wave of the effect over the angle.
 
         Parameters
         ----------
@@ -285,7 +283,7 @@ class Effect(Description, Evidence, Hooks):
 
         """
         orders = [p.order for p in self.parameters_of(machine) if p.order]
-        return not orders or max(orders) * machine.travel_turns >= 0.125
+        return not orders or max(orders) * machine.travel_turns >= machine.policy.cutting.least_wave
 
     def dof(self, machine: Machine) -> int:
         """How many parameters are fitted.

@@ -23,8 +23,9 @@ def _torque(x: Operating, q: Values) -> Array:
 EFFECT = Effect(
     name="compliance",
     words="two masses and a spring: a share of J at the far end, behind a twist (reported at the "
-    "machine's torque) by the torque passed on, damping_s late (c/k); between: the transducer is "
-    "in the coupling (1), or beyond it on a dynamometer that gives way (-1)",
+    "machine's torque) by the torque passed on, damping_s late (c/k); far_friction: the part of the "
+    "friction at the far end; between: the transducer is in the coupling (1), or beyond it on a "
+    "dynamometer that gives way (-1)",
     signature="a resonance after torque steps",
     tests=("drive", "torque_map"),
     experiment="torque steps with the angle recorded on the load side as well",

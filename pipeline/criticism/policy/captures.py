@@ -75,6 +75,10 @@ class Cutting:
         5, "samples", "samples of the shortest parabola",
         source="the shortest that leaves less noise than there is",
     )  # fmt: skip
+    least_wave: float = chosen(
+        0.125, "waves", "part of a wave of the angle that a capture goes through for it to be one",
+        why="a parabola leaves 3 per cent of that, and of less soon nothing",
+    )  # fmt: skip
     jump_share: float = chosen(
         0.1, "1", "of the highest speed, by which a speed that jumps changes between two samples",
         why="less is as much in the samples as between them",

@@ -6,8 +6,9 @@ transducer beyond the far part reads,
 
     T_load = T − drags − J θ″ + (f J/k) [T″ − (1 − f) J θ⁗] − (f J/k) (c/k) [T″ − (1 − f) J θ⁗]′,
 
-all is linear in J, the drags and four further parameters. So one rough fit gives the share f, the
-stiffness k and the damping c, wherever the base fit ended, and the coupling is fitted from these.
+all is linear in J, the drags and four further parameters, but for the drags in the torque that is
+passed on. So a fit gives the share f, the stiffness k and the damping c, wherever the base fit
+ended, and the coupling is fitted from these.
 Any effect with a `LinearForm` is tried so.
 
 Reference: Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control.
@@ -220,8 +221,8 @@ def _fits_from_form(fit: Fit, effect: Effect, form: LinearForm) -> list[Fit]:
     """Where fits with the effect begin: at the values that its linear form gives, by its choices.
 
     At an order of the angle the torque's fourth derivative of an angle is noise. These rows are
-    left out. None where the linear form does not take most of the signal's power over the floor:
-    what makes it miss is something else.
+    left out. There is no start where the linear form does not take most of the signal's power over
+    the floor: what makes it miss is something else.
     """
     silent, machine = fit.policy.fit.silent, fit.machine
     sigmas = tuple(
