@@ -23,7 +23,7 @@ def _torque(x: Operating, q: Values) -> Array:
 EFFECT = Effect(
     name="compliance",
     words="two masses and a spring: a share of J at the far end, behind a twist (reported at the "
-    "machine's torque) by the torque passed on, damping_s late (c/k); far_friction: the part of the "
+    "machine's torque) by the torque passed on, damping_s late (c/k); far_friction: the part of "
     "friction at the far end; between: the transducer is in the coupling (1), or beyond it on a "
     "dynamometer that gives way (-1)",
     signature="a resonance after torque steps",

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
@@ -17,7 +15,6 @@ from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
 from pipeline.criticism.machine.two_masses import reach
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
-from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.shaft import (
     net_torque,
     torque_between,
@@ -26,7 +23,6 @@ from pipeline.criticism.signals.shaft import (
 )
 from pipeline.criticism.signals.true_current import drive_current
 from pipeline.criticism.signals.true_state import at_true_angle, finer_of, motion_of, operating
-from pipeline.numerics.jumps import speed_jumps
 from pipeline.numerics.projection import projection
 from pipeline.records.capture import Capture
 
@@ -49,8 +45,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     Segment or None
         None with a transducer, and where something else than the current drives the shaft. Windows
         are few because waves of the angle take long to compute at speed. None is of a shaft at
-        rest: there friction holds what a load and the current leave over. None is at a jump of the
-    speed from one sample to the next.
+        rest: there friction holds what a load and the current leave over.
 
     Notes
     -----
@@ -70,7 +65,6 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     # a window needs the rows that show what its current does between them
     pad = max(pad, -(-(machine.policy.ripple.rows - window) // 2))
     moves = log.keep & ~rests(shaft["theta_mech_rad"], window, policy)
-    moves &= ~_about_jumps(shaft["theta_mech_rad"], policy)
     shaft, starts = thinned(shaft, moves, window, policy.windows_motion, pad)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     middle = np.rint(shaft["t_s"][starts + window // 2] / log.period_s)
@@ -86,13 +80,6 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         blocks=in_time(middle, log.keep.size),
     )
     return replace(segment, unthinned=Unthinned(full))
-
-
-def _about_jumps(theta_rad: Array, policy: Cutting) -> NDArray[np.bool_]:
-    """Samples [n] near which the speed jumps: what the current did there is in no sample."""
-    jumping = speed_jumps(theta_rad, policy.jump_share, policy.change_u)
-    near: NDArray[np.bool_] = maximum_filter1d(jumping, 2 * policy.beside_jump + 1)
-    return near
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

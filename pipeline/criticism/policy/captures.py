@@ -79,14 +79,6 @@ class Cutting:
         0.125, "waves", "part of a wave of the angle that a capture goes through for it to be one",
         why="a parabola leaves 3 per cent of that, and of less soon nothing",
     )  # fmt: skip
-    jump_share: float = chosen(
-        0.1, "1", "of the highest speed, by which a speed that jumps changes between two samples",
-        why="less is as much in the samples as between them",
-    )  # fmt: skip
-    beside_jump: int = derived(
-        3, "samples", "samples to either side of such a jump that are left out",
-        source="the current between two samples is drawn through two on either side",
-    )  # fmt: skip
     held_s: float = chosen(
         1.0, "s", "time in which a speed that is held scatters no more than its noise, at the most",
         why="a level of a map is held for some seconds",
