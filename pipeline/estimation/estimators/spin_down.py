@@ -253,8 +253,8 @@ def _coasts(capture: Capture) -> list[Coast]:
         return []
     angle, limits = y if of_angle else trapezoid(t, y), policy().coast_down
     try:
-        rows = min(max(t.size / limits.smoothed_part, limits.least_smoothed), limits.most_smoothed)
-        speed = smooth_speed(t, angle, max(0.01, rows * float(np.median(np.diff(t)))))
+        width = min(max(t.size / limits.smoothed_part, limits.least_smoothed), limits.most_smoothed)
+        speed = smooth_speed(t, angle, max(0.01, width * float(np.median(np.diff(t)))))
     except ValueError:
         return []
     return [

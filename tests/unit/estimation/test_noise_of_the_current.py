@@ -99,26 +99,3 @@ def test_no_window_has_a_speed_that_changes_between_two_rows() -> None:
     assert rows is not None
     assert rows.count > 100
     assert np.abs(rows.acceleration_rad_s2).max() < 0.1
-
-
-def test_spin_ups_of_one_current_and_coasts_have_an_inertia() -> None:
-    """No coast has a torque; its viscous friction was read as its 1/J, and J refused."""
-    rng, rate = np.random.default_rng(6), 500.0
-    t = np.arange(0.0, 4.0, 1.0 / rate)
-
-    def run(torque_nm: float, begin: float, test: str):
-        level, rise = (torque_nm - np.sign(begin or torque_nm) * DRY_NM) / VISCOUS, J_KGM2 / VISCOUS
-        omega = level + (begin - level) * np.exp(-t / rise)
-        theta = level * t + rise * (begin - level) * (1.0 - np.exp(-t / rise))
-        keep = omega * np.sign(begin or torque_nm) > 1.0
-        current = {"iq_a": (torque_nm / KT + rng.normal(0.0, 2e-3, t.size))[keep]}
-        current = current if test == "drive" else {}
-        return capture(test, f"{test}{torque_nm}{begin}", t_s=t[keep], theta_mech_rad=theta[keep],
-                       **current)  # fmt: skip
-
-    drives = [run(nm, 0.0, "drive") for nm in (0.4, -0.4, 0.8, -0.8)]
-    coasts = [run(0.0, begin, "spin_down") for begin in (40.0, -40.0)]
-    found = estimates(inertia.ESTIMATOR, *drives, *coasts, known=KNOWN)["j_rotor_kgm2"]
-    assert found.known, found.note
-    assert abs(found.number - J_KGM2) < 3.0 * found.u
-    assert found.u < 0.05 * J_KGM2
