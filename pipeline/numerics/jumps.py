@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.quantisation import resolution
+
 Array = NDArray[np.float64]
+_ROUNDED_STEPS = 2.5
+"""Steps of its resolution up to which rounding alone may bend an angle: three roundings of half a
+step each, the middle one twice, make two."""
 
 
 def jumps(signal: Array, least: float) -> Array:
@@ -50,17 +55,21 @@ def speed_jumps(theta_rad: Array, share: float, times: float) -> NDArray[np.bool
     share
         Least change of the speed over the highest [1].
     times
-        Least change over the usual one [1], so that neither rounding nor a steady acceleration is
-        one.
+        Least change over the usual one [1], so that neither noise nor a steady acceleration is one.
 
     Returns
     -------
     array [n]
         What drove the shaft there happened between two samples, and is in none.
 
+    Notes
+    -----
+    Of an angle that is rounded the usual change may be none, and rounding makes one of up to two
+    steps of its resolution.
+
     Examples
     --------
-    >>> speed_jumps(np.array([0.0, 1.0, 2.0, 3.0, 6.0, 9.0, 12.0]), 0.1, 10.0).nonzero()[0]
+    >>> speed_jumps(np.array([0.0, 1.0, 2.0, 3.0, 8.0, 13.0, 18.0]), 0.1, 10.0).nonzero()[0]
     array([3])
 
     """
@@ -69,5 +78,5 @@ def speed_jumps(theta_rad: Array, share: float, times: float) -> NDArray[np.bool
         speed = np.diff(theta_rad)
         change = np.abs(np.diff(speed))
         least = max(share * float(np.abs(speed).max()), times * float(np.median(change)))
-        found[1:-1] = change > max(least, 1e-300)
+        found[1:-1] = change > max(least, _ROUNDED_STEPS * resolution(theta_rad), 1e-300)
     return found

@@ -243,7 +243,7 @@ def window_of(period: float, size: int, policy: Cutting) -> int:
 
 
 def window_between_gaps(period: float, keep: NDArray[np.bool_], policy: Cutting) -> int:
-    """Samples a window that is no longer than what is free of gaps.
+    """Samples a window of which two fit into the stretches that most of a capture is in.
 
     Parameters
     ----------
@@ -261,8 +261,9 @@ def window_between_gaps(period: float, keep: NDArray[np.bool_], policy: Cutting)
 
     """
     ends = np.flatnonzero(~np.concatenate([[False], keep, [False]]))
-    longest = int(np.diff(ends).max()) - 1
-    return max(min(window_of(period, keep.size, policy), longest), policy.least_window)
+    stretches = np.sort(np.diff(ends) - 1)
+    usual = int(stretches[np.searchsorted(np.cumsum(stretches), 0.5 * float(stretches.sum()))])
+    return max(min(window_of(period, keep.size, policy), usual // 2), policy.least_window)
 
 
 def parabolas(signal: Array, width: int) -> Array:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
@@ -15,6 +17,7 @@ from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
 from pipeline.criticism.machine.two_masses import reach
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
+from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.shaft import (
     net_torque,
     torque_between,
@@ -23,6 +26,7 @@ from pipeline.criticism.signals.shaft import (
 )
 from pipeline.criticism.signals.true_current import drive_current
 from pipeline.criticism.signals.true_state import at_true_angle, finer_of, motion_of, operating
+from pipeline.numerics.jumps import speed_jumps
 from pipeline.numerics.projection import projection
 from pipeline.records.capture import Capture
 
@@ -59,12 +63,13 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     shaft = {name: log.columns[name] for name in _USED if name in log.columns}
     shaft["t_s"] = log.period_s * np.arange(log.keep.size, dtype=np.float64)
     policy = machine.policy.cutting
-    window = window_between_gaps(log.period_s, log.keep, policy)
+    steady = ~_jumping(shaft["theta_mech_rad"], policy)
+    window = window_between_gaps(log.period_s, log.keep & steady, policy)
     full = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
     pad = max(policy.motion_pad, reach(log.period_s, machine.policy.torsion))
     # a window needs the rows that show what its current does between them
     pad = max(pad, -(-(machine.policy.ripple.rows - window) // 2))
-    moves = log.keep & ~rests(shaft["theta_mech_rad"], window, policy)
+    moves = log.keep & steady & ~rests(shaft["theta_mech_rad"], window, policy)
     shaft, starts = thinned(shaft, moves, window, policy.windows_motion, pad)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     middle = np.rint(shaft["t_s"][starts + window // 2] / log.period_s)
@@ -80,6 +85,14 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         blocks=in_time(middle, log.keep.size),
     )
     return replace(segment, unthinned=Unthinned(full))
+
+
+def _jumping(theta_rad: Array, policy: Cutting) -> NDArray[np.bool_]:
+    """Samples at which the speed jumps, and those beside them, in which it settles: what drove the
+    shaft there is in no row.
+    """
+    found = speed_jumps(theta_rad, policy.jump_share, policy.jump_times)
+    return maximum_filter1d(found, 2 * policy.jump_rows + 1)
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

@@ -75,6 +75,20 @@ class Cutting:
         5, "samples", "samples of the shortest parabola",
         source="the shortest that leaves less noise than there is",
     )  # fmt: skip
+    jump_share: float = chosen(
+        0.03, "1", "of the highest speed, by which a speed that jumps changes from row to row",
+        why="what drove the shaft there is in no row; of one pump's log at 20 Hz, J was 42 % too "
+        "small at 0.1 and is withheld at 0.03",
+    )  # fmt: skip
+    jump_times: float = derived(
+        10.0, "1", "of the usual change of speed from row to row, below which one is no jump",
+        source="the largest of 10,000 of a normal distribution are six times the median",
+    )  # fmt: skip
+    jump_rows: int = chosen(
+        3, "rows", "rows beside a jump of the speed that are left out with it",
+        why="of a loop of two rows' time constant, which settles there, current_delay was named "
+        "with one row and with none left out",
+    )  # fmt: skip
     least_wave: float = chosen(
         0.125, "waves", "part of a wave of the angle that a capture goes through for it to be one",
         why="a parabola leaves 3 per cent of that, and of less soon nothing",

@@ -211,14 +211,16 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
     law = acceleration(rows, driving)
     drag = _drag(rows, law, nuisances, options["level"], torque.kt_nm_a)
-    if not torque_is_separable(drag.design, drag.sigma):
+    if not (drag.steady or torque_is_separable(drag.design, drag.sigma)):
         note = f"the drive's torque cannot be separated from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     strange = share_of_no_torque(rows, drag)
     if strange > policy().drag.loaded_share and not _load_logged(rows):
         return METHOD.nothing(GIVES, f"{words_of_no_torque(strange)}; {LOAD}")
-    regimes = drag_disagreements(rows, drag, options["level"])
-    doubts = Doubts(strange, regimes, _over_time(rows, driving, drag, options["level"]))
+    doubts = Doubts(strange, (None, None, None))
+    if not drag.steady:
+        regimes = drag_disagreements(rows, drag, options["level"])
+        doubts = Doubts(strange, regimes, _over_time(rows, driving, drag, options["level"]))
     sampled = () if coasts_decide(rows) else sampling_drag(rows.captures, torque.kt_nm_a, known)
     estimates = _estimates(rows, torque, drag, doubts, _left_out(rows, campaign), sampled)
     if strange > policy().drag.unexplained_share and not _load_logged(rows):
@@ -414,6 +416,7 @@ def _slopes(
 
 def _words(rows: ShaftRows, torque: Torque, drag: DragFit) -> list[str]:
     words = [torque.words, drag_description(drag)]
+    words += ["all that brakes the shaft counts to friction"] if drag.steady else []
     words.append("what iron loss there is under the magnet's flux counts as drag")
     words.append(f"{rows.count} windows, {rows.dropped} near standstill left out")
     if _of_a_speed(rows, 1.0):
@@ -440,16 +443,18 @@ def _load_words(rows: ShaftRows, strange: float, left_out: Sequence[str]) -> lis
 
 
 def _evidence(rows: ShaftRows, measured: Array, drag: DragFit) -> tuple[Evidence, ...]:
-    words = ["coast" if c.meta.test == "spin_down" else "drive" for c in rows.captures]
-    titles = [f"Acceleration in the {word}" for word in words]
-    columns = rows.capture, rows.time_s, measured, measured - drag.residuals
-    caption = "window means, no derivative taken"
-    plots = METHOD.traces(rows.captures, titles, "acceleration_rad_s2", columns, caption)
     curve = METHOD.plot(
         "Drag against speed", ("omega_mech_rad_s", "torque_coulomb_nm"), "scatter",
         (Series("drag", *drag.curve(rows)),),
         "driving torque less J times acceleration; line: Coulomb and viscous",
     )  # fmt: skip
+    if drag.steady:
+        return (curve,)
+    words = ["coast" if c.meta.test == "spin_down" else "drive" for c in rows.captures]
+    titles = [f"Acceleration in the {word}" for word in words]
+    columns = rows.capture, rows.time_s, measured, measured - drag.residuals
+    caption = "window means, no derivative taken"
+    plots = METHOD.traces(rows.captures, titles, "acceleration_rad_s2", columns, caption)
     return (*plots, curve)
 
 

@@ -31,6 +31,10 @@ from pipeline.numerics.least_squares import (
 )
 from pipeline.numerics.selection import needed_columns
 
+_STEADY = (
+    "the speed is steady in every row, or changes between two; record a drive that accelerates and "
+    "brakes over many rows, or a spin_down"
+)
 _UNSUPPORTED = (
     "the drag curve is followed to no low speed: drawn on to standstill it is open by {:.2g} N·m, "
     "more than all drag that was seen; record spin_downs down to rest"
@@ -128,7 +132,11 @@ def drag_by_current(
     )
     fit = torque_fit(design.columns, y, sigma)
     inertia = float(fit.coefficients[0])
-    if inertia <= 0.0 or not sigma[0] or fit.chi2_dof > policy().drag.noise_alone:
+    if not sigma[0] or fit.chi2_dof > policy().drag.noise_alone:
+        return None
+    if is_steady(rows, fit):
+        return _of_steady_speeds(rows, design, sigma)
+    if inertia <= 0.0:
         return None
     covariance, dof = _covariance(rows, np.column_stack([y, -design.columns[:, 1:]]), fit, sigma)
     slope = np.eye(fit.coefficients.size) / inertia
@@ -137,6 +145,36 @@ def drag_by_current(
         design.names, over_inertia(fit.coefficients), slope @ covariance @ slope.T,
         -fit.residuals / inertia, dof, False, np.zeros(3), ("", "", ""), design.columns,
         sigma / inertia, y, rows.fastest_rad_s, by_current=True,
+    )  # fmt: skip
+
+
+def is_steady(rows: ShaftRows, fit: LinearFit) -> bool:
+    """Whether no torque that accelerates is in the rows, and several speeds of both senses are.
+
+    Parameters
+    ----------
+    rows
+        Windows of drives.
+    fit
+        Their `torque_fit`.
+
+    """
+    u_inertia = math.sqrt(float(fit.covariance[0, 0]) * max(fit.chi2_dof, 1.0))
+    speeds = np.unique(np.round(rows.speed_rad_s / rows.fastest_rad_s, 1))
+    both = float(speeds.min()) < 0.0 < float(speeds.max())
+    return both and speeds.size > 2 and fit.coefficients[0] < policy().evidence.sigmas * u_inertia
+
+
+def _of_steady_speeds(rows: ShaftRows, design: Design, sigma: Array) -> DragFit:
+    """Friction alone, T = T_c sign ω + B ω + nuisances: what holds each speed."""
+    fit = linear_fit(-design.columns[:, 1:], design.columns[:, 0], sigma)
+    inner, dof = _covariance(rows, -design.columns[:, 1:], fit, sigma)
+    covariance = np.zeros(2 * [len(design.names)])
+    covariance[1:, 1:] = inner
+    return DragFit(
+        design.names, np.array([1.0, *fit.coefficients]), covariance, -fit.residuals, dof, False,
+        np.zeros(3), (_STEADY, "", ""), design.columns, sigma, rows.acceleration_rad_s2,
+        rows.fastest_rad_s, by_current=True, steady=True,
     )  # fmt: skip
 
 

@@ -82,6 +82,8 @@ class DragFit:
         Highest speed of the rows.
     by_current
         Whether the noise is in the torque, and the rows were fitted the other way round.
+    steady
+        Whether the rows show friction alone: g is 1, and the residuals are torques.
 
     """
 
@@ -98,6 +100,7 @@ class DragFit:
     target: Array
     fastest_rad_s: float
     by_current: bool = False
+    steady: bool = False
 
     def refit(self, driving_nm: Array) -> Array:
         """The coefficients with another driving torque in the same columns.
@@ -115,6 +118,9 @@ class DragFit:
         """
         design = self.design.copy()
         design[:, 0] = driving_nm
+        if self.steady:
+            friction = linear_fit(-design[:, 1:], driving_nm, self.sigma).coefficients
+            return np.array([1.0, *friction])
         if self.by_current:
             return over_inertia(torque_fit(design, self.target, self.sigma).coefficients)
         return linear_fit(design, self.target, self.sigma).coefficients

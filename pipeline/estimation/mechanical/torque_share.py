@@ -67,8 +67,8 @@ def share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
     -------
     float
         What is left over what no column of the current explains [1], less the current's noise where
-        the fit has it. Where the d current has one size, its square times the q current is the
-        torque.
+        the fit has it; 0 of steady speeds. Where the d current has one size, its square times the q
+        current is the torque.
 
     Notes
     -----
@@ -81,6 +81,8 @@ def share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
     Fuller, Measurement Error Models, Wiley, 1987, section 1.1. doi:10.1002/9780470316665
 
     """
+    if drag.steady:
+        return 0.0
     drives = rows.kind == DRIVE
     others = [k for k, name in enumerate(drag.names) if not name.startswith(OF_CURRENT)]
     without = linear_fit(drag.design[drives][:, others], drag.target[drives])

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from pipeline.estimation.estimators import inertia
-from pipeline.estimation.mechanical.shaft_rows import shaft_rows
 from pipeline.estimation.mechanical.torque_share import has_torque_of_its_own
 from pipeline.records.constants import Constants
 from tests.unit.estimation.signals import capture, estimates, known_value
@@ -74,28 +73,3 @@ def test_nuisances_of_a_current_of_one_size_leave_its_torque_a_part(beside: str,
     design = np.column_stack([KT * current, -np.sign(speed), -speed, column])
     drag = SimpleNamespace(design=design, names=("torque", "coulomb", "viscous", beside))
     assert has_torque_of_its_own(drag) == own
-
-
-def plateaus():
-    """Levels of speed for three seconds each at twenty rows a second; the shaft is at each within
-    30 ms, under a current that no row has.
-    """
-    rng, rows = np.random.default_rng(5), 60
-    speeds = np.repeat(np.array([40, 120, -80, 200, -160, 60, -220, 150, -30, 90] * 2), rows)
-    t = np.arange(speeds.size) / 20.0
-    theta = np.append(0.0, np.cumsum(speeds[:-1] / 20.0))
-    torque = 0.01 * np.sign(speeds) + 1e-4 * speeds
-    begun = np.append(False, np.diff(speeds) != 0)
-    # what a snapshot may still have of the pulse that brought the shaft there
-    torque = torque + 0.02 * begun * np.sign(np.append(0, np.diff(speeds))) * rng.uniform(
-        size=t.size
-    )
-    return log(t, theta, torque / KT, 1e-3, 147_456)
-
-
-def test_no_window_has_a_speed_that_changes_between_two_rows() -> None:
-    """With them J of such a log came out 61 % too small, sure to 17 %: what did it is in no row."""
-    rows = shaft_rows([plateaus()], {})
-    assert rows is not None
-    assert rows.count > 100
-    assert np.abs(rows.acceleration_rad_s2).max() < 0.1
