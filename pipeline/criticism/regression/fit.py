@@ -131,15 +131,13 @@ class Fit:
         moves = zip(columns, step.tolist(), strict=True)
         return self.at({c.name: self.values[c.name] + change for c, change in moves})
 
-    def moved_over_inertia(self, columns: Sequence[Column], step: Array) -> Fit | None:
+    def moved_over_inertia(self, moves: Values) -> Fit | None:
         """The fit after a step that is taken in 1/J and in drags over J.
 
         Parameters
         ----------
-        columns
-            Parameters that move.
-        step
-            Change of each, as for `moved`.
+        moves
+            Change of each parameter that moves, by its full name.
 
         Returns
         -------
@@ -152,13 +150,12 @@ class Fit:
         the tangent in J leads below zero.
 
         """
-        moves = {c.name: change for c, change in zip(columns, step.tolist(), strict=True)}
         inertia = self.values["j_kgm2"]
         shrinks = -moves.get("j_kgm2", 0.0) / inertia
         if shrinks <= self.policy.fit.inertia_step:
             return None
         moved = {name: self.values[name] + change for name, change in moves.items()}
-        of_drags = [c.name for c in columns if _is_drag(c)]
+        of_drags = [name for name in moves if _is_drag(name, self.model)]
         moved |= {n: (moved[n] + shrinks * self.values[n]) / (1.0 + shrinks) for n in of_drags}
         return self.at({**moved, "j_kgm2": inertia / (1.0 + shrinks)})
 
@@ -174,13 +171,12 @@ class Fit:
         return tuple(Floor(sigma, self.near, tolerance) for sigma, tolerance in pairs)
 
 
-def _is_drag(column: Column) -> bool:
+def _is_drag(name: str, model: Model) -> bool:
     """Whether a parameter is in the shaft's equation over the inertia."""
-    if column.effect is None:
-        return column.name == "b_nm_s_rad"
-    parameters = {p.name: p for p in column.effect.parameters}
-    parameter = parameters.get(column.name.partition(".")[2])
-    return column.effect.torque is not None and (parameter is None or parameter.amplitude)
+    if name not in model.parameters():
+        return name == "b_nm_s_rad"
+    effect, parameter = model.parameters()[name]
+    return effect.torque is not None and parameter.amplitude
 
 
 def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Array, ...]:

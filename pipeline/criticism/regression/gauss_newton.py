@@ -126,7 +126,8 @@ def _over_inertia(system: LinearSystem, step: Array, shortened: LinearSystem) ->
     """The system after a step in 1/J, if that is better than the shortened one: from an inertia
     that is many times too large no short step in J leads back.
     """
-    moved = system.fit.moved_over_inertia(system.columns, step)
+    names = (column.name for column in system.columns)
+    moved = system.fit.moved_over_inertia(dict(zip(names, step.tolist(), strict=True)))
     if moved is None:
         return shortened
     return min(shortened, linear_system(moved, before=system), key=lambda one: one.deviance)

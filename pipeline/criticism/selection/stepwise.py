@@ -407,20 +407,13 @@ def _refitted(wide: LinearSystem, score: Score) -> LinearSystem:
     """The fit with a candidate, started from the step that its score predicts.
 
     If that fit is no better than the one without it, a second one begins with all other parameters
-    where they are: the linear step overshoots where parameters are strongly correlated. A third one
-    with a drag begins from orders of magnitude, if these have another inertia: without the weight
-    of an arm no inertia is large enough for a free shaft's acceleration, and no step leads back.
+    where they are: the linear step overshoots where parameters are strongly correlated.
     """
-    begun = begin_from(wide.fit, score)
-    tried = gauss_newton(begun, before=wide)
+    tried = gauss_newton(begin_from(wide.fit, score), before=wide)
     if tried.deviance + score.penalty < wide.deviance:
         return tried
-    ends = [tried, gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)]
-    if score.candidate.effect.hook == "torque":
-        rough = rough_anew(begun)
-        if _other_inertia(rough, wide.fit):
-            ends.append(gauss_newton(replace(rough, sigma=wide.fit.sigma, near=wide.fit.near)))
-    return min(ends, key=lambda end: end.deviance)
+    again = gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)
+    return min(tried, again, key=lambda end: end.deviance)
 
 
 def _other_inertia(rough: Fit, fit: Fit) -> bool:
@@ -441,12 +434,13 @@ def begin_from(fit: Fit, score: Score) -> Fit:
 
     """
     effect = score.candidate.effect
-    model = fit.model.with_effects(effect)
-    moved = {name: fit.values[name] + change for name, change in score.moves.items()}
-    if effect.in_place_of is not None:
-        moved[effect.in_place_of[0]] = 0.0
-    start = {**moved, **score.candidate.values, **score.step}
-    return replace(fit, model=model).at(start)
+    model, start = fit.model.with_effects(effect), {**fit.values, **score.candidate.values}
+    moves = {**score.moves, **score.step}
+    before = replace(fit, model=model, values=start)
+    begun = before.moved_over_inertia(moves)
+    if begun is None:
+        begun = before.at({name: start[name] + change for name, change in moves.items()})
+    return begun if effect.in_place_of is None else begun.at({effect.in_place_of[0]: 0.0})
 
 
 def _unsure(wide: LinearSystem, base: int) -> tuple[str, LinearSystem] | None:
