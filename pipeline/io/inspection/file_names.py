@@ -19,6 +19,7 @@ _TIME = re.compile(r"([01]\d|2[0-3])[-h]?[0-5]\d([-m]?[0-5]\d)?")
 _PAIRS = {"ab": "ab", "bc": "bc", "ca": "ca", "uv": "ab", "vw": "bc", "wu": "ca"}
 _SPEED = re.compile(r"(?<![A-Za-z\d.])(-?\d{2,6})[_ ]?(rpm|RPM|Upm|upm|Umin|umin)(?![A-Za-z\d])")
 MOTION = frozenset({"omega_mech_rad_s", "theta_mech_rad", "theta_elec_rad"})
+_TABLE = frozenset({"iq_a", "torque_shaft_nm"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +83,9 @@ def name_patterns(
         bound = key != "test" or any(len(word) < _LEAST_INSIDE for word in words)
         patterns.append(f"(?:^|{_BREAK}){group}(?={_BREAK}|$)" if bound else group)
         meanings = {text: meaning for text, meaning in places_of_words.values() if meaning}
+        if columns >= _TABLE and "t_s" not in columns:
+            # a map of steady points has no clock
+            meanings = {w: "torque_table" if m == "torque_map" else m for w, m in meanings.items()}
         if meanings:
             values[key] = dict(sorted(meanings.items()))
         if len(places_of_words) == len(paths):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cache
 
@@ -19,7 +20,9 @@ _CHANNEL = re.compile(r"^ch(?:annel)?\s?\d+[\s:_-]+(?=[^\s(\[])", re.IGNORECASE)
 _LEAST_STEM = 4
 _LETTERS = frozenset("acfhkv")
 """Ends of a name that are a phase as well as a unit: `current_a`."""
-_IMPLIED = {"rpm": "rpm", "erpm": "rpm", "mstoday": "ms"}
+_COMPANIONS = {"a": "bc", "v": "uw", "c": "ab"}
+"""Letters of the other phases beside one that is a unit too."""
+_IMPLIED = {"rpm": "rpm", "erpm": "rpm", "mstoday": "ms", "second": "s", "seconds": "s", "sec": "s"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +39,7 @@ class Label:
     exact: bool = False
 
 
-def read_label(name: str, unit_row: str | None = None) -> Label:
+def read_label(name: str, unit_row: str | None = None, beside: Collection[str] = ()) -> Label:
     """What the name of a field and the units row say of it.
 
     Parameters
@@ -45,6 +48,8 @@ def read_label(name: str, unit_row: str | None = None) -> Label:
         Name of the field.
     unit_row
         What the units row says of it; None without such a row.
+    beside
+        Names of all fields of the table.
 
     Returns
     -------
@@ -70,9 +75,10 @@ def read_label(name: str, unit_row: str | None = None) -> Label:
         if head and normal_unit(tail) == COUNTS:
             return Label(_columns(head), None, tail)
         ended = tuple(c for c in _columns(head) if known_unit(COLUMNS[c].unit, tail) is not None)
-        if ended and tail not in _LETTERS:
+        is_unit = tail not in _LETTERS or _is_lone(name.strip(), tail, beside)
+        if ended and is_unit:
             columns, text = ended, tail
-        elif not columns and tail not in _LETTERS:
+        elif not columns and is_unit:
             columns, text = _by_its_end(head, tail)
     if not columns and dimensions:
         columns = _of_dimension(stem, dimensions)
@@ -84,6 +90,13 @@ def read_label(name: str, unit_row: str | None = None) -> Label:
     return Label(columns, unit or implied, text)
 
 
+def _is_lone(name: str, tail: str, beside: Collection[str]) -> bool:
+    """Whether a name that ends in a phase's letter has no companion of another phase beside it."""
+    others = {name.removesuffix(tail) + other for other in _COMPANIONS.get(tail, "")}
+    of_phase = not {"phase", "ph"}.isdisjoint(words_of(name))
+    return bool(others) and name in beside and not of_phase and others.isdisjoint(beside)
+
+
 def _by_its_end(head: str, tail: str) -> tuple[tuple[str, ...], str | None]:
     """Columns of a name whose end is a unit, and the unit: `battery_V`, `iq_actual_mA`, "tick_us".
 
@@ -93,7 +106,7 @@ def _by_its_end(head: str, tail: str) -> tuple[tuple[str, ...], str | None]:
     columns = _of_dimension(head, dimensions) if dimensions else ()
     if len(tail) == 1 and not _marks(words_of(head)):
         return (), None
-    return columns, tail if columns else None
+    return columns, tail if dimensions else None
 
 
 def known_unit(target: str, text: str) -> str | None:

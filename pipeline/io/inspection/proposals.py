@@ -14,6 +14,7 @@ import numpy as np
 from pipeline.io.inspection.evidence import Evidence, gather
 from pipeline.io.inspection.labels import Label, known_unit, read_label, words_of
 from pipeline.io.inspection.parts import PartSeen
+from pipeline.io.inspection.vocabulary import ROW_NUMBERS
 from pipeline.io.maps.columns import JOINT_COLUMNS
 from pipeline.io.maps.units import COUNTS, FOREIGN_UNITS, normal_unit
 from pipeline.io.tables.raw_table import RawTable
@@ -121,9 +122,10 @@ def _label(table: RawTable, name: str) -> Label:
     if table.joint_state:
         known = JOINT_COLUMNS.get(name)
         return Label((known,), exact=True) if known else Label()
-    groups = {field.rpartition("/")[0] for field in table.fields}
-    label = name.rpartition("/")[2] if len(groups) == 1 and len(table.fields) > 1 else name
-    return read_label(label, dict(table.units).get(name))
+    groups = {field.rpartition("/")[0] for field in table.fields} - {""}
+    single = len(groups) == 1 and len(table.fields) > 1
+    of = {field: field.rpartition("/")[2] if single else field for field in table.fields}
+    return read_label(of[name], dict(table.units).get(name), of.values())
 
 
 def _columns(
@@ -148,6 +150,8 @@ def _columns(
             columns[name] = label.columns
     if not logged and not any(one[:1] == ("t_s",) for one in columns.values()):
         clear = [c for c in evidence.clocks if c.jitter < _MOST_CLOCK_JITTER]
+        rows = frozenset(ROW_NUMBERS.split())
+        clear = [c for c in clear if rows.isdisjoint(words_of(c.field))]
         free = [c for c in clear if not columns[c.field] and not _is_answered(c.field, answers)]
         if free:
             columns[min(free, key=lambda clock: clock.jitter).field] = ("t_s",)

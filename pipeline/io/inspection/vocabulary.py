@@ -28,6 +28,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "flux": ("Wb", "flux fluss verkettung flujo lambda psi 磁链 磁束"),
     "frequency": ("Hz", "freq frequency frequenz frequence frecuencia 频率 周波数"),
     "power": ("W", "power leistung puissance potencia 功率 電力"),
+    "duty": ("1", "duty dutycycle tastgrad aussteuerung 占空比 デューティ"),
 }
 QUALIFIERS: dict[str, str] = {
     "winding": (
@@ -39,7 +40,7 @@ QUALIFIERS: dict[str, str] = {
     "motor": "motor moteur 电机 電動機 モータ",
     "bus": (
         "bus dc dclink zwischenkreis versorgung supply battery batterie batterie alimentation "
-        "alimentacion input eingang 母线 直流 電源"
+        "alimentacion input eingang vbus ubus 母线 直流 電源"
     ),
     "electrical": "el elec electrical elek elektrisch electrique electrico 电角 電気角",
     "d axis": "d daxis laengs langs d轴 d軸 id ud vd",
@@ -95,4 +96,6 @@ TESTS: dict[str, str] = {
     "torque_table": "torque_table static statisch drehmomenttabelle 静态 静的 静特性 静トルク",
     "drive": "drive sixstep six_step fahrt betrieb zyklus log run conduite marche 运行 運転",
 }
+ROW_NUMBERS = "punkt messpunkt point nr no number nummer row zeile ligne fila 序号 番号"
+"""Names of a column that counts the rows of a table, which is no clock."""
 DIRECTIONS = "cw ccw fwd rev forward reverse vor zurueck rueck links rechts vorwaerts rueckwaerts"

@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.io.ingest.capture_reader import read_capture, survey
 from pipeline.io.inspection.describe import InspectReport, describe
+from pipeline.io.inspection.file_names import name_patterns
 from pipeline.io.inspection.labels import read_label
 from pipeline.io.inspection.proposals import propose
 from pipeline.io.maps.map_file import parse_source_file
@@ -94,6 +95,44 @@ def test_a_unit_at_the_end_of_a_name_says_what_it_is_of(name: str, column: str, 
 @pytest.mark.parametrize("name", ["phase_A", "cob_id", "sensor_V", "gain_s"])
 def test_a_letter_at_the_end_of_a_name_may_be_no_unit(name: str) -> None:
     assert read_label(name).columns == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "beside", "columns", "unit"),
+    [
+        ("current_in_a", (), ("idc_a",), "A"),
+        ("input_voltage_v", (), ("vdc_v",), "V"),
+        ("current_motor_a", (), ("iq_a", "ia_a", "idc_a"), "A"),
+        ("current_a", ("current_b",), ("ia_a",), None),
+        ("phase_current_a", (), ("ia_a",), None),
+    ],
+)
+def test_a_letter_is_the_unit_where_no_other_phase_is_beside_it(
+    name: str, beside: tuple[str, ...], columns: tuple[str, ...], unit: str | None
+) -> None:
+    """The log of a speed controller had its motor's current as that of a lone phase."""
+    found = read_label(name, beside=(name, *beside))
+    assert (found.columns, found.unit) == (columns, unit)
+
+
+def test_a_number_of_the_row_is_no_clock() -> None:
+    fields = {"Punkt": np.arange(1.0, 31.0), "Iq [A]": np.arange(30.0) % 5 - 2.0}
+    assert [one.column for one in propose(RawTable("csv", fields), {})] == [None, "iq_a"]
+
+
+@pytest.mark.parametrize(("clock", "test"), [((), "torque_table"), (("t_s",), "torque_map")])
+def test_a_map_without_a_clock_is_a_table(clock: tuple[str, ...], test: str) -> None:
+    columns = frozenset({"iq_a", "torque_shaft_nm", *clock})
+    names = name_patterns(["Kennfeld_M17.csv"], columns=columns)
+    assert names.values["test"] == {"Kennfeld": test}
+
+
+def test_a_duty_cycle_is_no_angle_and_joints_are_known_in_their_group() -> None:
+    k = np.arange(60.0)
+    waves = {"j1/duty_cycle": np.cos(0.7 * k), "j1/current_A": np.sin(k)}
+    fields = {"time_ms": k, **waves, "j1/rpm": k}
+    columns = [one.column for one in propose(RawTable("csv", fields), {})]
+    assert columns == ["t_s", None, None, "omega_mech_rad_s"]
 
 
 def test_fields_of_one_group_are_known_by_their_own_names() -> None:
