@@ -329,12 +329,14 @@ def _untested_form(
     """Allowance for drag of another form where no speed is left over to test it.
 
     A share of the drag at the slowest speed may be Stribeck's, iron's or windage. Two speeds in
-    either sense test the zero of the transducer, and no form.
+    either sense test the zero of the transducer, and no form; three of one sense each are as many
+    as both drags and that zero.
     """
     turning = [p for p in points if not p.standing]
     speeds = _column(turning, "omega_mech_rad_s")
     faster = np.diff(np.log(np.sort(np.abs(speeds)))) > policy().points.same_speed
-    if np.count_nonzero(faster) >= 2:
+    left_over = len({p.group for p in turning}) - len(DRAG) - 1
+    if np.count_nonzero(faster) >= 2 and left_over > 0:
         return ()
     drag = _drag(points, model).values
     slowest = float(np.min(np.abs(speeds)))

@@ -155,7 +155,10 @@ def _widened(estimate: Estimate, judging: Sequence[Estimate]) -> Estimate:
     spread = _between(methods)
     if spread.p_value >= policy().agreement.level or spread.sd == 0.0:
         return estimate
+    # two that agree with each other say nothing for a third
+    nearest = min(_between([estimate, other]).sd for other in judging)
     each = ", ".join(f"{e.method} {e.number:.5g} ± {e.u:.2g}" for e in methods)
     words = f"methods disagree beyond chance ({each} {estimate.unit})"
-    part = Contribution(f"{METHODS}{estimate.name}", spread.sd, "A", spread.dof)
+    sd = max(spread.sd, nearest)
+    part = Contribution(f"{METHODS}{estimate.name}", sd, "A", spread.dof)
     return _with(estimate, part, words)

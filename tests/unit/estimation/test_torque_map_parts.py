@@ -181,7 +181,9 @@ def test_the_form_of_drag_is_tested_by_a_third_speed_and_not_by_the_other_sense(
         ((-90.0, -40.0, 40.0, 90.0), False),
         ((-90.0, -40.2, 40.0, 90.3), False),
         ((-90.0, -40.0, 40.0, 60.0, 90.0), True),
-        ((-90.0, 40.0, 60.0), True),
+        # as many as both drags and the transducer's zero
+        ((-90.0, 40.0, 60.0), False),
+        ((-90.0, -40.0, 60.0, 120.0), True),
     ):
         points, offsets = speeds_of(speeds)
         model = regression([f"speed {g}" for g in range(len(speeds))], offsets)
