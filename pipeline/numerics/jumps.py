@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import grey_opening
 
 from pipeline.numerics.quantisation import resolution
 
 Array = NDArray[np.float64]
+_LASTING = 4
+"""Samples of an acceleration that is none of jumps: a line from sample to sample follows it."""
 _ROUNDED_STEPS = 2.5
 """Steps of its resolution up to which rounding alone may bend an angle: three roundings of half a
 step each, the middle one twice, make two."""
@@ -60,12 +63,18 @@ def speed_jumps(theta_rad: Array, share: float, times: float) -> NDArray[np.bool
     Returns
     -------
     array [n]
-        What drove the shaft there happened between two samples, and is in none.
+        What drove the shaft there happened between samples, or in too few to follow it.
 
     Notes
     -----
+    Of the changes of the speed what is above their morphological opening: an acceleration that
+    lasts, however large, is no jump.
     Of an angle that is rounded the usual change may be none, and rounding makes one of up to two
     steps of its resolution.
+
+    References
+    ----------
+    Serra, Image Analysis and Mathematical Morphology, Academic Press, 1982 (top-hat transform).
 
     Examples
     --------
@@ -78,5 +87,6 @@ def speed_jumps(theta_rad: Array, share: float, times: float) -> NDArray[np.bool
         speed = np.diff(theta_rad)
         change = np.abs(np.diff(speed))
         least = max(share * float(np.abs(speed).max()), times * float(np.median(change)))
-        found[1:-1] = change > max(least, _ROUNDED_STEPS * resolution(theta_rad), 1e-300)
+        lasting = grey_opening(change, _LASTING)
+        found[1:-1] = change - lasting > max(least, _ROUNDED_STEPS * resolution(theta_rad), 1e-300)
     return found

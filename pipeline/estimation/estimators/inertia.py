@@ -29,7 +29,6 @@ from pipeline.estimation.mechanical.shaft_doubts import DRAGS, Doubts
 from pipeline.estimation.mechanical.shaft_nuisances import (
     COAST_LOAD,
     NUISANCES,
-    OF_CURRENT,
     OFFSET,
     RELUCTANCE,
     SAMPLED,
@@ -47,6 +46,7 @@ from pipeline.estimation.mechanical.torque_constant import UNKNOWN, USES, torque
 from pipeline.estimation.mechanical.torque_share import (
     has_torque_of_its_own,
     is_apart,
+    is_of_size,
     share_of_no_torque,
     words_of_no_torque,
 )
@@ -243,7 +243,7 @@ def _drag(
     drag = drag_of(rows, law, nuisances, level)
     if not has_torque_of_its_own(drag):
         # several nuisances of a current of one size are its torque together
-        nuisances = [name for name in nuisances if not name.startswith(OF_CURRENT)]
+        nuisances = [name for name in nuisances if not is_of_size(name)]
         drag = drag_of(rows, law, nuisances, level)
     if OFFSET in drag.names:
         # an error of the current, or a load: in coasts of one sense that would be friction

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.estimation.mechanical.drag_fit import DragFit
-from pipeline.estimation.mechanical.shaft_nuisances import OF_CURRENT
+from pipeline.estimation.mechanical.shaft_nuisances import OF_CURRENT, TIMING
 from pipeline.estimation.mechanical.shaft_rows import DRIVE, ShaftRows
 from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import linear_fit
@@ -36,7 +36,8 @@ def is_apart(rows: ShaftRows, driving_nm: Array, name: str) -> bool:
 
 
 def has_torque_of_its_own(drag: DragFit) -> bool:
-    """Whether nuisances of the current leave the torque a part of what friction leaves of it.
+    """Whether nuisances of the current's size leave the torque a part of what friction and the
+    current's timing leave of it.
 
     Parameters
     ----------
@@ -45,12 +46,24 @@ def has_torque_of_its_own(drag: DragFit) -> bool:
 
     """
     torque, others = drag.design[:, 0], np.array([False, *(True for _ in drag.names[1:])])
-    of_current = np.array([name.startswith(OF_CURRENT) for name in drag.names])
+    of_size = np.array([is_of_size(name) for name in drag.names])
     own, beside_friction = (
         float(np.linalg.norm(linear_fit(drag.design[:, columns], torque).residuals))
-        for columns in (others, others & ~of_current)
+        for columns in (others, others & ~of_size)
     )
     return own > policy().drag.least_own_share * beside_friction
+
+
+def is_of_size(name: str) -> bool:
+    """Whether a nuisance goes with the size of the current, and not with its instant.
+
+    Parameters
+    ----------
+    name
+        Of the nuisance.
+
+    """
+    return name.startswith(OF_CURRENT) and name not in TIMING
 
 
 def share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:

@@ -34,3 +34,14 @@ def test_a_speed_that_changes_between_two_rows_is_one(counts: int | None) -> Non
     if counts is not None:
         theta = STEP * np.floor(theta / STEP + 0.3)
     assert speed_jumps(theta, SHARE, TIMES).nonzero()[0].tolist() == [50, 100]
+
+
+@pytest.mark.parametrize(("rows", "jump"), [(2, True), (10, False)])
+def test_an_acceleration_that_lasts_is_none(rows: int, jump: bool) -> None:
+    """A drive that reverses in ten rows, and runs at its highest speed in most, lost the rows that
+    show its inertia.
+    """
+    steps = np.concatenate([np.zeros(60), np.full(rows, -2.0 / rows), np.zeros(60)])
+    theta = np.cumsum(np.cumsum(np.concatenate([[1.0], steps, -steps])))
+    theta += np.random.default_rng(2).normal(0.0, 1e-5, theta.size)
+    assert speed_jumps(theta, SHARE, TIMES).any() == jump
