@@ -8,11 +8,12 @@ that is large for the machine, and that no slow drift of the instruments explain
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.diagnosis import base_fit, searched
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.friction_parts import friction_parts
@@ -30,6 +31,8 @@ from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import Diagnosis, ReportedParameter
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict, Parameters
+
+TORQUE = "torque_shaft_nm"
 
 
 def model_verdict(
@@ -80,10 +83,13 @@ def model_verdict(
     tested = _residuals(base if diagnosis.verdict in ("missing", "unknown") else fitted)
     machine, library = base.system.fit.machine, effects(model.effects_path)
     named = replace(_named(tested, diagnosis), scales=machine.scales)
+    far = _far_inertia(named.sizes, library, base.system.fit.segments)
+    left = {name: parameters for name, parameters in named.sizes.items() if name not in far}
     named = replace(
         named,
-        touches=_touches(named.sizes, library),
+        touches=_touches(left, library),
         in_friction=_in_friction(named, library, machine),
+        far_inertia=far,
     )
     return _stated(model, named), diagnosis
 
@@ -150,6 +156,24 @@ def _in_friction(
         confused = name in named.missing and named.missing[name].confused_with
         parts[name] = {n: _any_share(*one) for n, one in whole.items()} if confused else whole
     return parts
+
+
+def _far_inertia(
+    sizes: Mapping[str, Parameters], library: Mapping[str, Effect], segments: Sequence[Segment]
+) -> dict[str, ReportedParameter]:
+    """Share of the inertia that is beyond a coupling, by the effect that says so.
+
+    Where a drive logs the torque in the coupling, its inertia is of the motor's side alone.
+    """
+    logged = any(TORQUE in one.recorded for one in segments if one.test == "drive")
+    shares: dict[str, ReportedParameter] = {}
+    for name, parameters in sizes.items():
+        share = parameters.get(library[name].far_inertia) if name in library else None
+        between = parameters.get("between")
+        in_coupling = logged and between is not None and between.value == 1.0
+        if share is not None and None not in (share.value, share.u) and not in_coupling:
+            shares[name] = share
+    return shares
 
 
 def _any_share(value: float | None, u: float | None, unit: str) -> ReportedParameter:

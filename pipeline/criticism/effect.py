@@ -144,6 +144,7 @@ class Description:
     of it, with sizes in braces, or several (`criticism.library.headline`); its name without one.
     `touches`: constants of a datasheet that mean something else where it acts, and what.
     `in_friction`: whether tests without voltages or d current count its drag as friction.
+    `far_inertia`: its parameter that is the share of the inertia of a free shaft beyond a coupling.
     """
 
     words: str
@@ -152,6 +153,7 @@ class Description:
     headline: str | tuple[str, ...] = ""
     touches: Mapping[str, str] = field(default_factory=dict)
     in_friction: bool = False
+    far_inertia: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Friction constants with the iron's drag separated from them, and combined with it."""
+"""Friction and inertia with the iron's drag and far masses separated from them, and combined."""
 
 from __future__ import annotations
 
@@ -6,20 +6,25 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
+from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import ModelVerdict
-from pipeline.records.uncertainty import type_a
+from pipeline.records.uncertainty import propagate, type_a
+
+INERTIAS = ("j_rotor_kgm2", "tau_mech_s")
+"""Constants that go with the inertia of the rotor."""
 
 
 def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[str, Estimate]:
-    """The constants less what they contain of effects that the model knows.
+    """The constants less what they contain of effects that the model knows: drag in friction, and
+    a mass beyond a coupling in the inertia and the time constant that goes with it.
 
     Parameters
     ----------
     constants
         Estimates by name, fitted without these effects.
     model
-        With `in_friction`: by effect, its part of each constant.
+        With `in_friction` and `far_inertia`: by effect, its part of each constant.
 
     Returns
     -------
@@ -44,7 +49,22 @@ def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[st
                 budget=(*one.budget, *type_a(_source(effect, name), -u)),
                 note="; ".join(part for part in (words, one.note) if part),
             )
+    for effect, share in list(model.far_inertia.items())[:1]:
+        changed |= {
+            name: _near(changed[name], effect, share)
+            for name in INERTIAS
+            if name in changed and changed[name].known
+        }
     return changed
+
+
+def _near(whole: Estimate, effect: str, share: ReportedParameter) -> Estimate:
+    """What is left of an inertia of all that turns on the motor's side of a coupling."""
+    far, u = share.value or 0.0, share.u or 0.0
+    parts = (1.0 - far, whole.budget), (1.0, type_a(_source(effect, whole.name), -whole.number * u))
+    words = f"less the {100.0 * far:.3g} % of the inertia that are beyond a coupling ({effect})"
+    note = "; ".join(part for part in (words, whole.note) if part)
+    return replace(whole, value=(1.0 - far) * whole.number, budget=propagate(parts), note=note)
 
 
 def combined(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[str, Estimate]:

@@ -114,6 +114,9 @@ class ModelVerdict(PlainRecord):
     in_friction
         By effect of `sizes`, its part of each friction constant, which is separated from the
         datasheet's.
+    far_inertia
+        By effect of `sizes`, the share of the inertia of all that turns which is beyond a coupling
+        [1]; the datasheet's is of the rotor alone.
 
     """
 
@@ -133,6 +136,7 @@ class ModelVerdict(PlainRecord):
     scales: Extension[Mapping[str, Spread]] = field(default_factory=dict)
     touches: Extension[Mapping[str, str]] = field(default_factory=dict)
     in_friction: Extension[Mapping[str, Parameters]] = field(default_factory=dict)
+    far_inertia: Extension[Mapping[str, ReportedParameter]] = field(default_factory=dict)
 
     @property
     def sizes(self) -> dict[str, Parameters]:

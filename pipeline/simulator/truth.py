@@ -116,7 +116,7 @@ def _coupling(motor: Motor, p: Plant, psi: float, r: float) -> dict[str, float |
         "kt_rms_nm_a": kt * math.sqrt(2.0),
         "kt_from_ke_nm_a": 1.5 * k,
         "motor_constant_nm_sqrt_w": kt / math.sqrt(1.5 * r),
-        "tau_mech_s": motor.j_rotor_kgm2 * r / (1.5 * k * k) if k > 0.0 else None,
+        "tau_mech_s": float(p.j_rotor) * r / (1.5 * k * k) if k > 0.0 else None,
     }
 
 
@@ -182,7 +182,7 @@ def truth(motor: Motor) -> dict[str, object]:
         **_coupling(motor, p, psi, r),
         "pole_pairs": motor.pole_pairs,
         **_cogging(motor, p),
-        "j_rotor_kgm2": motor.j_rotor_kgm2,
+        "j_rotor_kgm2": float(p.j_rotor),
         "torque_coulomb_nm": float(p.coulomb),
         "b_visc_nm_s_rad": motor.b_visc_nm_s_rad,
         "tau_elec_s": field["lq_h"] / r,

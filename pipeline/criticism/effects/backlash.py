@@ -33,6 +33,7 @@ EFFECT = Effect(
     experiment="reversals of torque with the angle recorded on the load side as well",
     headline="play of {gap_rad} between rotor and load",
     touches={"j_rotor_kgm2": "is of all that turns, not of the rotor alone"},
+    far_inertia="share",
     reference="Nordin & Gutman, Automatica 38 (2002), controlling systems with backlash",
     parameters=(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),

@@ -31,6 +31,7 @@ EFFECT = Effect(
     experiment="torque steps with the angle recorded on the load side as well",
     headline="a shaft or coupling that twists, {share %} of the inertia beyond it",
     touches={"j_rotor_kgm2": "is of all that turns, not of the rotor alone"},
+    far_inertia="share",
     reference="Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control",
     parameters=(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
-from pipeline.criticism.adequacy import _in_friction
+from pipeline.criticism.adequacy import _far_inertia, _in_friction
 from pipeline.criticism.library.friction_parts import friction_parts
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.parameter import Machine
@@ -88,3 +89,32 @@ def test_other_effects_and_other_constants_stay() -> None:
     assert model.in_friction == {}
     assert separated({}, with_parts(lacking())) == {}
     assert ModelVerdict.of(with_parts(lacking()).document()) == with_parts(lacking())
+
+
+def test_the_inertia_of_the_rotor_is_less_what_is_beyond_a_coupling() -> None:
+    """Of a motor behind a soft coupling that of all that turns was published, six times its own."""
+    size = {
+        "share": ReportedParameter(0.8, 0.01, "1"),
+        "between": ReportedParameter(0.0, 0.0, "1"),
+    }
+    far = _far_inertia({"compliance": size}, effects(None), [])
+    model = ModelVerdict("missing", missing={"compliance": FoundEffect(size)}, far_inertia=far)
+    whole = Estimate(
+        "j_rotor_kgm2", 1e-3, "kg·m²", "measured", "inertia", type_b("current@rig", 1e-5)
+    )
+    near = separated({"j_rotor_kgm2": whole}, model)["j_rotor_kgm2"]
+    assert near.number == pytest.approx(2e-4)
+    assert near.u == pytest.approx(math.hypot(2e-6, 1e-5))
+    assert "80 % of the inertia" in near.note
+    assert ModelVerdict.of(model.document()) == model
+
+
+@pytest.mark.parametrize(
+    ("between", "logged", "taken"), [(1.0, True, False), (-1.0, True, True), (1.0, False, True)]
+)
+def test_a_transducer_in_the_coupling_sees_no_mass_beyond_it(between, logged, taken) -> None:
+    share = ReportedParameter(0.8, 0.01, "1")
+    size = {"share": share, "between": ReportedParameter(between, 0.0, "1")}
+    drive = SimpleNamespace(test="drive", recorded={"torque_shaft_nm": ()} if logged else {})
+    far = _far_inertia({"compliance": size, "windage": {}}, effects(None), [drive])
+    assert far == ({"compliance": share} if taken else {})
