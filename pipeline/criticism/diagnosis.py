@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from scipy.special import gammaincc
 
-from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
+from pipeline.criticism.data.machine_scale import PAIRLESS, PARAMETERS, machine_of
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.discovery.changed_constants import Change
@@ -26,7 +26,11 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, of_motor, over_floor
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import hum_notes
-from pipeline.criticism.regression.reported import against_stated, reported_combinations
+from pipeline.criticism.regression.reported import (
+    against_stated,
+    reported_combinations,
+    reported_parameters,
+)
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import Ladder, SearchResult, search_ladder
@@ -182,8 +186,20 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
         model.effects,
         combinations,
         policy_digest(last.policy),
+        _constants(last, ladder.held_out[-1]),
     )
     return diagnosis, ladder.base
+
+
+def _constants(system: LinearSystem, held_out: HeldOut) -> dict[str, ReportedParameter]:
+    """The machine's own constants that a fit determines, by their names in a datasheet."""
+    known = reported_parameters(system, held_out)
+    found = {constant: known[name] for constant, name in PARAMETERS.items() if name in known}
+    return {
+        constant: ReportedParameter(one.value, one.u, one.unit)
+        for constant, one in found.items()
+        if one.value is not None and one.u is not None
+    }
 
 
 def _notes(

@@ -334,6 +334,9 @@ class Diagnosis(PlainRecord):
         What is known of parameters of the last step that are not known one by one.
     policy
         Digest of the constants of judgement.
+    constants
+        Constants of the machine by their names in a datasheet, fitted with all effects of the last
+        step; those that the captures determine.
 
     """
 
@@ -350,6 +353,7 @@ class Diagnosis(PlainRecord):
     asked: Extension[tuple[Name, ...]] = ()
     combinations: Extension[tuple[KnownCombination, ...]] = ()
     policy: Extension[str] = ""
+    constants: Extension[Mapping[str, ReportedParameter]] = field(default_factory=dict)
 
     @property
     def whole_model(self) -> str:

@@ -11,13 +11,16 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.uncertainty import propagate, type_a
 
+MECHANICAL = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")
+"""Constants that tests of a shaft share with every effect that turns or brakes it."""
 INERTIAS = ("j_rotor_kgm2", "tau_mech_s")
 """Constants that go with the inertia of the rotor."""
 
 
 def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[str, Estimate]:
-    """The constants less what they contain of effects that the model knows: drag in friction, and
-    a mass beyond a coupling in the inertia and the time constant that goes with it.
+    """The constants less what they contain of effects that the model knows: drag in friction, a
+    mass beyond a coupling in the inertia and the time constant that goes with it; and constants of
+    the shaft of the fit with these effects, where an estimate without them is another.
 
     Parameters
     ----------
@@ -49,6 +52,8 @@ def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[st
                 budget=(*one.budget, *type_a(_source(effect, name), -u)),
                 note="; ".join(part for part in (words, one.note) if part),
             )
+    for name in (one for one in MECHANICAL if one in changed and one in model.constants):
+        changed[name] = _held_against(changed[name], model)
     for effect, share in list(model.far_inertia.items())[:1]:
         changed |= {
             name: _near(changed[name], effect, share)
@@ -56,6 +61,32 @@ def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[st
             if name in changed and changed[name].known
         }
     return changed
+
+
+def _held_against(estimate: Estimate, model: ModelVerdict) -> Estimate:
+    """An estimate that was made without an effect, or that of the fit which has the effect.
+
+    Where both differ by more than twice the uncertainty of that, or the estimate has no value, the
+    effect is in the way. Where another effect explains the captures as well, none is taken.
+    """
+    value, u, unit = model.constants[estimate.name]
+    if estimate.status == "stated" or value is None or u is None or not model.sizes:
+        return estimate
+    apart = abs(estimate.number - value) if estimate.known else math.inf
+    if estimate.known and apart <= 2.0 * math.hypot(estimate.u, u):
+        return estimate
+    names = " and ".join(model.sizes)
+    source = _source("model", estimate.name)
+    if any(found.confused_with for found in model.missing.values()):
+        words = f"a fit with {names} has {value:.4g} ± {u:.2g} {unit}"
+        between = type_a(source, apart / math.sqrt(2.0)) if estimate.known else ()
+        held = replace(estimate, budget=(*estimate.budget, *between))
+    else:
+        words = f"by a fit with {names}"
+        if estimate.known:
+            words += f"; without, {estimate.number:.4g} ± {estimate.u:.2g} {unit}"
+        held = replace(estimate, value=value, status="measured", budget=type_a(source, u))
+    return replace(held, note="; ".join(part for part in (words, estimate.note) if part))
 
 
 def _near(whole: Estimate, effect: str, share: ReportedParameter) -> Estimate:

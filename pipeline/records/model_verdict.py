@@ -117,6 +117,9 @@ class ModelVerdict(PlainRecord):
     far_inertia
         By effect of `sizes`, the share of the inertia of all that turns which is beyond a coupling
         [1]; the datasheet's is of the rotor alone.
+    constants
+        Constants of the machine that the captures determine, fitted with all effects of `sizes`; of
+        all that turns. None where something else is left.
 
     """
 
@@ -137,6 +140,7 @@ class ModelVerdict(PlainRecord):
     touches: Extension[Mapping[str, str]] = field(default_factory=dict)
     in_friction: Extension[Mapping[str, Parameters]] = field(default_factory=dict)
     far_inertia: Extension[Mapping[str, ReportedParameter]] = field(default_factory=dict)
+    constants: Extension[Parameters] = field(default_factory=dict)
 
     @property
     def sizes(self) -> dict[str, Parameters]:

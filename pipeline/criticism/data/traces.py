@@ -242,8 +242,10 @@ def window_of(period: float, size: int, policy: Cutting) -> int:
     return max(min(samples, size // 4), policy.least_window)
 
 
-def window_between_gaps(period: float, keep: NDArray[np.bool_], policy: Cutting) -> int:
-    """Samples a window of which two fit into the stretches that most of a capture is in.
+def window_between_gaps(
+    period: float, keep: NDArray[np.bool_], policy: Cutting, each: int = 1
+) -> int:
+    """Samples a window of which some fit into the stretches that most of a capture is in.
 
     Parameters
     ----------
@@ -253,6 +255,8 @@ def window_between_gaps(period: float, keep: NDArray[np.bool_], policy: Cutting)
         Samples of the capture that count [n].
     policy
         Length of a window.
+    each
+        Windows that fit into such a stretch.
 
     Returns
     -------
@@ -263,7 +267,7 @@ def window_between_gaps(period: float, keep: NDArray[np.bool_], policy: Cutting)
     ends = np.flatnonzero(~np.concatenate([[False], keep, [False]]))
     stretches = np.sort(np.diff(ends) - 1)
     usual = int(stretches[np.searchsorted(np.cumsum(stretches), 0.5 * float(stretches.sum()))])
-    return max(min(window_of(period, keep.size, policy), usual // 2), policy.least_window)
+    return max(min(window_of(period, keep.size, policy), usual // each), policy.least_window)
 
 
 def parabolas(signal: Array, width: int) -> Array:

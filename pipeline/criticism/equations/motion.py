@@ -64,7 +64,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     shaft["t_s"] = log.period_s * np.arange(log.keep.size, dtype=np.float64)
     policy = machine.policy.cutting
     steady = ~_jumping(shaft["theta_mech_rad"], policy)
-    window = window_between_gaps(log.period_s, log.keep & steady, policy)
+    each = 1 if steady.all() else 2
+    window = window_between_gaps(log.period_s, log.keep & steady, policy, each)
     full = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
     pad = max(policy.motion_pad, reach(log.period_s, machine.policy.torsion))
     # a window needs the rows that show what its current does between them

@@ -434,8 +434,10 @@ def begin_from(fit: Fit, score: Score) -> Fit:
 
     """
     effect = score.candidate.effect
-    model, start = fit.model.with_effects(effect), {**fit.values, **score.candidate.values}
-    moves = {**score.moves, **score.step}
+    none = dict.fromkeys(score.step, 0.0)
+    start = {**fit.values, **none, **score.candidate.values}
+    own = {name: value - start[name] for name, value in score.step.items()}
+    moves, model = {**score.moves, **own}, fit.model.with_effects(effect)
     before = replace(fit, model=model, values=start)
     begun = before.moved_over_inertia(moves)
     if begun is None:

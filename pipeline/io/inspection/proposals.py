@@ -6,6 +6,7 @@ A unit that neither the name nor the numbers give is asked for and never assumed
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -122,9 +123,10 @@ def _label(table: RawTable, name: str) -> Label:
     if table.joint_state:
         known = JOINT_COLUMNS.get(name)
         return Label((known,), exact=True) if known else Label()
-    groups = {field.rpartition("/")[0] for field in table.fields} - {""}
-    single = len(groups) == 1 and len(table.fields) > 1
-    of = {field: field.rpartition("/")[2] if single else field for field in table.fields}
+    bare = {field: re.split(r"[\[({]", field)[0] for field in table.fields}
+    groups = Counter(text.rpartition("/")[0] for text in bare.values() if "/" in text)
+    single = next(iter(groups)) + "/" if len(groups) == 1 and max(groups.values()) > 1 else ""
+    of = {field: field.removeprefix(single) for field in table.fields}
     return read_label(of[name], dict(table.units).get(name), of.values())
 
 

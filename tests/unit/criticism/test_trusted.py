@@ -325,7 +325,6 @@ def test_a_refit_begins_again_where_the_tangent_goes_astray(
 
     stepwise = "pipeline.criticism.selection.stepwise"
     monkeypatch.setattr(f"{stepwise}.gauss_newton", gauss_newton)
-    monkeypatch.setattr(f"{stepwise}.rough_anew", lambda begun: begun)
     monkeypatch.setattr(LinearSystem, "deviance", property(lambda one: float(one.residual[0])))
     fit = Fit((log(),), Model(machine(), ()), {**BASE, "r_ohm": 0.3}, (), BASE)
     wide = replace(missing_by(torque_shaft_nm=100.0**2).system, fit=fit)
