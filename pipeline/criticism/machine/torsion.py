@@ -86,6 +86,9 @@ class Law:
         Windows in which the torque presses to both sides.
     mobility, u_mobility
         1/J of what turns under `momentum_nm` and its standard uncertainty [1/(kg·m²)].
+    products
+        Of the whitened columns of 1/J, 1/k and half the gap, and of the angle, with each other,
+        summed over the windows [4, 4].
 
     """
 
@@ -97,6 +100,21 @@ class Law:
     windows: int
     mobility: float
     u_mobility: float
+    products: Array
+
+    def misfit(self, softness: float, gap_rad: float) -> float:
+        """χ² of the windows with another softness and gap, damping and all else in it.
+
+        Parameters
+        ----------
+        softness
+            [rad/(N·m)].
+        gap_rad
+            Gap [rad].
+
+        """
+        residual = np.array([-self.mobility, -softness, -0.5 * gap_rad, 1.0])
+        return float(residual @ self.products @ residual)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +166,14 @@ def law_of_twist(shafts: Iterable[Shaft], policy: Torsion) -> Law | None:
         len(turning),
         float(coefficients[0]),
         math.sqrt(spread[0, 0]),
+        sum((_products(one) for one in windows if one.turns), np.zeros((4, 4))),
     )
+
+
+def _products(window: _Window) -> Array:
+    """Of the columns and the angle of a window with each other [4, 4]."""
+    both = np.column_stack([window.columns, window.angle])
+    return both.T @ both
 
 
 def _windows(shaft: Shaft, policy: Torsion) -> Iterable[_Window]:

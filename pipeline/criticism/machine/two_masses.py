@@ -353,7 +353,8 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
 
 def _excluded(law: Law, log: FullLog, part: float, q: Values) -> bool:
     """Whether a law, `part` of the twist in it, shows less of the fit's twist and gap than a share,
-    and nothing of what the fit has not. One with a gap or softness below zero is of something else.
+    and nothing of what the fit has not. One with a gap or softness below zero is of something else,
+    and one that leaves more in its windows than the fit's is of a few of them.
     """
     machine = log.x.machine
     policy = machine.policy.torsion
@@ -362,6 +363,8 @@ def _excluded(law: Law, log: FullLog, part: float, q: Values) -> bool:
         return False
     softness = part * q.get("twist_rad", 0.0) / machine.scales["torque_nm"]
     gap = part * q.get("gap_rad", 0.0)
+    if law.misfit(law.softness, law.gap_rad) > law.misfit(softness, gap):
+        return False
     return all(
         value < policy.sure_u * u
         if size == 0.0

@@ -15,6 +15,7 @@ from pipeline.estimation.mechanical.drag_forms import (
     FORMS,
     KNOTS,
     STRIBECK,
+    WINDAGE,
     low_end,
 )
 from pipeline.estimation.mechanical.drive_windows import coasts_decide, drive_columns, freedom
@@ -195,6 +196,10 @@ def _additions(
     start = np.column_stack([law, *(candidates[n] for n in chosen)])
     shapes = {n: candidates[n] for n in STRIBECK}
     chosen += needed_columns(start, shapes, y, sigma, level, 1, tau)
+    if _coefficients(chosen, law, candidates, y, sigma).get(WINDAGE, 0.0) < 0.0:
+        # it helps the shaft: it takes up another form
+        others = {name: column for name, column in candidates.items() if name != WINDAGE}
+        return _additions(rows, law, others, richest, level)
     return _without_negative_excess(chosen, law, candidates, y, sigma)
 
 
@@ -253,10 +258,17 @@ def _without_negative_excess(
     chosen: list[str], base: Array, candidates: Mapping[str, Array], y: Array, sigma: Array
 ) -> list[str]:
     """The columns without Stribeck's where it came out below Coulomb friction: it is an excess."""
+    values = _coefficients(chosen, base, candidates, y, sigma)
+    return [n for n in chosen if n not in STRIBECK or values[n] > 0.0]
+
+
+def _coefficients(
+    chosen: Sequence[str], base: Array, candidates: Mapping[str, Array], y: Array, sigma: Array
+) -> dict[str, float]:
+    """The coefficients of chosen columns beside those of a base."""
     design = np.column_stack([base, *(candidates[n] for n in chosen)])
     coefficients = linear_fit(design, y, sigma).coefficients[base.shape[1] :]
-    values = dict(zip(chosen, coefficients, strict=True))
-    return [n for n in chosen if n not in STRIBECK or values[n] > 0.0]
+    return dict(zip(chosen, coefficients.tolist(), strict=True))
 
 
 def _shape_allowance(

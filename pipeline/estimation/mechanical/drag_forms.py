@@ -43,7 +43,8 @@ DRAG_FORMS: dict[str, Callable[[Array], Array]] = {
     **{f"knot {k}": _hat(k) for k in range(len(KNOTS))},
 }
 STRIBECK = tuple(_BUMPS)
-FORMS = ("windage", *STRIBECK)
+WINDAGE = "windage"
+FORMS = (WINDAGE, *STRIBECK)
 DRAG_NAMES = ("coulomb", "viscous", *FORMS, *CURVE)
 """Columns of a fit that are drag."""
 
