@@ -102,7 +102,7 @@ class Law:
     u_mobility: float
     products: Array
 
-    def misfit(self, softness: float, gap_rad: float) -> float:
+    def chi2(self, softness: float, gap_rad: float) -> float:
         """χ² of the windows with another softness and gap, damping and all else in it.
 
         Parameters

@@ -363,7 +363,7 @@ def _excluded(law: Law, log: FullLog, part: float, q: Values) -> bool:
         return False
     softness = part * q.get("twist_rad", 0.0) / machine.scales["torque_nm"]
     gap = part * q.get("gap_rad", 0.0)
-    if law.misfit(law.softness, law.gap_rad) > law.misfit(softness, gap):
+    if law.chi2(law.softness, law.gap_rad) > law.chi2(softness, gap):
         return False
     return all(
         value < policy.sure_u * u
