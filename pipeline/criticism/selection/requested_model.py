@@ -10,11 +10,9 @@ from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_fit
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import Hum, hum_of, with_hum
-from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
-from pipeline.criticism.selection.score_test import score_all
-from pipeline.criticism.selection.stepwise import begin_from
+from pipeline.criticism.selection.stepwise import floored_anew, refitted, reweighted, scored
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +49,9 @@ def fit_of(segments: Sequence[Segment], model: Model) -> BaseFit:
 
     Notes
     -----
-    Effects with a shape or a choice are added one by one, the most helpful first, each at the best
-    of its trial values: from another one, a bump of friction may move its speed the wrong way.
+    Effects with a shape or a choice are added one by one, the most helpful first, as a search for
+    what is missing adds them: from another start, a bump of friction may move its speed the wrong
+    way, and most of the inertia stays on the wrong side of a soft coupling.
 
     """
     shaped = {
@@ -68,16 +67,15 @@ def fit_of(segments: Sequence[Segment], model: Model) -> BaseFit:
     if not shaped:
         return BaseFit(system, hum)
     while shaped:
-        offered = candidates(shaped, system.fit.model)
-        wide = widened(system.fit, offered, system)
-        scores = score_all(wide, offered)
+        wide, scores = scored(system.fit, shaped, system)
         if not scores:
             break
-        del shaped[scores[0].candidate.effect.name]
-        system = gauss_newton(begin_from(system.fit, scores[0]), before=wide)
+        best = min(scores, key=lambda score: score.penalty - score.fall)
+        del shaped[best.candidate.effect.name]
+        system = refitted(reweighted(wide, best), best)
     for effect in system.fit.model.effects:
         system = renamed(system, effect.name, {effect.name: effect})
-    fit = system.fit
+    fit = floored_anew(system.fit, system)
     settled = {effect.name: effect for effect in fit.model.effects}
     model = replace(model, effects=tuple(settled.get(e.name, e) for e in model.effects))
     unheard = {k: v for effect in shaped.values() for k, v in zero(effect, model).items()}

@@ -125,7 +125,7 @@ def _steps_from(
     """
     steps, policy = list(before), fit.policy.selection
     for _ in range(policy.most_steps):
-        wide, scores = _scored(fit, library, steps[-1].system if steps else None)
+        wide, scores = scored(fit, library, steps[-1].system if steps else None)
         added = tuple(e.name for e in fit.model.effects[base:])
         steps.append(LadderStep(added, wide, scores))
         if len(steps) == policy.most_steps:
@@ -183,17 +183,26 @@ def _with_pair(
         first, second = (effect.name for effect in both.fit.model.effects[-2:])
         alone = _refloored(gauss_newton(both.fit.without(second), before=both), base)
         steps[place + 1 :] = [
-            LadderStep((*step.added, first), *_scored(alone, library, step.system))
+            LadderStep((*step.added, first), *scored(alone, library, step.system))
         ]
         return both
     return None
 
 
-def _scored(
+def scored(
     fit: Fit, library: Mapping[str, Effect], before: LinearSystem | None
 ) -> tuple[LinearSystem, tuple[Score, ...]]:
-    """A fit with the columns of all candidates, those of `before` where they may serve, and every
-    candidate's score on it.
+    """A fit with the columns of all candidates, and every candidate's score on it.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    library
+        Effects that may be added.
+    before
+        A system around a near fit, whose columns may serve.
+
     """
     offered = candidates(library, fit.model)
     wide = widened(fit, offered, before)
@@ -240,7 +249,7 @@ def _is_reading(
     beside, alone = chosen.deviance - both.deviance, wide.deviance - reread.deviance
     if beside >= wide.policy.selection.unexplained_share * alone:
         return False
-    rest, scores = _scored(reread.fit, library, wide)
+    rest, scores = scored(reread.fit, library, wide)
     limit, tie = _cost(chosen), wide.policy.selection.tie
     other = _best(rest, scores, base, unsure)
     if other is None:
@@ -267,7 +276,7 @@ def _refloored(system: LinearSystem, base: int) -> Fit:
     """The fit of a system by tolerances and noise floors of the effects beyond its first `base`."""
     fit, effects = system.fit, system.fit.model.effects[base:]
     fit = replace(fit, tolerance=tolerances(fit, effects))
-    return _floored_anew(fit, system) if effects else fit
+    return floored_anew(fit, system) if effects else fit
 
 
 def _with_full_logs(system: LinearSystem) -> float:
@@ -290,27 +299,37 @@ def _may_join(score: Score, inside: Set[object], couplings: bool) -> bool:
     return effect.discriminator is None or (couplings and effect.discriminator not in inside)
 
 
-def _floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
-    """The fit by noise floors made anew, now that another effect is in; `before` by the former.
+def floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
+    """The fit by noise floors made anew, now that another effect is in.
 
+    Parameters
+    ----------
+    fit
+        The fit by the former floors.
+    before
+        A system around it, whose columns may serve.
+
+    Notes
+    -----
     The tolerance for its form is new, so it is refitted in any case: the next effect is judged
     against this deviance. If some floor changes by half, or something is left over them, and a
     rough fit finds another inertia, a fit is begun there as well and the better one stays. Undoing
     a sensor's lag adds noise, so does a twist derived from an angle, and so do the edges of a dead
     time. An encoder off its centre drives J to next to nothing, an unbalance to six times what it
     is, and the floors were made with that J.
+
     """
     changed = floors_changed(fit)
     if changed:
         floor = floors(fit.segments, fit.model, fit.values)
         fit = replace(fit, sigma=floor, near=fit.values)
-    refitted = gauss_newton(fit, before=before)
-    if not changed and not significant_groups(refitted).any():
-        return refitted.fit
+    anew = gauss_newton(fit, before=before)
+    if not changed and not significant_groups(anew).any():
+        return anew.fit
     rough = rough_anew(fit)
     if not _other_inertia(rough, fit):
-        return refitted.fit
-    return min(refitted, first_fit(rough), key=lambda end: end.deviance).fit
+        return anew.fit
+    return min(anew, first_fit(rough), key=lambda end: end.deviance).fit
 
 
 def _chosen(
@@ -370,8 +389,8 @@ def _refit_best(
     least = 0.0
     for score in close:
         effect = score.candidate.effect
-        begun = _reweighted(wide, score)
-        tried = _refitted(begun, score)
+        begun = reweighted(wide, score)
+        tried = refitted(begun, score)
         baseline = usual if begun is wide else Baseline.of(gauss_newton(begun.fit, begun), added)
         base = baseline.wide
         # of two that tie, the one that benches have and that some capture here was made to show
@@ -387,11 +406,21 @@ def _refit_best(
     return best
 
 
-def _reweighted(wide: LinearSystem, score: Score) -> LinearSystem:
+def reweighted(wide: LinearSystem, score: Score) -> LinearSystem:
     """The fit by the noise floors that a candidate begins with, if it is a coupling.
 
+    Parameters
+    ----------
+    wide
+        The fit without it.
+    score
+        The score of the candidate.
+
+    Notes
+    -----
     A twist derived from an angle amplifies its noise, at orders of the angle by hundreds. By the
     floors of a rigid shaft this noise would count as deviance.
+
     """
     if score.candidate.effect.discriminator is None:
         return wide
@@ -403,11 +432,19 @@ def _reweighted(wide: LinearSystem, score: Score) -> LinearSystem:
     return linear_system(replace(wide.fit, sigma=grown, near=begun.values))
 
 
-def _refitted(wide: LinearSystem, score: Score) -> LinearSystem:
+def refitted(wide: LinearSystem, score: Score) -> LinearSystem:
     """The fit with a candidate, started from the step that its score predicts.
 
     If that fit is no better than the one without it, a second one begins with all other parameters
     where they are: the linear step overshoots where parameters are strongly correlated.
+
+    Parameters
+    ----------
+    wide
+        The fit without it.
+    score
+        The score of the candidate.
+
     """
     tried = gauss_newton(begin_from(wide.fit, score), before=wide)
     if tried.deviance + score.penalty < wide.deviance:

@@ -21,7 +21,7 @@ from pipeline.criticism.regression.gauss_newton import (
     summed_error,
 )
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.selection.stepwise import _floored_anew
+from pipeline.criticism.selection.stepwise import floored_anew
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -70,9 +70,9 @@ def test_whichever_end_is_better_stays(monkeypatch):
         "pipeline.criticism.selection.stepwise.gauss_newton",
         linear_system,
     )
-    found = _floored_anew(lost)
+    found = floored_anew(lost)
     assert found.values["j_kgm2"] == pytest.approx(BASE["j_kgm2"], rel=0.02)
-    assert _floored_anew(found).values is found.values
+    assert floored_anew(found).values is found.values
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_a_fit_is_begun_anew_only_from_another_inertia(monkeypatch, share, times
         "pipeline.criticism.selection.stepwise.gauss_newton",
         linear_system,
     )
-    _floored_anew(lost)
+    floored_anew(lost)
     assert len(begun) == times
 
 

@@ -22,7 +22,7 @@ from pipeline.criticism.selection.candidates import Candidate
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.score_test import Score
 from pipeline.criticism.selection.sizes import material, size_of
-from pipeline.criticism.selection.stepwise import _floored_anew, search
+from pipeline.criticism.selection.stepwise import floored_anew, search
 from tests.unit.criticism.machines import (
     BASE,
     LIBRARY,
@@ -47,7 +47,7 @@ def test_the_next_effect_is_judged_against_a_fit_that_has_converged():
     """A tolerance of form is new, no floor has changed by half and nothing is left over one."""
     fit = fitted((log(noise=1.0), log(noise=1.0, seed=6)))
     moved = replace(fit, values={**fit.values, "psi_wb": (1.0 + 2e-4) * fit.values["psi_wb"]})
-    found = _floored_anew(moved)
+    found = floored_anew(moved)
     assert linear_system(moved).deviance > linear_system(found).deviance + 1.0
     assert found.values["psi_wb"] == pytest.approx(fit.values["psi_wb"], rel=2e-5)
 
@@ -216,9 +216,9 @@ def test_the_fit_is_looked_at_anew_whatever_joins(monkeypatch):
 
     def spy(fit, before):
         asked.append(fit.model.effects[-1].name)
-        return _floored_anew(fit, before)
+        return floored_anew(fit, before)
 
-    monkeypatch.setattr("pipeline.criticism.selection.stepwise._floored_anew", spy)
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise.floored_anew", spy)
     steps = search(fitted((with_drag(curved(0.1)), with_drag(curved(0.1), 6))), LIBRARY)
     assert steps[-1].added == ("windage",)
     assert asked == ["windage"]

@@ -22,7 +22,7 @@ from pipeline.criticism.selection.acceptance import _improves_held_out, is_deter
 from pipeline.criticism.selection.candidates import Candidate
 from pipeline.criticism.selection.requested_model import BaseFit
 from pipeline.criticism.selection.score_test import Score
-from pipeline.criticism.selection.stepwise import LadderStep, _refitted, search
+from pipeline.criticism.selection.stepwise import LadderStep, refitted, search
 from pipeline.criticism.selection.truncation import contradiction, explained, truncated
 from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, fitted, log, machine, with_drag
@@ -328,7 +328,7 @@ def test_a_refit_begins_again_where_the_tangent_goes_astray(
     monkeypatch.setattr(LinearSystem, "deviance", property(lambda one: float(one.residual[0])))
     fit = Fit((log(),), Model(machine(), ()), {**BASE, "r_ohm": 0.3}, (), BASE)
     wide = replace(missing_by(torque_shaft_nm=100.0**2).system, fit=fit)
-    assert _refitted(wide, score).deviance == end
+    assert refitted(wide, score).deviance == end
     assert asked == begun
 
 
