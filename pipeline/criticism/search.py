@@ -33,6 +33,7 @@ from pipeline.criticism.selection.order_scan import orders_left
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of
 from pipeline.criticism.selection.stepwise import LadderStep, search
 from pipeline.criticism.selection.truncation import SHAFT, contradiction, explained, truncated
+from pipeline.numerics.identifiability import REACH
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.diagnosis import Remainder, UnknownStructure
@@ -217,12 +218,14 @@ def _freed_share_notes(system: LinearSystem) -> Iterator[str]:
     variance = system.covariance(system.model_columns).diagonal()
     for test in free_tests(fit):
         shares = {name: fit.values[name] for name in SHARES[test]}
+        u = {name: math.sqrt(variance[system.place([name])[0]]) for name in shares}
         if max(map(abs, shares.values())) < system.policy.discovery.changed_share:
+            continue
+        if all(abs(share) < REACH * u[name] for name, share in shares.items()):
             continue
         captures = ", ".join(sorted({s.capture for s in fit.segments if s.test == test}))
         sizes = (
-            f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± "
-            f"{100.0 * math.sqrt(variance[system.place([name])[0]]):.1g} % "
+            f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± {100.0 * u[name]:.1g} % "
             f"{'higher' if share > 0 else 'lower'}"
             for name, share in shares.items()
         )

@@ -65,10 +65,12 @@ class Change:
 
 
 def by_words(value: float, difference: float, u: float, unit: str) -> str:
-    """By how much a constant is higher or lower: `5 % lower (by 0.47 ± 0.02 mWb)`."""
+    """By how much a constant is higher or lower: `5 % lower (by 0.47 ± 0.02 mWb)`; of one that is
+    next to none elsewhere without a share.
+    """
     sense = "higher" if difference * value > 0.0 else "lower"
     share = abs(difference / value) if value else math.inf
-    by = f"{100.0 * share:.3g} % " if math.isfinite(share) else ""
+    by = f"{100.0 * share:.3g} % " if share <= 1.0 else ""
     return f"{by}{sense} (by {number_text(abs(difference), u, unit)})"
 
 

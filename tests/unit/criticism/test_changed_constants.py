@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.discovery.changed_constants import changed_constant
+from pipeline.criticism.discovery.changed_constants import by_words, changed_constant
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
 from tests.unit.criticism.machines import BASE, log, machine
@@ -77,3 +77,9 @@ def test_an_effect_that_every_capture_has_is_no_change():
         s["torque_shaft_nm"] = s["torque_shaft_nm"] - 0.02 * omega / (1.0 + (omega / 20.0) ** 2)
         bent.append(replace(segment, recorded=s))
     assert change(tuple(bent)) is None
+
+
+def test_a_change_of_what_is_next_to_none_has_no_share() -> None:
+    """A wave of the back-EMF was said to be 290,000 % lower."""
+    assert by_words(1e-6, 0.3, 0.01, "Wb").startswith("higher (by ")
+    assert by_words(0.6, 0.3, 0.01, "Wb").startswith("50 % higher (by ")

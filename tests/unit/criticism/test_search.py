@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from pipeline.criticism import search
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.search import search_ladder
 from pipeline.records.comparison import ModelSpec
@@ -156,3 +158,21 @@ def test_orders_of_an_earlier_step_join_where_the_last_one_leaves_something(
     monkeypatch.setattr(search, "_sketched", lambda *_: (None, 0.0))
     assert search._by_orders(search_again, "m_unknown")[0].name == taken
     assert asked == [(), (22, 24)]
+
+
+@pytest.mark.parametrize(("u", "told"), [(0.02, True), (0.2, False)])
+def test_a_share_that_may_be_none_is_no_change(u: float, told: bool, monkeypatch) -> None:
+    """Friction of a coast was said to have changed by 1.5 ± 6 %."""
+    names = search.SHARES["spin_down"]
+    values = dict.fromkeys(names, 0.2)
+    segment = SimpleNamespace(test="spin_down", capture="coast")
+    system = SimpleNamespace(
+        fit=SimpleNamespace(values=values, segments=(segment,)),
+        policy=DEFAULT,
+        model_columns=np.arange(len(names)),
+        covariance=lambda _: u**2 * np.eye(len(names)),
+        place=lambda one: [list(names).index(one[0])],
+    )
+    monkeypatch.setattr(search, "_changing_friction_notes", lambda _: iter(()))
+    monkeypatch.setattr(search, "free_tests", lambda _: ("spin_down",))
+    assert bool(list(search._freed_share_notes(system))) == told
