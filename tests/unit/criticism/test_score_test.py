@@ -16,7 +16,7 @@ from pipeline.criticism.regression.linear_system import LinearSystem, model_colu
 from pipeline.criticism.selection.candidates import Candidate, candidates, searched, widened
 from pipeline.criticism.selection.improvement import fall_below_floor, power_share
 from pipeline.criticism.selection.score_test import Score, score_all
-from pipeline.criticism.selection.stepwise import _floored_anew
+from pipeline.criticism.selection.stepwise import floored_anew
 from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, machine, with_drag
 
 
@@ -181,7 +181,7 @@ def test_floors_are_made_anew_where_undoing_a_lag_brings_noise(lag_s, anew):
         model=before.model.with_effects(effects()["torque_lag"]),
         values={**before.values, "torque_lag.lag_s": lag_s} | NO_STAMP,
     )
-    after = _floored_anew(lagging)
+    after = floored_anew(lagging)
     assert (after.sigma is not before.sigma) is anew
     assert bool(after.sigma[0][-1] > 2.0 * before.sigma[0][-1]) is anew
 
