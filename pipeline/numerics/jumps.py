@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import grey_opening
+from scipy.ndimage import grey_opening, maximum_filter1d
 
 from pipeline.numerics.quantisation import resolution
 
@@ -48,8 +48,8 @@ def jumps(signal: Array, least: float) -> Array:
     return found
 
 
-def speed_jumps(theta_rad: Array, share: float, times: float) -> NDArray[np.bool_]:
-    """Samples at which a shaft changes its speed from one to the next.
+def speed_jumps(theta_rad: Array, share: float, times: float, beside: int = 0) -> NDArray[np.bool_]:
+    """Samples at which a shaft changes its speed from one to the next, and those beside them.
 
     Parameters
     ----------
@@ -59,6 +59,8 @@ def speed_jumps(theta_rad: Array, share: float, times: float) -> NDArray[np.bool
         Least change of the speed over the highest [1].
     times
         Least change over the usual one [1], so that neither noise nor a steady acceleration is one.
+    beside
+        Samples on either side in which the speed settles.
 
     Returns
     -------
@@ -89,4 +91,4 @@ def speed_jumps(theta_rad: Array, share: float, times: float) -> NDArray[np.bool
         least = max(share * float(np.abs(speed).max()), times * float(np.median(change)))
         lasting = grey_opening(change, _LASTING)
         found[1:-1] = change - lasting > max(least, _ROUNDED_STEPS * resolution(theta_rad), 1e-300)
-    return found
+    return maximum_filter1d(found, 2 * beside + 1)

@@ -11,6 +11,7 @@ import pytest
 from scipy.special import stdtrit
 from scipy.stats import binomtest
 
+import pipeline
 from pipeline.__main__ import main
 from pipeline.records.uncertainty import BETWEEN
 
@@ -129,3 +130,13 @@ def test_constants_of_motors_that_hide_nothing_stay_narrow(rows: list[Row]) -> N
 def test_most_constants_are_published(rows: list[Row]) -> None:
     """Nothing is bought by silence: 63 or more measured numbers of nine motors."""
     assert len(rows) >= 63
+
+
+def test_an_effect_that_was_found_takes_the_same_error_away_when_it_is_asked_for() -> None:
+    """`diagnose` named compliance at 0.7 noise floors, and `compare` with it stayed at 159."""
+    recordings = pipeline.read(BENCH / "L3")
+    (asked,) = pipeline.compare(recordings, effects=["compliance"]).motors.values()
+    assert asked.held_out < 1.0
+    share, inertia = (asked.parameters[n].value for n in ("compliance.share", "j_kgm2"))
+    true = json.loads((BENCH / "L3" / "truth.json").read_bytes())["constants"]["j_rotor_kgm2"]
+    assert (1.0 - share) * inertia == pytest.approx(true, rel=0.05)

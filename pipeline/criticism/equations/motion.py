@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
@@ -17,7 +15,6 @@ from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
 from pipeline.criticism.machine.two_masses import reach
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
-from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.shaft import (
     net_torque,
     torque_between,
@@ -63,7 +60,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     shaft = {name: log.columns[name] for name in _USED if name in log.columns}
     shaft["t_s"] = log.period_s * np.arange(log.keep.size, dtype=np.float64)
     policy = machine.policy.cutting
-    steady = ~_jumping(shaft["theta_mech_rad"], policy)
+    # what drove the shaft where its speed jumps, and settles, is in no row
+    limits = policy.jump_share, policy.jump_times, policy.jump_rows
+    steady = ~speed_jumps(shaft["theta_mech_rad"], *limits)
     each = 1 if steady.all() else 2
     window = window_between_gaps(log.period_s, log.keep & steady, policy, each)
     full = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
@@ -86,14 +85,6 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         blocks=in_time(middle, log.keep.size),
     )
     return replace(segment, unthinned=Unthinned(full))
-
-
-def _jumping(theta_rad: Array, policy: Cutting) -> NDArray[np.bool_]:
-    """Samples at which the speed jumps, and those beside them, in which it settles: what drove the
-    shaft there is in no row.
-    """
-    found = speed_jumps(theta_rad, policy.jump_share, policy.jump_times)
-    return maximum_filter1d(found, 2 * policy.jump_rows + 1)
 
 
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:

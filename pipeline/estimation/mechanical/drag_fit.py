@@ -118,9 +118,6 @@ class DragFit:
         """
         design = self.design.copy()
         design[:, 0] = driving_nm
-        if self.steady:
-            friction = linear_fit(-design[:, 1:], driving_nm, self.sigma).coefficients
-            return np.array([1.0, *friction])
         if self.by_current:
             return over_inertia(torque_fit(design, self.target, self.sigma).coefficients)
         return linear_fit(design, self.target, self.sigma).coefficients

@@ -225,7 +225,7 @@ def _part(capture: Capture, winding: Winding | None) -> _Part | None:
 def _hidden(weak: WeakRows, theta: Array, kind: int) -> NDArray[np.bool_]:
     """Windows [w] of a drive in which the speed jumps: what the current did there is in no row."""
     limits = policy().shaft_rows
-    jumping = speed_jumps(theta, limits.jump_share, limits.jump_sigmas)
+    jumping = speed_jumps(theta, limits.jump_share, limits.jump_sigmas, limits.jump_rows)
     found: NDArray[np.bool_] = weak.integral(jumping.astype(float)) > 0.0
     return found if kind == DRIVE else np.zeros(weak.count, dtype=bool)
 

@@ -30,6 +30,10 @@ class ShaftRows:
         0.03, "1", "of the highest speed, by which a speed that jumps changes from row to row",
         why="of one pump's log at 20 Hz, J was 42 % too small at 0.1 and is withheld at 0.03",
     )  # fmt: skip
+    jump_rows: int = chosen(
+        3, "rows", "rows beside a jump of the speed whose windows are left out with it",
+        why="as of a diagnosis: a loop settles there, in rows too few to follow it",
+    )  # fmt: skip
     coast_share: float = calibrated(
         0.05, "1", "of a coast-down, that a window takes",
         by=TRIED,

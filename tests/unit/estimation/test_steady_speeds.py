@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from pipeline.estimation.estimators import inertia
+from pipeline.estimation.mechanical.drag import is_steady
 from pipeline.estimation.mechanical.shaft_rows import shaft_rows
 from pipeline.records.constants import Constants
 from tests.unit.estimation.signals import estimates, known_value
@@ -56,3 +59,18 @@ def test_another_drag_and_one_sense_give_none(other) -> None:
     """What is no Coulomb and viscous drag is none, and in one sense a zero of the current is it."""
     found = estimates(inertia.ESTIMATOR, plateaus(**other), known=KNOWN)
     assert not any(found[name].known for name in NAMES)
+
+
+@pytest.mark.parametrize(
+    ("speeds", "inertia", "steady"),
+    [((-90, 40, 120), 1e-6, True), ((40, 60, 120), 1e-6, False), ((-90, 40, 120), 1e-4, False)],
+)
+def test_speeds_are_steady_where_no_torque_accelerates(speeds, inertia, steady) -> None:
+    """And of both senses: in one the zero of the current is friction."""
+    rows = SimpleNamespace(speed_rad_s=np.array(speeds, dtype=float), fastest_rad_s=120.0)
+    fit = SimpleNamespace(
+        coefficients=np.array([inertia, 0.01, 1e-4]),
+        covariance=np.diag([1e-12, 1e-8, 1e-12]),
+        chi2_dof=1.0,
+    )
+    assert is_steady(rows, fit) == steady
