@@ -32,7 +32,7 @@ from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import Diagnosis, ReportedParameter
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict, Parameters
 
-TORQUE = "torque_shaft_nm"
+TORQUE, INERTIA = "torque_shaft_nm", "j_rotor_kgm2"
 
 
 def model_verdict(
@@ -90,6 +90,7 @@ def model_verdict(
         touches=_touches(left, library),
         in_friction=_in_friction(named, library, machine),
         far_inertia=far,
+        constants=_of_the_shaft_alone(named.constants, left, library),
     )
     return _stated(model, named), diagnosis
 
@@ -175,6 +176,16 @@ def _far_inertia(
         if share is not None and None not in (share.value, share.u) and not in_coupling:
             shares[name] = share
     return shares
+
+
+def _of_the_shaft_alone(
+    constants: Parameters, left: Mapping[str, Parameters], library: Mapping[str, Effect]
+) -> dict[str, ReportedParameter]:
+    """The constants of a fit, without an inertia of all that turns where that of a datasheet may be
+    of the motor's side: a coupling is among the effects `left`, whose share is not taken off.
+    """
+    coupled = any(library[name].far_inertia for name in left if name in library)
+    return {name: one for name, one in constants.items() if not (coupled and name == INERTIA)}
 
 
 def _any_share(value: float | None, u: float | None, unit: str) -> ReportedParameter:

@@ -9,12 +9,13 @@ from dataclasses import replace
 from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import ModelVerdict
-from pipeline.records.uncertainty import propagate, type_a
+from pipeline.records.uncertainty import BETWEEN, propagate, type_a
 
-MECHANICAL = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")
+INERTIA, TAU = "j_rotor_kgm2", "tau_mech_s"
+MECHANICAL = (INERTIA, "torque_coulomb_nm", "b_visc_nm_s_rad")
 """Constants that tests of a shaft share with every effect that turns or brakes it."""
-INERTIAS = ("j_rotor_kgm2", "tau_mech_s")
-"""Constants that go with the inertia of the rotor."""
+FIT = "model"
+"""In the source of a constant of the fit that has the effects, in the place of an effect."""
 
 
 def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[str, Estimate]:
@@ -54,13 +55,28 @@ def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[st
             )
     for name in (one for one in MECHANICAL if one in changed and one in model.constants):
         changed[name] = _held_against(changed[name], model)
+    changed |= _with_its_inertia(constants, changed)
     for effect, share in list(model.far_inertia.items())[:1]:
         changed |= {
             name: _near(changed[name], effect, share)
-            for name in INERTIAS
+            for name in (INERTIA, TAU)
             if name in changed and changed[name].known
         }
     return changed
+
+
+def _with_its_inertia(
+    before: Mapping[str, Estimate], after: Mapping[str, Estimate]
+) -> dict[str, Estimate]:
+    """The mechanical time constant of an inertia that was replaced; empty where it was not."""
+    old, new, tau = before.get(INERTIA), after.get(INERTIA), after.get(TAU)
+    if old is None or new is None or tau is None or not (old.known and new.known and tau.known):
+        return {}
+    ratio = new.number / old.number
+    if ratio == 1.0:
+        return {}
+    budget = propagate([(ratio, tau.budget)])
+    return {TAU: replace(tau, value=ratio * tau.number, budget=budget)}
 
 
 def _held_against(estimate: Estimate, model: ModelVerdict) -> Estimate:
@@ -76,16 +92,17 @@ def _held_against(estimate: Estimate, model: ModelVerdict) -> Estimate:
     if estimate.known and apart <= 2.0 * math.hypot(estimate.u, u):
         return estimate
     names = " and ".join(model.sizes)
-    source = _source("model", estimate.name)
     if any(found.confused_with for found in model.missing.values()):
         words = f"a fit with {names} has {value:.4g} ± {u:.2g} {unit}"
+        source = f"{BETWEEN}residual_test:{estimate.name}"
         between = type_a(source, apart / math.sqrt(2.0)) if estimate.known else ()
         held = replace(estimate, budget=(*estimate.budget, *between))
     else:
         words = f"by a fit with {names}"
         if estimate.known:
             words += f"; without, {estimate.number:.4g} ± {estimate.u:.2g} {unit}"
-        held = replace(estimate, value=value, status="measured", budget=type_a(source, u))
+        budget = type_a(_source(FIT, estimate.name), u)
+        held = replace(estimate, value=value, status="measured", budget=budget)
     return replace(held, note="; ".join(part for part in (words, estimate.note) if part))
 
 
@@ -114,7 +131,8 @@ def combined(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[str
         for name, (value, _, _) in parts.items():
             one = changed.get(name)
             source = _source(effect, name)
-            if value is None or one is None or all(c.source != source for c in one.budget):
+            sources = set() if one is None else {c.source for c in one.budget}
+            if value is None or one is None or sources.isdisjoint({source, _source(FIT, name)}):
                 continue
             budget = tuple(c for c in one.budget if c.source != source)
             changed[name] = replace(one, value=one.number + value, budget=budget)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline.criticism.adequacy import _far_inertia, _in_friction
+from pipeline.criticism.adequacy import _far_inertia, _in_friction, _of_the_shaft_alone
 from pipeline.criticism.library.friction_parts import friction_parts
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.parameter import Machine
@@ -153,3 +153,32 @@ def test_where_two_effects_tie_a_constant_is_as_unsure_as_they_are_apart() -> No
     assert held.u == pytest.approx(5e-4 / math.sqrt(2.0), rel=1e-2)
     unknown = separated({DRY: dry(None)}, fitted("windage"))[DRY]
     assert not unknown.known
+
+
+def test_the_inertia_behind_a_transducer_in_the_coupling_is_not_that_of_all_that_turns() -> None:
+    """Its estimate is of the motor's side, and the fit's is not: none is held against the other."""
+    coupling = {"compliance": {"share": ReportedParameter(0.8, 0.01, "1")}}
+    known = {"j_rotor_kgm2": ReportedParameter(1e-3, 1e-6, "kg·m²"), DRY: fitted().constants[DRY]}
+    assert set(_of_the_shaft_alone(known, coupling, effects(None))) == {DRY}
+    assert set(_of_the_shaft_alone(known, {"windage": {}}, effects(None))) == set(known)
+
+
+def test_drag_at_no_current_has_the_iron_s_beside_a_constant_of_the_fit() -> None:
+    """B of the fit has no iron in it, and a no-load run has."""
+    known = {B: ReportedParameter(0.0001, 1e-6, "N·m·s/rad")}
+    model = replace(with_parts(lacking()), constants=known)
+    held = separated(viscous(0.0005), model)
+    assert held[B].number == pytest.approx(0.0001)
+    assert combined(held, model)[B].number == pytest.approx(0.0003)
+
+
+def test_a_time_constant_goes_with_the_inertia_that_is_replaced() -> None:
+    inertia, tau = "j_rotor_kgm2", "tau_mech_s"
+    known = {
+        inertia: Estimate(inertia, 2e-4, "kg·m²", "measured", "inertia", type_b("c", 1e-7)),
+        tau: Estimate(tau, 0.02, "s", "derived", "derived", type_b("c", 1e-5)),
+    }
+    model = replace(fitted(), constants={inertia: ReportedParameter(1e-4, 1e-7, "kg·m²")})
+    held = separated(known, model)
+    assert held[inertia].number == 1e-4
+    assert held[tau].number == pytest.approx(0.01)
