@@ -90,7 +90,7 @@ def with_starts(
     before = FitQuality.of(
         base, np.arange(len(base.columns)), base.normal_equations().best(*thorough)
     )
-    for end in _best_ends(base, offered):
+    for end in _best_ends(base, offered, before.deviance):
         effect, score = end.trial.candidate.effect, _score(base, end, before, significant)
         known = best.get(effect.name)
         if known is None or score.fall > known.fall:
@@ -99,8 +99,10 @@ def with_starts(
     return ranked(best.values())
 
 
-def _best_ends(base: LinearSystem, offered: Sequence[Candidate]) -> list[_End]:
-    """The best trial of every parameter with starts: of these, then of finer ones beside it."""
+def _best_ends(base: LinearSystem, offered: Sequence[Candidate], without: float) -> list[_End]:
+    """The best trial of every parameter with starts: of these, then of finer ones beside it. None
+    where no start has less than the deviance `without` the effect.
+    """
     machine, finer = base.fit.machine, base.policy.selection.finer_starts
     tried = [
         (c, p)
@@ -109,11 +111,11 @@ def _best_ends(base: LinearSystem, offered: Sequence[Candidate]) -> list[_End]:
         for p in c.effect.parameters_of(machine)
         if p.starts
     ]
+    starts = [[_Trial(*one, start) for start in one[1].starts] for one in tried]
     nearest = [
-        _best_end(ends)
-        for ends in _refitted_ends(
-            base, [[_Trial(*one, start) for start in one[1].starts] for one in tried]
-        )
+        end
+        for end in map(_best_end, _refitted_ends(base, starts))
+        if end.descent.deviance < without
     ]
     beside = _refitted_ends(
         base,

@@ -7,6 +7,7 @@ misses, two at a time are tried.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -65,6 +66,7 @@ def best_pair(
     offered: Sequence[Candidate],
     scores: Sequence[Score],
     added: Sequence[Effect],
+    most_deviance: float = math.inf,
 ) -> LinearSystem | None:
     """The fit with two further effects that hold only together.
 
@@ -78,6 +80,8 @@ def best_pair(
         Their scores, one an effect.
     added
         Effects that the search added to it.
+    most_deviance
+        Deviance that the fit must not exceed.
 
     Returns
     -------
@@ -98,8 +102,10 @@ def best_pair(
         if wide.deviance - tried.deviance < pair.penalty:
             continue
         tried = gauss_newton(with_all_terms(tried.fit), before=tried)
+        if tried.deviance > most_deviance:  # with fewer terms it is no smaller
+            continue
         tried = reshaped(trimmed(tried, [e.name for e in tried.fit.model.effects]))
-        if _holds(baseline, tried, pair):
+        if tried.deviance <= most_deviance and _holds(baseline, tried, pair):
             return linear_system(tried.fit)
     return None
 

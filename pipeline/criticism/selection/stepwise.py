@@ -175,10 +175,10 @@ def _with_pair(
         step = steps[place]
         model, policy = step.fit.model, step.fit.policy.selection
         scores = [s for s in step.scores if s.candidate.effect.name not in unsure]
-        both = best_pair(step.system, candidates(library, model), scores, model.effects[base:])
+        most = last.deviance - policy.tie if place < len(steps) - 1 else math.inf
+        offered, added = candidates(library, model), model.effects[base:]
+        both = best_pair(step.system, offered, scores, added, most)
         if both is None or place + 2 >= policy.most_steps:
-            continue
-        if place < len(steps) - 1 and both.deviance > last.deviance - policy.tie:
             continue
         first, second = (effect.name for effect in both.fit.model.effects[-2:])
         alone = _refloored(gauss_newton(both.fit.without(second), before=both), base)
