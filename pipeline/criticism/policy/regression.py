@@ -181,10 +181,6 @@ class NoiseFloors:
         0.5, "sample periods", "what the instant of a reversal is known to",
         source="a sample's speed is the mean of the period before and the one behind",
     )  # fmt: skip
-    creep: float = chosen(
-        1e-3, "machine scales", "speed below which friction may hold the shaft",
-        why="a resting shaft's recorded speed is noise of that size",
-    )  # fmt: skip
     rest_s: float = chosen(
         5e-3, "s", "time for which the speed must be that low",
         why="a reversal on the way is no rest",

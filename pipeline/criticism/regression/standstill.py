@@ -33,7 +33,8 @@ def at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Arr
     Notes
     -----
     Whatever the log says of its speed, a shaft that sticks is held by anything between plus and
-    minus its friction: T/√3, a rectangle's standard deviation.
+    minus its friction: T/√3, a rectangle's standard deviation. A bearing that sticks still yields:
+    so does a shaft that is slow and goes nowhere before it turns again.
 
     References
     ----------
@@ -43,11 +44,12 @@ def at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Arr
     weak = segment.weak
     if weak is None:
         return np.zeros(segment.size)
-    policy = model.policy.noise_floors
-    slow = policy.creep * model.machine.scales["speed_rad_s"]
+    policy = model.policy.cutting
+    slow = policy.slowest_share * model.machine.scales["speed_rad_s"]
     finer = x.theta_rad.size // segment.size
     pace = np.abs(x.omega_rad_s[::finer])
-    rests = _lasting(pace < slow, round(policy.rest_s / x.ts_s))
+    least = round(model.policy.noise_floors.rest_s / x.ts_s)
+    rests = _lasting(pace < slow, least, pace * x.ts_s, policy.turning_rad)
     creeping = np.flatnonzero(_with_neighbours(rests))
     if creeping.size < 2:
         return np.zeros(weak.starts.size)
@@ -105,10 +107,14 @@ def _with_neighbours(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return beside
 
 
-def _lasting(which: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
-    """The samples [n] that are in a run of at least so many: a reversal on the way is no rest."""
+def _lasting(
+    which: NDArray[np.bool_], least: int, travel_rad: Array, most_rad: float
+) -> NDArray[np.bool_]:
+    """The samples [n] that are in a run of at least so many: a reversal on the way is no rest; and
+    of no more travel: a slow turn is none.
+    """
     edges = np.flatnonzero(np.diff(which.astype(np.int8), prepend=0, append=0))
     lasting = np.zeros(which.size, dtype=bool)
     for first, end in edges.reshape(-1, 2).tolist():
-        lasting[first:end] = end - first >= least
+        lasting[first:end] = end - first >= least and travel_rad[first:end].sum() < most_rad
     return lasting
