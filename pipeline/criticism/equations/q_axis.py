@@ -157,6 +157,6 @@ EQUATION = Equation(
         form="affine",
     ),
     recorder="log",
-    sensing=Sensing(errors=frozenset({"late_speed", "voltage_jumps", "unsampled"})),
+    sensing=Sensing(errors=frozenset({"late_speed", "voltage_jumps", "unsampled", "instants"})),
     use=Use(turns=True, warms=frozenset({"drop", "flux"})),
 )

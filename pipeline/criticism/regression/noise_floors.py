@@ -209,6 +209,7 @@ def _of_voltages(segment: Segment, model: Model, values: Values) -> Array:
     if "instants" in errors and segment.instrument.timing == "instant":
         unsampled = _unsampled(segment, values, model.policy.noise_floors.jump)
         total = np.hypot(total, np.abs(projected(segment, unsampled)))
+        total = np.hypot(total, _spikes(segment, VOLTS, model.policy.noise_floors)[:, :, None])
     if any(effect.drop is not None for effect in model.effects):
         steep = steep_drops(model, values, operate(segment, segment.recorded, model, values))
         steep = steep[:: steep.size // segment.size]
@@ -346,6 +347,26 @@ def _jumps(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array
     bend[bend < policy.jump * noise] = 0.0
     rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
     return policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
+
+
+def _spikes(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array:
+    """Error [V, W] of signals that stand out in one row alone, as weak samples of each.
+
+    Between two instants a log doesn't say how long a pulse lasted: from no time to two periods, and
+    its mean is open by as much as it is.
+    """
+    weak, there = segment.weak, [name for name in names if name in segment.channels]
+    if weak is None:
+        return np.zeros((len(there), segment.size))
+    height = np.zeros((len(there), segment.size))
+    for place, name in enumerate(there):
+        before, after = np.diff(segment.recorded[name])[:-1], np.diff(segment.recorded[name])[1:]
+        least = np.minimum(np.abs(before), np.abs(after))
+        stands_out = (before * after < 0.0) & (least > policy.jump * segment.sensors.noise[name])
+        height[place, 1:-1] = np.where(stands_out, least, 0.0)
+    rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
+    spread: Array = np.sqrt((height[:, rows] ** 2) @ (weak.functions[0, 0] ** 2))
+    return spread
 
 
 def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Array:

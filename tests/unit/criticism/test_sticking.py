@@ -1,0 +1,53 @@
+"""A shaft that sticks at its reversals, and still yields there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import pipeline
+from pipeline.records.capture import Campaign
+from tests.unit.estimation.signals import capture
+
+KT = {"kt_peak_nm_a": 0.0945, "u_kt_peak_nm_a": 0.0002}
+INERTIA, COULOMB, VISCOUS = 9e-5, 0.03, 1.1e-4
+
+
+def gentle(seed: int, yields_rad_s: float = 0.06, time_s: float = 30.0) -> pipeline.Recordings:
+    """Slow sines of a speed loop of 8 Hz. Below `yields_rad_s` friction is viscous, so that the
+    shaft creeps by an encoder's count or two a row where the current does not overcome it.
+    """
+    rng, period = np.random.default_rng(seed), 2.5e-4
+    t = period * np.arange(round(time_s / period))
+    waves = zip((0.21, 0.37, 0.83), rng.uniform(0.0, 6.3, 3), strict=True)
+    wanted = sum(5.0 * np.sin(2.0 * np.pi * f * t + phase) for f, phase in waves)
+    omega, torque, integral = np.zeros(t.size), np.zeros(t.size), 0.0
+    pull = 2.0 * np.pi * 8.0 * INERTIA
+    for n in range(1, t.size):
+        error = wanted[n] - omega[n - 1]
+        integral += period * error
+        torque[n] = pull * error + 2.0 * np.pi * 2.0 * pull * integral
+        # implicit in the speed, as the slope of what yields is steep
+        free = omega[n - 1] + period / INERTIA * torque[n]
+        slope = 1.0 + period / INERTIA * (VISCOUS + COULOMB / yields_rad_s)
+        inside = free / slope
+        slides = free - np.sign(free) * period / INERTIA * COULOMB
+        sliding = slides / (1.0 + period / INERTIA * VISCOUS)
+        omega[n] = inside if abs(inside) < yields_rad_s else sliding
+    theta, count = period * np.cumsum(omega), 2.0 * np.pi / 16384
+    rows = slice(None, None, 20)
+    noise = rng.normal(0.0, 0.008, t[rows].size)
+    log = capture(
+        "drive",
+        "log",
+        t_s=t[rows],
+        iq_a=torque[rows] / KT["kt_peak_nm_a"] + noise,
+        theta_mech_rad=count * np.floor(theta[rows] / count),
+    )
+    return pipeline.Recordings({"m": Campaign("m", (log,))})
+
+
+def test_creep_of_a_shaft_that_sticks_is_nothing_that_a_model_lacks() -> None:
+    (found,) = pipeline.diagnose(gentle(1), constants=KT).motors.values()
+    assert found.verdict == "insufficient"
+    assert not found.missing
+    assert found.ladder[-1].held_out < 1.2
