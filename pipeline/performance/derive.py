@@ -31,9 +31,9 @@ from pipeline.performance.sources import (
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
-from pipeline.records.friction import combined
 from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.performance import Blank, Curve, Derived, Operation, Performance
+from pipeline.records.shaft_constants import combined
 
 SPEEDS, CURRENTS = 33, 21
 FASTEST = 4.0

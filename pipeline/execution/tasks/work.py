@@ -28,9 +28,9 @@ from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
-from pipeline.records.friction import separated
 from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.outcome import Stopwatch
+from pipeline.records.shaft_constants import separated
 
 UNTESTED = ModelVerdict("not_tested", note="the residual test is not made yet")
 

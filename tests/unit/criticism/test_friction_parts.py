@@ -14,8 +14,8 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.parameter import Machine
 from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.estimate import Estimate
-from pipeline.records.friction import combined, separated
 from pipeline.records.model_verdict import FoundEffect, ModelVerdict
+from pipeline.records.shaft_constants import combined, separated
 from pipeline.records.uncertainty import type_b
 
 B, DRY = "b_visc_nm_s_rad", "torque_coulomb_nm"

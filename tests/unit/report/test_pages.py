@@ -333,7 +333,7 @@ def test_the_fleet_shows_each_motor_once_on_one_scale(datasheet: Datasheet) -> N
         assert float(rows[motor_id][place].split(" ± ")[0]) * unit == pytest.approx(ohms, abs=5e-4)
     links = {attrs["href"] for tag, attrs in page.tags if tag == "a" and "html" in attrs["href"]}
     assert links == {"joint-P0.html", f"{file_stem('p0 <x>')}.html"}
-    assert "kt vs ke" in rows["joint-P0"][4]
+    assert "kt vs ke" in rows["joint-P0"][3]
     assert "the file ends early" in page.text
     assert "record it again" in page.text
 

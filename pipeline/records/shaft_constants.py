@@ -1,4 +1,4 @@
-"""Friction and inertia with the iron's drag and far masses separated from them, and combined."""
+"""Constants of the shaft less what effects add to them, or of the fit that has these effects."""
 
 from __future__ import annotations
 
