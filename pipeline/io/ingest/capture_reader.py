@@ -14,16 +14,22 @@ from pipeline.io.ingest.files import read_whole
 from pipeline.io.ingest.guard import refusing
 from pipeline.io.ingest.metadata import capture_meta
 from pipeline.io.ingest.survey import Survey, survey
-from pipeline.io.maps.columns import foreign_unit, is_field, last_part, to_frame
+from pipeline.io.maps.columns import (
+    common_starts,
+    foreign_unit,
+    is_field,
+    last_part,
+    to_frame,
+)
 from pipeline.io.maps.source_map import Part, SourceMap
 from pipeline.io.mcap.container import scan
 from pipeline.io.mcap.tables import read_tables
 from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT
 from pipeline.io.tables.csv_table import read_csv
 from pipeline.io.tables.foreign import find_reader
-from pipeline.io.tables.raw_table import RawTable
+from pipeline.io.tables.raw_table import RawTable, is_of_stamp
 from pipeline.physics.glossary import COLUMNS
-from pipeline.records.capture import Capture, CaptureMeta, Integrity
+from pipeline.records.capture import Capture, Integrity
 from pipeline.records.errors import CaptureError
 
 __all__ = ["Entry", "Survey", "read_capture", "survey"]
@@ -70,7 +76,9 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
         raw, source, verified = _read_foreign(content, entry)
     else:
         raw, source, verified = _read_csv(content, entry)
-    frames = [frame for table in raw if (frame := _frame(table, source, meta)) is not None]
+    starts = common_starts(raw, source)
+    framed = (to_frame(table, source, meta.pole_pairs, starts) for table in raw)
+    frames = [frame for frame in framed if frame is not None]
     if source is not None:
         frames = _with_columns(frames, source.columns_from_name(entry.path))
     if entry.form == "foreign":
@@ -86,10 +94,6 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
     # an order that the order of topics in the file has no part in
     tables = tuple(sorted(frames, key=lambda frame: (frame.columns, -frame.height)))
     return Capture(entry.capture_path, entry.sha256, integrity, meta, tables)
-
-
-def _frame(table: RawTable, source: SourceMap | None, meta: CaptureMeta) -> pl.DataFrame | None:
-    return to_frame(table, source, meta.pole_pairs)
 
 
 def _with_columns(frames: list[pl.DataFrame], stated: Mapping[str, float]) -> list[pl.DataFrame]:
@@ -143,6 +147,8 @@ def wanted(source: SourceMap | None, name: str) -> bool:
     """
     if source is None:
         return last_part(name) in COLUMNS or foreign_unit(name) is not None
+    if source.time.origin == "stamp" and is_of_stamp(name):
+        return True
     return any(is_field(part.field, name) for part in source.fields)
 
 

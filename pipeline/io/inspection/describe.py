@@ -20,7 +20,7 @@ from pipeline.io.inspection.parts import parts_of
 from pipeline.io.inspection.proposals import FieldSeen, StreamSeen, propose
 from pipeline.io.inspection.sniff import encoding_of, numeric_columns, sniff
 from pipeline.io.inspection.starter_map import Shape, map_text
-from pipeline.io.maps.columns import to_frame
+from pipeline.io.maps.columns import last_part, to_frame
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.maps.units import FOREIGN_UNITS, Scale
 from pipeline.io.mcap.container import MAGIC, Layout, scan
@@ -318,13 +318,16 @@ def _matched(
 
 
 def _stream(table: RawTable, encoding: str, answers: Mapping[str, str]) -> StreamSeen:
-    fields = propose(table, answers)
-    time = _time_s(table, fields)
+    dated = _by_stamps(table)
+    fields = propose(dated, answers)
+    time = _time_s(dated, fields)
     steps = np.diff(time) if time is not None else np.empty(0)
     step = float(np.nanmedian(steps)) if steps.size else 0.0
     rate = 1.0 / step if step > 0 else None
     clock = "" if rate is None else _clock_words(steps, step)
-    return StreamSeen(table.name, encoding, table.rows, rate, fields, clock)
+    stamped = dated is not table
+    fields = tuple(one for one in fields if not stamped or one.name != "t_s")
+    return StreamSeen(table.name, encoding, table.rows, rate, fields, clock, stamped=stamped)
 
 
 def _in_si_units(table: RawTable, fields: Sequence[FieldSeen]) -> dict[str, NDArray[np.float64]]:
@@ -354,6 +357,19 @@ def _clock_words(steps: NDArray[np.float64], step: float) -> str:
     if back:
         remarks.append(f"it stands or goes back at {counted(back, 'row')}")
     return "; ".join(remarks)
+
+
+def _by_stamps(table: RawTable) -> RawTable:
+    """A table with `t_s` in the place of the stamps of its messages, where it has no `t_s` and each
+    was sent after the one before. A recorder notes when it got a message, which may be in bursts.
+    """
+    parts, stamps = table.stamp_fields, table.stamp_ns
+    if parts is None or stamps is None or stamps.size < 2 or table.blocks:
+        return table
+    if "t_s" in map(last_part, table.fields) or not (np.diff(stamps) > 0).all():
+        return table
+    others = {name: values for name, values in table.fields.items() if name not in parts}
+    return replace(table, fields={"t_s": (stamps - stamps[0]) / 1e9, **others})
 
 
 def _time_s(table: RawTable, fields: Sequence[FieldSeen]) -> NDArray[np.float64] | None:

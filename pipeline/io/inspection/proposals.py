@@ -54,8 +54,8 @@ class FieldSeen:
 
 @dataclass(frozen=True, slots=True)
 class StreamSeen:
-    """One table or topic: rows, rate [Hz] (None without a clock), its fields, and the `parts` of a
-    log that holds several tests.
+    """One table or topic: rows, rate [Hz] (None without a clock), its fields, the `parts` of a log
+    that holds several tests, and whether its clock are the stamps of its messages.
     """
 
     name: str
@@ -65,6 +65,7 @@ class StreamSeen:
     fields: tuple[FieldSeen, ...]
     clock: str = ""
     parts: tuple[PartSeen, ...] = ()
+    stamped: bool = False
 
     @property
     def pace(self) -> str:
@@ -121,7 +122,7 @@ def propose(table: RawTable, answers: Mapping[str, str]) -> tuple[FieldSeen, ...
 def _label(table: RawTable, name: str) -> Label:
     """What a field is by its name, without the group that all fields of the table are in."""
     if table.joint_state:
-        known = JOINT_COLUMNS.get(name)
+        known = JOINT_COLUMNS.get(name, name if name in COLUMNS else None)
         return Label((known,), exact=True) if known else Label()
     bare = {field: re.split(r"[\[({]", field)[0] for field in table.fields}
     groups = Counter(text.rpartition("/")[0] for text in bare.values() if "/" in text)

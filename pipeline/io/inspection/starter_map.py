@@ -148,7 +148,8 @@ def _shape_lines(shape: Shape, increment: str | None) -> list[str]:
     lines += [f"  {_field_line(field)}" for field in shape.fields]
     if not any(field.column == "t_s" for field in shape.fields):
         if shape.topics:
-            lines += ["time:", "  from: log"]
+            stamped = all(stream.stamped for stream in shape.streams if stream.fields)
+            lines += ["time:", f"  from: {'stamp' if stamped else 'log'}"]
         elif increment:
             lines += ["time:", "  from: increment", f"  increment_s: {increment}"]
         else:

@@ -27,6 +27,8 @@ JOINT_COLUMNS = {
 }
 _BRACKET = re.compile(r"^(.*?)\s*[(\[](.*)[)\]]$")
 _NANOSECONDS_A_SECOND = 1e9
+_STAMP = "stamp"
+"""Among the fields of clocks, the stamp of a message."""
 
 
 def last_part(name: str) -> str:
@@ -174,8 +176,40 @@ def is_field(field: str, name: str) -> bool:
     return "*" in field and fnmatchcase(name, re.sub(r"[\[?]", "[\\g<0>]", field))
 
 
+def common_starts(tables: Sequence[RawTable], source: SourceMap | None) -> dict[str, int]:
+    """What the whole-number clocks of a capture's tables count from, so that tables stay in step.
+
+    Parameters
+    ----------
+    tables
+        Fields by their own names.
+    source
+        The source map; None for the contract's own form.
+
+    Returns
+    -------
+    dict of str to int
+        The first reading of all tables, by the clock's field.
+
+    """
+    starts: dict[str, int] = {}
+    for table in tables:
+        clock = next((one for one in _chosen(table, source) if one.column == "t_s"), None)
+        if source is not None and source.time.origin == "stamp":
+            name, counts = _STAMP, table.stamp_ns
+        else:
+            name, counts = ("", None) if clock is None else (clock.field, table.fields[clock.field])
+        if counts is not None and counts.size and counts.dtype.kind in "iu":
+            first = int(counts[0])
+            starts[name] = min(first, starts.get(name, first))
+    return starts
+
+
 def to_frame(
-    table: RawTable, source: SourceMap | None, pole_pairs: int | None = None
+    table: RawTable,
+    source: SourceMap | None,
+    pole_pairs: int | None = None,
+    starts: Mapping[str, int] | None = None,
 ) -> pl.DataFrame | None:
     """The contract's columns of one table.
 
@@ -187,6 +221,8 @@ def to_frame(
         The source map; None for the contract's own form.
     pole_pairs
         Of the nameplate, for fields that a drive logs in electrical terms.
+    starts
+        Of `common_starts`; None for a table by itself.
 
     Returns
     -------
@@ -199,11 +235,7 @@ def to_frame(
         A unit, the time, or a duplicate column cannot be settled.
 
     """
-    names = list(table.fields)
-    if source is None:
-        chosen = contract_fields(names, table.joint_state)
-    else:
-        chosen = mapped_fields(names, source)
+    chosen = _chosen(table, source)
     columns = {
         part.column: _converted(
             table.fields[part.field], _mechanical(part, pole_pairs), dict(table.units)
@@ -217,11 +249,20 @@ def to_frame(
     for part in (part for part in chosen if part.times is not None):
         columns[part.column] = columns[part.column] * columns[_factor(part, named)]
     clock = next((part for part in chosen if part.column == "t_s"), None)
-    time = _time(table, clock, source)
+    starts = common_starts((table,), source) if starts is None else starts
+    time = _time(table, clock, source, starts)
     if time is not None:
         columns = {"t_s": time} | columns
     frame = pl.DataFrame(columns)
     return frame if source is None else _without_blank_rows(frame)
+
+
+def _chosen(table: RawTable, source: SourceMap | None) -> list[FieldMap]:
+    """The fields of a table that are columns."""
+    names = list(table.fields)
+    if source is None:
+        return contract_fields(names, table.joint_state)
+    return mapped_fields(names, source)
 
 
 def _factor(part: FieldMap, named: Mapping[str, str]) -> str:
@@ -277,16 +318,24 @@ def _converted(values: NDArray[Any], part: FieldMap, units: Mapping[str, str]) -
         return numbers + shift if shift else numbers
 
 
-def _time(table: RawTable, clock: FieldMap | None, source: SourceMap | None) -> Array | None:
+def _time(
+    table: RawTable, clock: FieldMap | None, source: SourceMap | None, starts: Mapping[str, int]
+) -> Array | None:
     origin = "field" if source is None else source.time.origin
     if origin == "increment" and source is not None:
         return _counted(table.rows, source.time.start_s, source.time.increment_s)
     if origin in ("field", "even") and clock is not None:
-        time = _from_field(table, clock, source)
+        time = _from_field(table, clock, source, starts)
         return _even(time) if origin == "even" else time
-    if table.log_time_ns is None:
+    clock_ns: NDArray[Any] | None = table.log_time_ns
+    if origin == "stamp":
+        if table.stamp_ns is None:
+            words = f"the messages of {table.name} hold no stamp of seconds and nanoseconds"
+            raise CaptureError("missing_time", words, "use `from: log`")
+        clock_ns = table.stamp_ns - starts[_STAMP]
+    if clock_ns is None:
         return None
-    time = table.log_time_ns / _NANOSECONDS_A_SECOND
+    time = clock_ns / _NANOSECONDS_A_SECOND
     if not table.blocks:
         return time
     increment = None if source is None else source.time.increment_s
@@ -296,7 +345,7 @@ def _time(table: RawTable, clock: FieldMap | None, source: SourceMap | None) -> 
             f"the blocks of {table.name} hold no t_s",
             "write t_s into every block, or state `increment_s` in a source map",
         )
-    return time + increment * _place_in_block(table.log_time_ns)
+    return time + increment * _place_in_block(clock_ns)
 
 
 def _even(time: Array) -> Array:
@@ -332,19 +381,21 @@ def _counted(rows: int, start_s: float, increment_s: float | None) -> Array:
     return start_s + increment_s * np.arange(rows, dtype=np.float64)
 
 
-def _place_in_block(log_time_ns: NDArray[np.uint64]) -> Array:
-    """Number of each row within its block [rows]; rows of one block share the log time."""
-    first = np.flatnonzero(np.diff(log_time_ns, prepend=log_time_ns[:1] + np.uint64(1)))
-    size = np.diff(np.append(first, log_time_ns.size))
-    place: Array = np.arange(log_time_ns.size, dtype=np.float64)
+def _place_in_block(clock_ns: NDArray[np.integer[Any]]) -> Array:
+    """Number of each row within its block [rows]; rows of one block share their time."""
+    first = np.flatnonzero(np.append(True, clock_ns[1:] != clock_ns[:-1]))
+    size = np.diff(np.append(first, clock_ns.size))
+    place: Array = np.arange(clock_ns.size, dtype=np.float64)
     return place - np.repeat(first, size)
 
 
-def _from_field(table: RawTable, clock: FieldMap, source: SourceMap | None) -> Array:
-    """Time from a field; whole-number clocks count from the first row, so no digit is lost."""
+def _from_field(
+    table: RawTable, clock: FieldMap, source: SourceMap | None, starts: Mapping[str, int]
+) -> Array:
+    """Time from a field; whole-number clocks count from their first row, so no digit is lost."""
     values = table.fields[clock.field]
-    if values.dtype.kind in "iu" and values.size:
-        values = (values - values[0]).astype(np.int64)
+    if clock.field in starts:
+        values = (values - values.dtype.type(starts[clock.field])).astype(np.int64)
     wraps_at = clock.wraps or (None if source is None else source.time.wraps_at)
     if wraps_at is not None:
         numbers = values.astype(np.float64)

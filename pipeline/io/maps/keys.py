@@ -134,9 +134,10 @@ KEYS: tuple[Key, ...] = (
     ),
     Key(
         "time.from",
-        ("field", "even", "log", "increment"),
+        ("field", "even", "log", "stamp", "increment"),
         "where `t_s` comes from: a field; a field whose digits are too few, evenly spaced; the "
-        "log clock of an MCAP file; a sampling interval",
+        "log clock of an MCAP file; the stamp that a message's sender wrote into its header; a "
+        "sampling interval",
     ),
     Key("time.wraps_at", "number", "as `wraps` of the clock's field", "86400000"),
     Key("time.start_s", "number", "the first instant [s] with `from: increment`"),

@@ -14,7 +14,7 @@ from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT, CsvDialect
 from pipeline.physics.glossary import COLUMNS
 from pipeline.records.parse import number
 
-TimeFrom = Literal["field", "even", "log", "increment"]
+TimeFrom = Literal["field", "even", "log", "stamp", "increment"]
 MessageForm = Literal["auto", "row", "block"]
 Pairs = tuple[tuple[str, str], ...]
 
@@ -62,14 +62,14 @@ class TimeMap:
     Attributes
     ----------
     origin
-        A mapped field, the log clock, or start + increment · row; `even` is a field whose digits do
-        not separate neighbouring samples, so that rows are evenly spaced along the straight line
-        through it.
+        A mapped field, the log clock, the stamp in a message's header, or start + increment · row;
+        `even` is a field whose digits do not separate neighbouring samples, so that rows are evenly
+        spaced along the straight line through it.
     wraps_at
         Value at which a clock starts again from zero [the field's unit].
     start_s, increment_s
-        Used where the layout does not find them in the file [s]; an increment with the log clock
-        separates the rows of one block.
+        Used where the layout does not find them in the file [s]; an increment with the log clock or
+        with stamps separates the rows of one block.
 
     """
 
