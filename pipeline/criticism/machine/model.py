@@ -236,6 +236,9 @@ class Model:
             for c, u in base
             if u is not None
         }
+        center, least = priors["lead_ohm"]
+        switches = self.policy.priors.lead_share * sizes["voltage_v"] / sizes["current_a"]
+        priors["lead_ohm"] = center, stated.get("lead_ohm", max(least, switches))
         for effect in self.effects:
             if effect.in_place_of is not None:
                 nuisance, _ = effect.in_place_of

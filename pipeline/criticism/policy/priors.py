@@ -41,8 +41,13 @@ class Priors:
         0.08, "(ω_e T_s)²", "ripple in a held shaft's torque", source="as `priors.ripple_edge`"
     )
     lead_ohm: float = chosen(
-        5e-3, "ohm", "resistance of inverter and leads, which a commanded voltage holds",
-        why="a few milliohm of switches and leads, whatever the winding",
+        5e-3, "ohm", "least resistance of inverter and leads, which a commanded voltage holds",
+        why="a few milliohm of leads and contacts, whatever the winding",
+    )  # fmt: skip
+    lead_share: float = chosen(
+        5e-3, "voltage over current", "resistance of an inverter's switches, where it is more",
+        why="at full current switches drop half a percent of the voltage that they are made for: "
+        "2 of 325 V; milliohms at tens of amperes, tenths of an ohm in integrated drivers",
     )  # fmt: skip
     zero_a: float = derived(
         1e-3, "machine scales", "offset of the shunts",
