@@ -44,10 +44,10 @@ class Priors:
         5e-3, "ohm", "least resistance of inverter and leads, which a commanded voltage holds",
         why="a few milliohm of leads and contacts, whatever the winding",
     )  # fmt: skip
-    lead_share: float = chosen(
-        5e-3, "voltage over current", "resistance of an inverter's switches, where it is more",
-        why="at full current switches drop half a percent of the voltage that they are made for: "
-        "2 of 325 V; milliohms at tens of amperes, tenths of an ohm in integrated drivers",
+    lead_share: float = derived(
+        4.3e-3, "voltage over current", "resistance of an inverter's switches, where it is more",
+        source="the estimators' `conduction_share`, 0.0025 of the link at the top current; a phase "
+        "has 1/√3 of the link",
     )  # fmt: skip
     zero_a: float = derived(
         1e-3, "machine scales", "offset of the shunts",
