@@ -138,6 +138,7 @@ def _scales(
     shaft = 0.0 if current and voltage else _largest(campaign.captures, ("torque_shaft_nm",))
     shaft = shaft or (0.0 if current and voltage else _stated_torque(known, speed))
     clamped = _largest(tables, ("torque_shaft_nm",))
+    recorded = {"impedance_ohm": voltage / current} if current and voltage else {}
     current, voltage = current or 1.0, voltage or 1.0
     psi = voltage / (pole_pairs * speed)
     fitted = start.best("psi_pm_wb")
@@ -150,6 +151,7 @@ def _scales(
         "torque_nm": max(shaft or 1.5 * pole_pairs * psi * current, clamped),
         "period_s": min((_period(c) for c in logs), default=1e-4),
         "flux_wb": psi,
+        **recorded,
     }
 
 

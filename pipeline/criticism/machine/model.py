@@ -237,7 +237,7 @@ class Model:
             if u is not None
         }
         center, least = priors["lead_ohm"]
-        switches = self.policy.priors.lead_share * sizes["voltage_v"] / sizes["current_a"]
+        switches = self.policy.priors.lead_share * sizes.get("impedance_ohm", 0.0)
         priors["lead_ohm"] = center, stated.get("lead_ohm", max(least, switches))
         for effect in self.effects:
             if effect.in_place_of is not None:

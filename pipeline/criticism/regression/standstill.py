@@ -47,9 +47,8 @@ def at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Arr
     policy = model.policy.cutting
     slow = policy.slowest_share * model.machine.scales["speed_rad_s"]
     finer = x.theta_rad.size // segment.size
-    pace = np.abs(x.omega_rad_s[::finer])
-    least = round(model.policy.noise_floors.rest_s / x.ts_s)
-    rests = _lasting(pace < slow, least, pace * x.ts_s, policy.turning_rad)
+    least = max(round(model.policy.noise_floors.rest_s / x.ts_s), 1)
+    rests = _rests(x.omega_rad_s[::finer], slow, least, policy.turning_rad / x.ts_s)
     creeping = np.flatnonzero(_with_neighbours(rests))
     if creeping.size < 2:
         return np.zeros(weak.starts.size)
@@ -107,14 +106,20 @@ def _with_neighbours(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return beside
 
 
-def _lasting(
-    which: NDArray[np.bool_], least: int, travel_rad: Array, most_rad: float
-) -> NDArray[np.bool_]:
-    """The samples [n] that are in a run of at least so many: a reversal on the way is no rest; and
-    of no more travel: a slow turn is none.
+def _rests(speed: Array, slow: float, least: int, most: float) -> NDArray[np.bool_]:
+    """The samples [n] of runs in which a shaft is slower than `slow` and goes nowhere.
+
+    A run has `least` samples, and the sum of its speeds is below `most`: a slow turn is no rest. A
+    reversal on the way is none either: the shaft stays for twice the time in which the speed, as it
+    changes before and after, passes from `slow` to `-slow`.
     """
+    which = np.abs(speed) < slow
     edges = np.flatnonzero(np.diff(which.astype(np.int8), prepend=0, append=0))
-    lasting = np.zeros(which.size, dtype=bool)
+    rests = np.zeros(which.size, dtype=bool)
     for first, end in edges.reshape(-1, 2).tolist():
-        lasting[first:end] = end - first >= least and travel_rad[first:end].sum() < most_rad
-    return lasting
+        beside = speed[max(first - least, 0) : first + 1], speed[end - 1 : end + least]
+        change = min((np.ptp(one) / (one.size - 1) for one in beside if one.size > 1), default=0.0)
+        passes = 2.0 * slow / change if change else 0.0
+        size, travel = end - first, np.abs(speed[first:end]).sum()
+        rests[first:end] = size >= max(least, 2.0 * passes) and travel < most
+    return rests

@@ -67,10 +67,13 @@ def with_linear_start(
         form = candidate.effect.linear
         if form is None or not _exceeds_floor(wide, significant, form.channel):
             continue
-        begun = _fits_from_form(wide.fit, candidate.effect, form)
-        ends = [_fitted(one) for start in begun for one in _by_choices(start)]
+        ends: list[LinearSystem] = []
+        for start in map(_floored, _fits_from_form(wide.fit, candidate.effect, form)):
+            # the noise is the same whatever is chosen
+            ends += map(gauss_newton, _by_choices(start))
         if ends:
-            end = min(ends, key=summed_error)
+            nearest = sorted(ends, key=summed_error)[: wide.policy.selection.refits]
+            end = min((_reweighted(one.fit, one.fit) for one in nearest), key=summed_error)
             so_far = with_better(so_far, _score_of(wide, candidate, end), offered)
     return tuple(so_far)
 
@@ -151,8 +154,13 @@ def scored(wide: LinearSystem, candidate: Candidate, begun: Fit) -> Score:
 
 def _fitted(begun: Fit) -> LinearSystem:
     """A fit from a start, by the noise floors of its end."""
-    refitted = gauss_newton(replace(begun, sigma=floors(begun.segments, begun.model, begun.values)))
+    refitted = gauss_newton(_floored(begun))
     return _reweighted(refitted.fit, refitted.fit)
+
+
+def _floored(begun: Fit) -> Fit:
+    """A start with the noise floors that the segments have there."""
+    return replace(begun, sigma=floors(begun.segments, begun.model, begun.values))
 
 
 def _score_of(wide: LinearSystem, candidate: Candidate, end: LinearSystem) -> Score:

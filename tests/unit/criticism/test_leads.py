@@ -49,6 +49,19 @@ def test_leads_of_a_seventh_of_the_resistance_are_no_missing_effect() -> None:
     assert result.ladder[-1].held_out < 0.8
 
 
+@pytest.mark.parametrize(("impedance_ohm", "ohm"), [(None, 5e-3), (0.4, 5e-3), (100.0, 0.43)])
+def test_switches_of_a_small_current_have_tenths_of_an_ohm(
+    impedance_ohm: float | None, ohm: float
+) -> None:
+    """At 5 mOhm a sound motor at a drive of 300 V and 3 A was clock_scale and voltage_scale. Where
+    no current is on record, none is known.
+    """
+    usual = machine()
+    known = {} if impedance_ohm is None else {"impedance_ohm": impedance_ohm}
+    model = Model(replace(usual, scales={**usual.scales, **known}), ())
+    assert model.priors()["lead_ohm"] == (0.0, pytest.approx(ohm))
+
+
 @pytest.mark.parametrize("kind", ["measured", "commanded", None])
 def test_a_voltage_is_measured_only_where_that_is_stated(kind: VoltageKind | None) -> None:
     """A log whose kind nobody stated may hold its inverter's commands, and then its leads."""
