@@ -252,9 +252,10 @@ def smoothed(
     Returns
     -------
     array [n]
-        Smoothed by the longest parabola, up to one for all, that leaves no more than a rounding
-        does, step / √12. A shorter one would keep part of the beat between the steps and the
-        sampling, and a longer one bends that the signal has.
+        Smoothed, part by part, by the longest parabola, up to one for all, that leaves no more
+        there than a rounding does, step / √12. A shorter one would keep part of the beat between
+        the steps and the sampling, and a longer one loses bends that the signal has: a log that
+        creeps and reverses needs both.
 
     Notes
     -----
@@ -265,11 +266,14 @@ def smoothed(
     rough = signal if between is None else between
     whole = max(signal.size - 1 + signal.size % 2, 1)
     shortest, *longer = *(n for n in policy.smooth if n < whole), whole
-    for length in reversed(longer):
-        even = parabolas(rough, length)
-        if float((signal - even).std()) <= most:
-            return even
-    return parabolas(rough, shortest)
+    even = parabolas(rough, shortest)
+    starts = np.arange(max(signal.size // policy.smooth_part, 1)) * policy.smooth_part
+    sizes = np.diff(starts, append=signal.size)
+    for length in longer:
+        wider = parabolas(rough, length)
+        left = np.add.reduceat((signal - wider) ** 2, starts) / sizes if signal.size else sizes
+        even = np.where(np.repeat(left <= most**2, sizes), wider, even)
+    return even
 
 
 def scatter(signal: Array, step: float, policy: SensorNoise) -> float:

@@ -60,6 +60,10 @@ class SensorNoise:
         1.05, "1", "what they may leave, over the rounding's standard deviation",
         why="a twentieth is the scatter of a standard deviation of 200 samples",
     )  # fmt: skip
+    smooth_part: int = derived(
+        200, "samples", "part of a signal that has a parabola of its own length",
+        source="`smooth_share` is the scatter of as many",
+    )  # fmt: skip
     burst: float = chosen(
         12.0, "1", "third difference over the median one that is a jump and not the rounding",
         why="rounding alone comes to four",

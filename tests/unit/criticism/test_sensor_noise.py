@@ -392,3 +392,18 @@ def test_white_noise_is_as_loud_in_short_blocks():
     rng = np.random.default_rng(3)
     found = [sensor_noise(rng.normal(0.0, 1.0, 300), DEFAULT.sensor_noise) for _ in range(200)]
     assert np.mean(found) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_creep_between_reversals_is_smoothed_by_a_parabola_of_its_own() -> None:
+    """At nearly a step a row rounding is a slow saw-tooth: of one short length for a whole log, for
+    the sake of its reversals, it stayed, and a sound motor was `backlash`.
+    """
+    step, size = 1.0, 2000
+    row = np.arange(size)
+    creep = 0.953 * row
+    turning = creep[-1] + 40.0 * np.sin(row / 12.0)
+    even = np.concatenate([creep, turning])
+    found = smoothed(np.round(even / step), step, DEFAULT.sensor_noise)
+    inside = slice(200, size - 200)
+    assert (found - even)[inside].std() < 0.05 * step
+    assert (found - even)[size + 200 : -200].std() < 0.5 * step
