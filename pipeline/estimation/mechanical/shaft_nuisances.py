@@ -4,6 +4,8 @@ from __future__ import annotations
 
 OFFSET, COAST_LOAD = "offset", "coast load"
 """A constant torque that the drives show beyond their current; and the same in the coasts."""
+BY_SENSE = "viscous drag by sense"
+"""What viscous drag has more in one sense than in the other: in coasts of one sense it is drag."""
 CURRENT_LAG, JUMPS = "current lag", "current jumps"
 """A current that is late, and one that jumps between its samples."""
 TIMING = frozenset({CURRENT_LAG, JUMPS})

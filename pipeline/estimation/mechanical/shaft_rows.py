@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pipeline.estimation.electrical.magnet_temperature import assumed_temperature
 from pipeline.estimation.electrical.ripple_torque import Winding, ripple_by_speed
 from pipeline.estimation.mechanical.shaft_nuisances import (
+    BY_SENSE,
     COAST_LOAD,
     CURRENT_LAG,
     JUMPS,
@@ -355,6 +356,7 @@ def _nuisances(part: _Part) -> dict[str, Array]:
     return {
         OFFSET: np.full(weak.count, driven),
         COAST_LOAD: np.full(weak.count, 1.0 - driven),
+        BY_SENSE: weak.integral(np.abs(part.speed)),
         SAMPLED: weak.integral(part.theta, 1) * driven,
         JUMPS: weak.integral(_jumps(part.current)),
         "load friction": weak.integral(torque),
