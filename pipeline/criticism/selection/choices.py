@@ -40,7 +40,7 @@ def reconsidered(system: LinearSystem) -> LinearSystem:
             break
         if effect.discriminator is not None:
             continue
-        for other in _choices(effect, system.fit):
+        for other in other_choices(effect, system.fit):
             fit = system.fit
             start = replace(fit, values={**fit.values, **other})
             system = better_of(system, start, fit.policy.selection.tie)
@@ -71,8 +71,22 @@ def better_of(system: LinearSystem, start: Fit, least: float) -> LinearSystem:
     return tried if tried.deviance < limit else system
 
 
-def _choices(effect: Effect, fit: Fit) -> Iterator[Values]:
-    """Every choice of an effect but that of the fit, by full names."""
+def other_choices(effect: Effect, fit: Fit) -> Iterator[Values]:
+    """Every choice inside an effect but that of a fit.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    fit
+        A fit with it.
+
+    Yields
+    ------
+    Values
+        By full names.
+
+    """
     machine = fit.model.machine
     chosen = [p for p in effect.parameters_of(machine) if p.choice and len(p.scan) > 1]
     grids = [[(f"{effect.name}.{p.name}", v * machine.scale(p)) for v in p.scan] for p in chosen]

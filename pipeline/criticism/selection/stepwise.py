@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +31,7 @@ from pipeline.criticism.selection.acceptance import (
 from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.changed_between import with_free_shares
 from pipeline.criticism.selection.changed_over_time import with_changing_friction
-from pipeline.criticism.selection.choices import reconsidered
+from pipeline.criticism.selection.choices import other_choices, reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
 from pipeline.criticism.selection.improvement import clears
@@ -436,7 +436,9 @@ def refitted(wide: LinearSystem, score: Score) -> LinearSystem:
     """The fit with a candidate, started from the step that its score predicts.
 
     If that fit is no better than the one without it, a second one begins with all other parameters
-    where they are: the linear step overshoots where parameters are strongly correlated.
+    where they are: the linear step overshoots where parameters are strongly correlated. If it falls
+    far short of the score, further ones begin by the other choices inside the effect, whose
+    tangents may be one: a late stamp is a lag of first order where both are small.
 
     Parameters
     ----------
@@ -447,10 +449,23 @@ def refitted(wide: LinearSystem, score: Score) -> LinearSystem:
 
     """
     tried = gauss_newton(begin_from(wide.fit, score), before=wide)
+    if wide.deviance - tried.deviance < wide.policy.selection.close_share * score.fall:
+        starts = (begin_from(wide.fit, other) for other in _with_other_choices(wide, score))
+        ends = [gauss_newton(start, before=wide) for start in starts]
+        tried = min([tried, *ends], key=lambda end: end.deviance)
     if tried.deviance + score.penalty < wide.deviance:
         return tried
     again = gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)
     return min(tried, again, key=lambda end: end.deviance)
+
+
+def _with_other_choices(wide: LinearSystem, score: Score) -> Iterator[Score]:
+    """The score of a candidate by every other choice inside its effect."""
+    candidate = score.candidate
+    if candidate.effect.discriminator is None:
+        begun = begin_from(wide.fit, score)
+        for other in other_choices(candidate.effect, begun):
+            yield replace(score, candidate=replace(candidate, values={**candidate.values, **other}))
 
 
 def _other_inertia(rough: Fit, fit: Fit) -> bool:

@@ -27,8 +27,7 @@ from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.setups import another_setup, setups_of
 from pipeline.estimation.mechanical.shaft_doubts import DRAGS, Doubts
 from pipeline.estimation.mechanical.shaft_nuisances import (
-    BY_SENSE,
-    COAST_LOAD,
+    BESIDE_OFFSET,
     NUISANCES,
     OFFSET,
     RELUCTANCE,
@@ -247,8 +246,8 @@ def _drag(
         nuisances = [name for name in nuisances if not is_of_size(name)]
         drag = drag_of(rows, law, nuisances, level)
     if OFFSET in drag.names:
-        # an error of the current, a load, or a sense: in coasts of one sense that would be friction
-        drag = drag_of(rows, law, [*nuisances, COAST_LOAD, BY_SENSE], level)
+        # in coasts of one sense these would be friction
+        drag = drag_of(rows, law, [*nuisances, *BESIDE_OFFSET], level)
     return drag
 
 
