@@ -12,11 +12,12 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.score_test import score_all
-from pipeline.criticism.selection.stepwise import begin_from, search
+from pipeline.criticism.selection.stepwise import begin_from, refitted, search
 from pipeline.criticism.selection.unusual_nuisances import with_nuisances
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -158,3 +159,18 @@ def test_an_effect_takes_over_the_nuisance_that_it_is_at_an_unusual_size():
     assert begun.model.priors()["late_torque_s"][1] < 1e-3 * usual_s
     saved = wide.only(wide.model_columns).deviance - linear_system(begun).deviance
     assert saved == pytest.approx(score.fall, rel=0.1)
+
+
+def test_a_lag_that_was_begun_as_a_late_stamp_is_the_lag():
+    """Their tangents are one. Where a refit falls far short of it, the other choice is tried."""
+    fit = fitted_behind(2e-3)
+    offered = candidates({"torque_lag": effects()["torque_lag"]}, fit.model)
+    wide = widened(fit, offered)
+    (score,) = with_nuisances(wide, offered, score_all(wide, offered, significant_groups(wide)))
+    stamp = {**score.candidate.values, "torque_lag.stamped": 1.0}
+    begun = replace(score, candidate=replace(score.candidate, values=stamp))
+    late, lag = (refitted(wide, replace(begun, fall=fall)) for fall in (0.0, 1e3 * score.fall))
+    assert late.fit.values["torque_lag.stamped"] == 1.0
+    assert lag.fit.values["torque_lag.stamped"] == 0.0
+    assert lag.deviance < late.deviance
+    assert lag.fit.values["torque_lag.lag_s"] == pytest.approx(2e-3, rel=0.02)
