@@ -16,6 +16,9 @@ from scipy.linalg import lapack
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.regression import GaussNewton
 
+_UNSEEN = 1e-200
+"""Information [1] below which no capture observes a parameter: of a bump of friction at a speed that
+no coast comes near there is 1e-320, and squares of steps along it overflow."""
 _TIE = 1e-11
 """Share of the largest information below which a direction has none, far above the rounding of
 doubles (1e-16). Larger, and constants that captures barely determine are held; smaller, and
@@ -346,7 +349,7 @@ def pseudo_inverse(normal: Array) -> Array:
     """
     information = np.diag(normal)
     # a parameter that no capture observes stays where it is, exactly
-    size = np.sqrt(np.where(information > 0.0, information, 1.0))
+    size = np.sqrt(np.where(information > _UNSEEN, information, 1.0))
     power, axes = np.linalg.eigh(normal / np.outer(size, size))
     nonzero = power > _TIE * max(float(power[-1]), 1.0)
     inverse: Array = (axes[:, nonzero] / power[nonzero]) @ axes[:, nonzero].T
@@ -360,7 +363,7 @@ def _solved(normal: Array, slope: Array) -> Array:
     if not slope.size:
         return slope
     information = np.diag(normal)
-    size = np.sqrt(np.where(information > 0.0, information, 1.0))
+    size = np.sqrt(np.where(information > _UNSEEN, information, 1.0))
     scaled = np.triu(normal / np.outer(size, size))
     entries = np.abs(scaled)
     norm = float((entries.sum(axis=0) + entries.sum(axis=1)).max(initial=1.0)) - 1.0
