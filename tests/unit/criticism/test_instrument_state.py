@@ -161,16 +161,16 @@ def test_an_effect_takes_over_the_nuisance_that_it_is_at_an_unusual_size():
     assert saved == pytest.approx(score.fall, rel=0.1)
 
 
-def test_a_lag_that_was_begun_as_a_late_stamp_is_the_lag():
+def test_a_late_stamp_that_was_begun_as_a_lag_is_the_stamp():
     """Their tangents are one. Where a refit falls far short of it, the other choice is tried."""
     fit = fitted_behind(2e-3)
     offered = candidates({"torque_lag": effects()["torque_lag"]}, fit.model)
     wide = widened(fit, offered)
     (score,) = with_nuisances(wide, offered, score_all(wide, offered, significant_groups(wide)))
-    stamp = {**score.candidate.values, "torque_lag.stamped": 1.0}
-    begun = replace(score, candidate=replace(score.candidate, values=stamp))
-    late, lag = (refitted(wide, replace(begun, fall=fall)) for fall in (0.0, 1e3 * score.fall))
-    assert late.fit.values["torque_lag.stamped"] == 1.0
+    of_lag = {**score.candidate.values, "torque_lag.stamped": 0.0}
+    begun = replace(score, candidate=replace(score.candidate, values=of_lag))
+    lag, late = (refitted(wide, replace(begun, fall=fall)) for fall in (0.0, 1e3 * score.fall))
     assert lag.fit.values["torque_lag.stamped"] == 0.0
-    assert lag.deviance < late.deviance
-    assert lag.fit.values["torque_lag.lag_s"] == pytest.approx(2e-3, rel=0.02)
+    assert late.fit.values["torque_lag.stamped"] == 1.0
+    assert late.deviance < lag.deviance - 100.0
+    assert late.fit.values["torque_lag.lag_s"] == pytest.approx(2e-3, rel=0.02)
