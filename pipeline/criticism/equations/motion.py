@@ -156,7 +156,7 @@ EQUATION = Equation(
     observes=Observes(
         (
             *("ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad"),
-            *("ripple_mean", "ripple_torque", *STATE),
+            *("ripple_mean", "ripple_torque", "ripple_sampled", *STATE),
         ),
         hooks=frozenset({"flux", "torque"}),
         sensors=frozenset({"angle", "current", "clock"}),

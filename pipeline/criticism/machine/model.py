@@ -97,6 +97,7 @@ BASE: tuple[Constant, ...] = (
     ),
     Constant("ripple_torque", "1", "T_s di/dt of the current in the torque", hook="hold"),
     Constant("ripple_held", "1", "(ω_e T_s)², ripple in a held shaft's torque", hook="hold"),
+    Constant("ripple_sampled", "s", "from a pulse's sample to its mean", hook="hold"),
     Constant("bench_angle_rad", "rad", "electrical zero of the bench's encoder", hook="bench"),
     Constant("lead_ohm", "ohm", "resistance of inverter and leads"),
     Constant("zero_alpha_a", "A", "α offset of the shunts", 0.0, "state", "current_a", "zero_a"),

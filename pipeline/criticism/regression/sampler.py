@@ -38,7 +38,7 @@ _NOTHING = 1e-40
 """What complex steps leave of a term that is zero."""
 _FINE = 1e-3
 """Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
-_BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
+_BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held", "ripple_sampled")
 """Constants that change no flux, drop or drag."""
 _OF_SENSORS = ("bench_angle_rad", *STATE)
 """Constants by which the machine's true state is another."""

@@ -22,7 +22,7 @@ from pipeline.criticism.signals.true_current import ahead_in
 from pipeline.criticism.signals.voltage import central
 from pipeline.records.row_means import row_means
 
-TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
+TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held", "ripple_sampled")
 """Nuisances of the current's ripple that are in the torque (`model.BASE`)."""
 
 
@@ -107,14 +107,35 @@ def torque_between(segment: Segment, x: Operating, pieces: Pieces, values: Value
 
     The current moves on for a part of a period; and while a held voltage turns, both are off their
     means. A free shaft responds to sample-period means; a locked shaft's transducer has a
-    nuisance parameter of its own.
+    nuisance parameter of its own. A sample that is not in the middle of a pulse is off its mean by
+    what the back-EMF moves the current over the time between, in proportion to speed.
     """
     if not any(values[name] for name in TORQUE_RIPPLES):
         return np.zeros(x.theta_rad.size)
     flux, current = ripple(x, values["ripple_held" if x.shaft.held else "ripple_mean"], values)
-    torque = _torque_of_current(x, pieces, _moved_on(segment, x, values) - current)
+    moved = _moved_on(segment, x, values) + _sampled_beside(x, values) - current
+    torque = _torque_of_current(x, pieces, moved)
     ripple_torque: Array = 1.5 * x.machine.pole_pairs * (np.conj(flux) * x.i_a).imag
     return torque - ripple_torque
+
+
+def _sampled_beside(x: Operating, values: Values) -> Complex:
+    """Mean of a pulse of the current over its sample [n, A]: j ω_e ψ_m τ/L_q of a drive's own.
+
+    Parameters
+    ----------
+    x
+        True state [n].
+    values
+        Parameters by full name; `ripple_sampled` is the time τ.
+
+    """
+    late_s = values["ripple_sampled"] * float(x.inverter and x.supply.hold_s > 0.0)
+    l_h = max(values["lq_h"], values["ld_h"] / x.machine.policy.cutting.saliency)
+    if not late_s or not l_h:
+        return np.zeros(x.theta_rad.size, dtype=np.complex128)
+    back_emf = x.machine.pole_pairs * x.omega_rad_s * values["psi_wb"]
+    return 1j * late_s / l_h * back_emf
 
 
 def _moved_on(segment: Segment, x: Operating, values: Values) -> Complex:

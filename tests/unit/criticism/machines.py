@@ -36,6 +36,7 @@ BASE = {
     "command_lead": 0.0,
     "ripple_torque": 0.0,
     "ripple_held": 0.0,
+    "ripple_sampled": 0.0,
     "bench_angle_rad": 0.0,
     "lead_ohm": 0.0,
     **dict.fromkeys((*STATE, *(one.name for one in BASE if one.hook in ("gain", "log"))), 0.0),
