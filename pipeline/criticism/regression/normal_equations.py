@@ -17,8 +17,8 @@ from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.regression import GaussNewton
 
 _UNSEEN = 1e-200
-"""Information [1] below which no capture observes a parameter: of a bump of friction at a speed that
-no coast comes near there is 1e-320, and squares of steps along it overflow."""
+"""Information [1] below which no capture observes a parameter: of a bump of friction at a speed
+that no coast comes near there is 1e-320, and squares of steps along it overflow."""
 _TIE = 1e-11
 """Share of the largest information below which a direction has none, far above the rounding of
 doubles (1e-16). Larger, and constants that captures barely determine are held; smaller, and

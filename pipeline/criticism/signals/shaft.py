@@ -135,7 +135,7 @@ def _sampled_beside(x: Operating, values: Values) -> Complex:
     if not late_s or not l_h:
         return np.zeros(x.theta_rad.size, dtype=np.complex128)
     back_emf = x.machine.pole_pairs * x.omega_rad_s * values["psi_wb"]
-    return 1j * late_s / l_h * back_emf
+    return (1j * late_s / l_h * back_emf).astype(np.complex128)
 
 
 def _moved_on(segment: Segment, x: Operating, values: Values) -> Complex:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.normal_equations import NormalEquations, Prior
+from pipeline.criticism.regression.normal_equations import NormalEquations, Prior, pseudo_inverse
 
 GROUP = np.repeat([0, 1, 2], [40, 60, 30])
 NOTHING = np.zeros(4)
@@ -76,3 +76,17 @@ def test_sheared_is_the_same_as_columns_added_to_another():
     direct = normal_equations(changed, residual)
     assert sheared.slope == pytest.approx(direct.slope)
     assert sheared.normal == pytest.approx(direct.normal)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-170, 1e-160])
+def test_a_column_of_next_to_nothing_is_one_that_no_row_observes(size):
+    """A bump of friction at a speed that no coast comes near: squares of steps along it overflow,
+    and a diagnosis ended with an error of the linear algebra.
+    """
+    matrix, residual = rows(bad=0.0)
+    full = normal_equations(matrix[:, :3], residual, NOTHING[:3], NOTHING[:3]).best()
+    matrix[:, 3] *= size
+    end = normal_equations(matrix, residual).best()
+    assert end.step == pytest.approx([*full.step, 0.0], rel=1e-9)
+    assert end.deviance == pytest.approx(full.deviance, rel=1e-12)
+    assert np.isfinite(pseudo_inverse(matrix.T @ matrix)).all()

@@ -363,3 +363,23 @@ def test_a_drive_is_allowed_the_drop_of_a_ripple_where_a_period_is_no_small_part
     torque = 10.5 * BASE["psi_wb"] * current * gain
     assert large.max() == pytest.approx(torque, rel=0.2)
     assert usual.max() < 0.5 * large.max()
+
+
+def test_a_pulse_that_is_sampled_off_its_middle_has_a_torque_in_proportion_to_speed():
+    """K² τ ω/(1.5 L_q) of the EMF's own torque constant K, as the estimators know it. Without it a
+    sampled current was held against a coast as exact, and a sound motor was unknown.
+    """
+    late_s, segment = 0.5e-6, log()
+    model = Model(machine(), ())
+    moved, still = (
+        residual(segment, model, {**BASE, "ripple_sampled": value}) for value in (late_s, 0.0)
+    )
+    theta = segment.recorded["theta_mech_rad"]
+    omega = np.gradient(theta, segment.ts_s)
+    per_ampere = 1.5 * 7 * BASE["psi_wb"]
+    expected = per_ampere**2 * late_s * omega / (1.5 * BASE["lq_h"])
+    change = (still - moved)[2, 50:-50]
+    # L_q i_d less L_d i_d is in the torque per ampere too
+    assert np.abs(change - expected[50:-50]).max() < 0.15 * np.abs(expected).max()
+    assert np.corrcoef(change, expected[50:-50])[0, 1] > 0.99
+    assert (still - moved)[:2, 50:-50] == pytest.approx(0.0, abs=1e-12)
