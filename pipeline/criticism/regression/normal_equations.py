@@ -5,6 +5,8 @@ Weights are one number a group, so that a fit whose weights change needs the sam
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -16,9 +18,9 @@ from scipy.linalg import lapack
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.regression import GaussNewton
 
-_UNSEEN = 1e-200
-"""Information [1] below which no capture observes a parameter: of a bump of friction at a speed
-that no coast comes near there is 1e-320, and squares of steps along it overflow."""
+_UNSEEN = math.sqrt(sys.float_info.min)
+"""Information [1] below which no capture observes a parameter, as its square is no number: a bump
+of friction at a speed that no coast comes near has 1e-320, and steps along it overflow."""
 _TIE = 1e-11
 """Share of the largest information below which a direction has none, far above the rounding of
 doubles (1e-16). Larger, and constants that captures barely determine are held; smaller, and
