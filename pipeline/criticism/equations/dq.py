@@ -155,7 +155,7 @@ def state(segment: Segment, signals: Signals, model: Model, values: Values) -> O
     motion = motion_of(segment, signals, model.machine, segment.instrument.points)
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     x = operating(segment, signals, model, values, current, motion)
-    ends = _hold_ends(segment, x, current, model) if segment.instrument.snapshots else None
+    ends = _hold_ends(segment, x, current, model, values) if segment.instrument.snapshots else None
     volts = (signals["vd_v"] + 1j * signals["vq_v"]).astype(np.complex128)
     volts = volts * (1.0 / (1.0 + values[segment.instrument.meter]))
     volts = on_points(volts, motion.theta_rad.size)
@@ -166,12 +166,13 @@ def state(segment: Segment, signals: Signals, model: Model, values: Values) -> O
 
 
 def _hold_ends(
-    segment: Segment, x: Operating, current: Complex, model: Model
+    segment: Segment, x: Operating, current: Complex, model: Model, values: Values
 ) -> tuple[tuple[float, Complex], tuple[float, Complex]]:
     """When the vector that a snapshot shows begins and ends, and the current then
-    (`Supply.hold_ends`).
+    (`Supply.hold_ends`). A commanded one acts later (`command_lead`).
     """
-    begin, end = (segment.instrument.frame + part for part in (-0.5, 0.5))
+    lead = values["command_lead"] if segment.instrument.meter == "gain_commanded" else 0.0
+    begin, end = (segment.instrument.frame + lead + part for part in (-0.5, 0.5))
     parts = (begin * x.supply.hold_s / segment.ts_s, end * x.supply.hold_s / segment.ts_s)
     both = current_between(segment, current, model, parts, HOLD_ENDS)
     first, last = both.reshape(-1, 2).T
@@ -274,7 +275,8 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
         mean = mean * x.once(
             x.theta_rad, ("behind", lag), lambda: np.exp(1j * lag * _frame_lag(segment, x))
         )
-    if commanded and (lead := values["command_lead"]) and x.supply.hold_s:
+    lead = values["command_lead"] if commanded and x.supply.hold_ends is None else 0.0
+    if lead and x.supply.hold_s:
         mean = mean + lead * x.supply.hold_s / segment.ts_s * np.gradient(mean)
     if shift:
         psi = ahead(pieces.psi_wb) if is_held else pieces.psi_wb

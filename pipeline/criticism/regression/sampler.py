@@ -40,7 +40,7 @@ _FINE = 1e-3
 """Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held", "ripple_sampled")
 """Constants that change no flux, drop or drag."""
-_OF_SENSORS = ("bench_angle_rad", *STATE)
+_OF_SENSORS = ("bench_angle_rad", "command_lead", *STATE)
 """Constants by which the machine's true state is another."""
 
 

@@ -131,15 +131,18 @@ def test_a_snapshot_is_held_whether_its_pwm_is_known(known):
     assert np.isfinite(residual(segment, PLAIN, BASE)).all()
 
 
-@pytest.mark.parametrize("frame", [0.0, 0.5])
-def test_a_snapshot_of_a_wave_is_its_mean_over_the_hold_of_one_vector(frame):
-    """ψ = ψ_m + ψ_m a e^{j6ε} by the harmonics of a back-EMF, whose mean over a turn is a sinc."""
+@pytest.mark.parametrize(("frame", "lead"), [(0.0, 0.0), (0.5, 0.0), (0.0, 1.5)])
+def test_a_snapshot_of_a_wave_is_its_mean_over_the_hold_of_one_vector(frame, lead):
+    """ψ = ψ_m + ψ_m a e^{j6ε} by the harmonics of a back-EMF, whose mean over a turn is a sinc. A
+    command acts `lead` periods later: by differences between rows, which turn the wave by 14 rad,
+    its harmonic was left in the voltage, and the motor was unknown.
+    """
     turn, hold_s, a = 2.3, 5e-5, 0.004
     segment = slow_log(turn, "instant")
-    segment = replace(segment, instrument=replace(segment.instrument, frame=frame))
-    segment = as_cut(segment)
+    instrument = replace(segment.instrument, frame=frame, meter="gain_commanded")
+    segment = as_cut(replace(segment, instrument=instrument))
     omega, held = turn / segment.ts_s, turn * hold_s / segment.ts_s
-    eps = PAIRS * segment.recorded["theta_mech_rad"] + frame * held
+    eps = PAIRS * segment.recorded["theta_mech_rad"] + (frame + lead) * held
     share = np.sinc(3.0 * held / np.pi)
     middle = 0.5 * (np.exp(6j * (eps + 0.5 * held)) + np.exp(6j * (eps - 0.5 * held)))
     wave = 1j * omega * BASE["psi_wb"] * a * (6.0 * share * np.exp(6j * eps) + middle)
@@ -153,7 +156,7 @@ def test_a_snapshot_of_a_wave_is_its_mean_over_the_hold_of_one_vector(frame):
     model = PLAIN.with_effects(effect)
     values = {**BASE, **zero(effect, model)}
     # a e^{j6ε} is a cos on the d axis and a sin on the q axis
-    values |= {"bemf_harmonics.d6_cos": a, "bemf_harmonics.q6_sin": a}
+    values |= {"bemf_harmonics.d6_cos": a, "bemf_harmonics.q6_sin": a, "command_lead": lead}
     segment = replace(segment, recorded=recorded)
     left = residual(segment, model, values)[:2, 5:-5]
     size = np.abs(wave).mean()
