@@ -219,15 +219,14 @@ def _freed_share_notes(system: LinearSystem) -> Iterator[str]:
     for test in free_tests(fit):
         shares = {name: fit.values[name] for name in SHARES[test]}
         u = {name: math.sqrt(variance[system.place([name])[0]]) for name in shares}
-        if max(map(abs, shares.values())) < system.policy.discovery.changed_share:
-            continue
-        if all(abs(share) < REACH * u[name] for name, share in shares.items()):
+        told = {n: share for n, share in shares.items() if abs(share) >= REACH * u[n]}
+        if max(map(abs, told.values()), default=0.0) < system.policy.discovery.changed_share:
             continue
         captures = ", ".join(sorted({s.capture for s in fit.segments if s.test == test}))
         sizes = (
             f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± {100.0 * u[name]:.1g} % "
             f"{'higher' if share > 0 else 'lower'}"
-            for name, share in shares.items()
+            for name, share in told.items()
         )
         yield (
             f"{' and '.join(sizes)} in {captures} than in the other captures: changed between "

@@ -52,12 +52,16 @@ def test_friction_that_repeats_to_some_percent_is_no_change(dry, viscous):
     assert (result.verdict, result.missing) == ("adequate", ())
 
 
-def test_a_bearing_that_was_cold_in_the_coasts_is_told_with_both_sizes():
+def test_a_bearing_that_was_cold_in_the_coasts_is_told_with_its_size():
+    """Its viscous drag, 40 % more, is less than what half a microsecond between a current's sample
+    and its mean is in proportion to speed.
+    """
     found = recorded("spin_down", torque_coulomb_nm=1.2, b_visc_nm_s_rad=1.4)
     result = diagnose(found, ModelSpec(), Constants())
     assert (result.verdict, result.missing) == ("unknown", ())
-    dry, viscous = sizes(next(note for note in result.notes if "dry friction" in note))
-    assert (dry, viscous) == (pytest.approx(20.0, abs=1.5), pytest.approx(40.0, abs=3.0))
+    assert sizes(next(note for note in result.notes if "dry friction" in note)) == [
+        pytest.approx(20.0, abs=1.5)
+    ]
 
 
 @pytest.mark.slow
