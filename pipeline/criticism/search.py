@@ -219,14 +219,14 @@ def _freed_share_notes(system: LinearSystem) -> Iterator[str]:
     for test in free_tests(fit):
         shares = {name: fit.values[name] for name in SHARES[test]}
         u = {name: math.sqrt(variance[system.place([name])[0]]) for name in shares}
-        told = {n: share for n, share in shares.items() if abs(share) >= REACH * u[n]}
-        if max(map(abs, told.values()), default=0.0) < system.policy.discovery.changed_share:
+        known = {n: share for n, share in shares.items() if abs(share) >= REACH * u[n]}
+        if max(map(abs, known.values()), default=0.0) < system.policy.discovery.changed_share:
             continue
         captures = ", ".join(sorted({s.capture for s in fit.segments if s.test == test}))
         sizes = (
             f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± {100.0 * u[name]:.1g} % "
             f"{'higher' if share > 0 else 'lower'}"
-            for name, share in told.items()
+            for name, share in known.items()
         )
         yield (
             f"{' and '.join(sizes)} in {captures} than in the other captures: changed between "
