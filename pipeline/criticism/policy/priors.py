@@ -40,9 +40,9 @@ class Priors:
     ripple_held: float = derived(
         0.08, "(ω_e T_s)²", "ripple in a held shaft's torque", source="as `priors.ripple_edge`"
     )
-    ripple_sampled: float = chosen(
+    ripple_sampled: float = derived(
         0.5e-6, "s", "where a drive samples a current's pulse, from where its mean is",
-        why="half of a dead time, and of what filters delay; dead times are 0.5 to 2 µs",
+        source="the estimators' `sampling_u_s`: half of a dead time, and of what filters delay",
     )  # fmt: skip
     lead_ohm: float = chosen(
         5e-3, "ohm", "least resistance of inverter and leads, which a commanded voltage holds",

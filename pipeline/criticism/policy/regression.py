@@ -185,6 +185,10 @@ class NoiseFloors:
         5e-3, "s", "time for which the speed must be that low",
         why="a reversal on the way is no rest",
     )  # fmt: skip
+    rest_passes: float = chosen(
+        2.0, "1", "time of a rest over what the speed beside it needs to pass through zero",
+        why="a shaft that turns back at once takes one",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -44,11 +44,12 @@ def at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Arr
     weak = segment.weak
     if weak is None:
         return np.zeros(segment.size)
-    policy = model.policy.cutting
+    policy, floors = model.policy.cutting, model.policy.noise_floors
     slow = policy.slowest_share * model.machine.scales["speed_rad_s"]
     finer = x.theta_rad.size // segment.size
-    least = max(round(model.policy.noise_floors.rest_s / x.ts_s), 1)
-    rests = _rests(x.omega_rad_s[::finer], slow, least, policy.turning_rad / x.ts_s)
+    least = max(round(floors.rest_s / x.ts_s), 1)
+    speed, most = x.omega_rad_s[::finer], policy.turning_rad / x.ts_s
+    rests = _rests(speed, slow, least, most, floors.rest_passes)
     creeping = np.flatnonzero(_with_neighbours(rests))
     if creeping.size < 2:
         return np.zeros(weak.starts.size)
@@ -106,12 +107,12 @@ def _with_neighbours(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return beside
 
 
-def _rests(speed: Array, slow: float, least: int, most: float) -> NDArray[np.bool_]:
+def _rests(speed: Array, slow: float, least: int, most: float, times: float) -> NDArray[np.bool_]:
     """The samples [n] of runs in which a shaft is slower than `slow` and goes nowhere.
 
     A run has `least` samples, and the sum of its speeds is below `most`: a slow turn is no rest. A
-    reversal on the way is none either: the shaft stays for twice the time in which the speed, as it
-    changes before and after, passes from `slow` to `-slow`.
+    reversal on the way is none either: the shaft stays for so many `times` what the speed, as it
+    changes before and after, takes to pass from `slow` to `-slow`.
     """
     which = np.abs(speed) < slow
     edges = np.flatnonzero(np.diff(which.astype(np.int8), prepend=0, append=0))
@@ -121,5 +122,5 @@ def _rests(speed: Array, slow: float, least: int, most: float) -> NDArray[np.boo
         change = min((np.ptp(one) / (one.size - 1) for one in beside if one.size > 1), default=0.0)
         passes = 2.0 * slow / change if change else 0.0
         size, travel = end - first, np.abs(speed[first:end]).sum()
-        rests[first:end] = size >= max(least, 2.0 * passes) and travel < most
+        rests[first:end] = size >= max(least, times * passes) and travel < most
     return rests
