@@ -352,7 +352,7 @@ def _jumps(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array
 def _spikes(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array:
     """Error [V, W] of signals that stand out in one row alone, as weak samples of each.
 
-    Between two instants a log does not say how long a pulse lasted: from no time to two periods, and
+    Between two instants a log does not say how long a pulse lasted, from no time to two periods. So
     its mean is open by as much as it is.
     """
     weak, there = segment.weak, [name for name in names if name in segment.channels]
