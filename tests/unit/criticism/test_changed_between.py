@@ -37,7 +37,7 @@ def recorded(test, plan=TESTS, **factors):
 
 def sizes(note):
     """Signed shares [%] in a note, in its order."""
-    found = re.findall(r"is ([\d.]+) ± [\d.e-]+ % (higher|lower)", note)
+    found = re.findall(r"is ([\d.]+) ± [\d.e+-]+ % (higher|lower)", note)
     return [float(size) * (1.0 if sense == "higher" else -1.0) for size, sense in found]
 
 

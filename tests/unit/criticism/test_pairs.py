@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -74,3 +75,12 @@ def test_the_coasts_are_what_they_say() -> None:
     slowed = -(theta[100:] - 2.0 * theta[50:-50] + theta[:-100]) / period**2
     law = np.array([SHAFT.slowed(omega) for omega in speed])
     assert slowed[speed > 100.0] == pytest.approx(law[speed > 100.0], rel=1e-3)
+
+
+def test_a_pair_that_explains_less_than_what_is_named_does_not_join(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given = stepwise.best_pair
+    monkeypatch.setattr(stepwise, "best_pair", lambda *all_but: given(*all_but[:4], -math.inf))
+    found = diagnose(two_drags(), ModelSpec(), Constants())
+    assert sorted(found.missing) != ["stribeck", "windage"]

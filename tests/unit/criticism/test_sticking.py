@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import pipeline
+from pipeline.criticism.regression.standstill import _rests
 from pipeline.records.capture import Campaign
 from tests.unit.estimation.signals import capture
 
@@ -51,3 +52,17 @@ def test_creep_of_a_shaft_that_sticks_is_nothing_that_a_model_lacks() -> None:
     assert found.verdict == "insufficient"
     assert not found.missing
     assert found.ladder[-1].held_out < 1.2
+
+
+def test_a_rest_is_neither_a_slow_turn_nor_a_pass_through_zero() -> None:
+    """Speeds in rad/s at 200 Hz; slower than 0.15 counts, for two rows and twice a pass."""
+    braking = np.linspace(2.0, 0.0, 20, endpoint=False)
+    still = np.array([0.08, -0.02, 0.0, 0.05, 0.0, -0.06, 0.03, 0.0])
+    stuck = np.concatenate([braking, still, -braking[::-1]])
+    passing = np.linspace(2.0, -2.0, 41)
+    turning = np.full(400, 0.1)
+    rests = [
+        _rests(speed, 0.15, 2, 0.1 * 200.0, 2.0).nonzero()[0] for speed in (stuck, passing, turning)
+    ]
+    assert {*range(20, 28)} <= {*rests[0].tolist()} <= {*range(18, 30)}
+    assert rests[1].size == rests[2].size == 0
