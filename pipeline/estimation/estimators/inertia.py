@@ -14,7 +14,7 @@ from pipeline.estimation.electrical.magnet_temperature import (
 )
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.electrical.ripple_torque import RIPPLE, winding_of
-from pipeline.estimation.mechanical.drag import drag_by_current, drag_of
+from pipeline.estimation.mechanical.drag import drag_beside_offset, drag_by_current, drag_of
 from pipeline.estimation.mechanical.drag_fit import DragFit, drag_description
 from pipeline.estimation.mechanical.drag_forms import DRAG_FORMS, DRAG_NAMES
 from pipeline.estimation.mechanical.drag_over_time import DragOverTime, drag_over_time
@@ -27,7 +27,6 @@ from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.setups import another_setup, setups_of
 from pipeline.estimation.mechanical.shaft_doubts import DRAGS, Doubts
 from pipeline.estimation.mechanical.shaft_nuisances import (
-    BESIDE_OFFSET,
     NUISANCES,
     OFFSET,
     RELUCTANCE,
@@ -246,8 +245,7 @@ def _drag(
         nuisances = [name for name in nuisances if not is_of_size(name)]
         drag = drag_of(rows, law, nuisances, level)
     if OFFSET in drag.names:
-        # in coasts of one sense these would be friction
-        drag = drag_of(rows, law, [*nuisances, *BESIDE_OFFSET], level)
+        drag = drag_beside_offset(rows, law, nuisances, level)
     return drag
 
 

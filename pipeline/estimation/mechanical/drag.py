@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import fdtrc
@@ -19,7 +20,7 @@ from pipeline.estimation.mechanical.drag_forms import (
     low_end,
 )
 from pipeline.estimation.mechanical.drive_windows import coasts_decide, drive_columns, freedom
-from pipeline.estimation.mechanical.shaft_nuisances import OF_CURRENT, TIMING
+from pipeline.estimation.mechanical.shaft_nuisances import BY_SENSE, COAST_LOAD, OF_CURRENT, TIMING
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.estimation.policy import policy
 from pipeline.numerics.clusters import cluster_covariance
@@ -87,6 +88,32 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
         design.names, fit.coefficients, covariance, fit.residuals, dof, free, u_form, reasons,
         design.columns, sigma, y, rows.fastest_rad_s,
     )  # fmt: skip
+
+
+def drag_beside_offset(
+    rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float
+) -> DragFit:
+    """The equation of motion where drives show a torque that is constant.
+
+    Parameters
+    ----------
+    rows, law, nuisances, level
+        As `drag_of` takes them.
+
+    Returns
+    -------
+    DragFit
+        It may be an error of the current, a load, or a friction that differs by sense: in coasts of
+        one sense that would be friction. So coasts have a constant torque of their own, and what
+        J, T_c and B would change by if viscous drag differed by sense too is in doubt.
+
+    """
+    drag = drag_of(rows, law, [*nuisances, COAST_LOAD], level)
+    by_sense = drag_of(rows, law, [*nuisances, COAST_LOAD, BY_SENSE], level)
+    if BY_SENSE not in by_sense.names:
+        return drag
+    change = by_sense.constants(by_sense.coefficients) - drag.constants(drag.coefficients)
+    return replace(drag, u_form=np.hypot(drag.u_form, change))
 
 
 def drag_by_current(

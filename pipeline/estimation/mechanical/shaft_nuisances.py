@@ -6,8 +6,6 @@ OFFSET, COAST_LOAD = "offset", "coast load"
 """A constant torque that the drives show beyond their current; and the same in the coasts."""
 BY_SENSE = "viscous drag by sense"
 """What viscous drag has more in one sense than in the other: in coasts of one sense it is drag."""
-BESIDE_OFFSET = (COAST_LOAD, BY_SENSE)
-"""What may join where drives show an offset: an error of their current, a load, or the sense."""
 CURRENT_LAG, JUMPS = "current lag", "current jumps"
 """A current that is late, and one that jumps between its samples."""
 TIMING = frozenset({CURRENT_LAG, JUMPS})

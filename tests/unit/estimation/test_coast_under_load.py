@@ -70,4 +70,4 @@ def test_friction_of_one_sense_is_not_that_of_both() -> None:
     found = estimates(inertia.ESTIMATOR, driven(0.0, 0.2), coast, known=known)
     for name, true in (("torque_coulomb_nm", DRY_NM), ("b_visc_nm_s_rad", VISCOUS)):
         assert abs(found[name].number - true) < 3.0 * found[name].u
-        assert found[name].number == pytest.approx(true, rel=0.1)
+        assert found[name].u < 0.3 * true
