@@ -82,14 +82,15 @@ def _with_its_inertia(
 def _held_against(estimate: Estimate, model: ModelVerdict) -> Estimate:
     """An estimate that was made without an effect, or that of the fit which has the effect.
 
-    Where both differ by more than twice the uncertainty of that, or the estimate has no value, the
-    effect is in the way. Where another effect explains the captures as well, none is taken.
+    Where both differ by more than twice the uncertainty of that, or the estimate has no value or
+    one of more than twice the uncertainty, the effect is in the way. Where another effect explains
+    the captures as well, none is taken.
     """
     value, u, unit = model.constants[estimate.name]
     if estimate.status == "stated" or value is None or u is None or not model.sizes:
         return estimate
     apart = abs(estimate.number - value) if estimate.known else math.inf
-    if estimate.known and apart <= 2.0 * math.hypot(estimate.u, u):
+    if estimate.known and apart <= 2.0 * math.hypot(estimate.u, u) and estimate.u <= 2.0 * u:
         return estimate
     names = " and ".join(model.sizes)
     if any(found.confused_with for found in model.missing.values()):
