@@ -142,7 +142,7 @@ def test_a_constant_that_lacks_an_effect_is_that_of_the_fit_which_has_it() -> No
 
 
 def test_a_constant_in_doubt_is_that_of_the_fit_which_is_sure() -> None:
-    """Viscous drag of one sense is known to 18 % where the fit with direction_friction knows it to 4 %."""
+    """Viscous drag of one sense is open by 18 %, where a fit with direction_friction has 4 %."""
     held = separated({DRY: dry(0.0197, u=5e-4)}, fitted())[DRY]
     assert (held.number, held.u) == (0.02, pytest.approx(2e-4))
 
