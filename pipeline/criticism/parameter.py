@@ -125,7 +125,7 @@ class Machine:
         Counted or stated; `slots` of the nameplate.
     scales
         Largest current, speed, torque and voltage, the sample period, and what follows from them
-        [unit of the name's suffix].
+        [unit of the name's suffix]; `impedance_ohm` only where current and voltage are on record.
     torque_orders
         Orders a turn that stand out of a slow turn.
     stated_u

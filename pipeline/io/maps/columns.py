@@ -332,7 +332,7 @@ def _time(
         if table.stamp_ns is None:
             words = f"the messages of {table.name} hold no stamp of seconds and nanoseconds"
             raise CaptureError("missing_time", words, "use `from: log`")
-        clock_ns = table.stamp_ns - starts[_STAMP]
+        clock_ns = table.stamp_ns - starts.get(_STAMP, 0)
     if clock_ns is None:
         return None
     time = clock_ns / _NANOSECONDS_A_SECOND

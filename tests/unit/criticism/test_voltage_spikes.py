@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 import pipeline
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.noise_floors import reading_error
+from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign
+from tests.unit.criticism.machines import BASE, machine
 from tests.unit.estimation.signals import capture
 
 R_OHM, L_H, PSI_WB, PAIRS = 0.1, 2e-4, 0.0125, 11
@@ -47,3 +51,27 @@ def test_a_kick_of_one_row_is_nothing_that_a_model_lacks() -> None:
     assert found.verdict == "insufficient"
     assert not found.remainder
     assert found.ladder[-1].held_out < 1.0
+
+
+def test_the_q_axis_alone_allows_for_a_kick_of_its_whole_height() -> None:
+    """Volts for a row, in the windows that have one; none is in a log without."""
+    t, kick = ROW_S * np.arange(900), 3.0
+    rng = np.random.default_rng(4)
+    speed = 6.0 * np.sin(2.0 * np.pi * 0.11 * t)
+    errors = []
+    for height in (0.0, kick):
+        kicks = np.where(np.arange(t.size) % 47 == 30, height, 0.0)
+        volts = PAIRS * PSI_WB * speed + kicks + rng.normal(0.0, 0.01, t.size)
+        current = 1.0 + 0.5 * np.sin(2.0 * np.pi * 0.071 * t) + rng.normal(0.0, 0.01, t.size)
+        log = capture(
+            "drive", "log", voltage_kind="commanded", t_s=t, iq_a=current, vq_v=volts,
+            omega_mech_rad_s=speed,
+        )  # fmt: skip
+        found = segments(Campaign("m", (log,)), machine(PAIRS))
+        (q_axis,) = [one for one in found if "vq_v" in one.channels]
+        model = Model(machine(PAIRS), ())
+        errors.append(reading_error(q_axis, model, BASE)[q_axis.channels.index("vq_v"), :, 0])
+    assert q_axis.weak is not None
+    window = q_axis.weak.functions[0, 0]
+    assert errors[0].max() < 0.02 * kick * window.max()
+    assert errors[1].max() > 0.9 * kick * window.max()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 
 import numpy as np
@@ -101,3 +102,15 @@ def test_topics_with_whole_numbers_for_a_clock_stay_in_step(tmp_path: Path) -> N
     capture = read(tmp_path, stream.getvalue(), text)
     starts = {table.columns[1]: table["t_s"][0] for table in capture.tables}
     assert starts == pytest.approx({"iq_a": 0.0, "theta_mech_rad": 7e-3})
+
+
+def test_rows_of_one_message_follow_its_stamp_by_the_increment(tmp_path: Path) -> None:
+    messages = []
+    for n in range(5):
+        stamp = {"sec": 7 + n, "nanosec": 500_000_000}
+        block = {"header": {"stamp": stamp}, "position": [0.1, 0.2, 0.3], "effort": [1.0, 2.0, 3.0]}
+        messages.append(("/joint_states", START_NS, json.dumps(block).encode()))
+    text = JOINT_MAP + "messages: block\ntime: {from: stamp, increment_s: 0.25}\n"
+    (table,) = read(tmp_path, mcap_file(messages, metadata={}), text).tables
+    expected = (np.arange(5.0)[:, None] + 0.25 * np.arange(3.0)).ravel()
+    np.testing.assert_allclose(table["t_s"], expected, atol=1e-12)
