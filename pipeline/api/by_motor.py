@@ -72,5 +72,12 @@ class ByMotor(Shown, Mapping[str, One]):
         str
             `motor`, or the first motor_id where it is None.
 
+        Raises
+        ------
+        KeyError
+            If `motor` is None and there is no motor.
+
         """
+        if motor is None and not self.motors:
+            raise KeyError("there is no motor")
         return next(iter(self.motors)) if motor is None else motor

@@ -12,7 +12,7 @@ from pipeline.api import frames
 from pipeline.api.by_motor import ByMotor
 from pipeline.api.fits import Fits, MotorFit
 from pipeline.api.models import model_spec
-from pipeline.api.options import check_options
+from pipeline.api.options import check_options, names_of
 from pipeline.api.recordings import Options
 from pipeline.execution.caches.stamp import configuration_digest, stamp_of
 from pipeline.execution.jobs import MotorJob
@@ -22,6 +22,7 @@ from pipeline.io.storage.diagnoses import read_diagnoses
 from pipeline.io.storage.limits import limits_file, release_conditions
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.diagnosis_summary import DiagnosisSummary
+from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Stopwatch
 from pipeline.settings import ModelSettings, RunSettings
 from pipeline.views.tables import CONSTANT_SCHEMA, constant_rows, texts
@@ -124,7 +125,9 @@ def check(
     Raises
     ------
     UsageError
-        For an unknown limits file, check, option, model or effect.
+        For an unknown limits file, release, check, option, model or effect.
+    TypeError
+        For anything but the result of `fit`.
 
     Examples
     --------
@@ -139,6 +142,10 @@ def check(
     ['resistance_balance']
 
     """
+    if not isinstance(fits, Fits):
+        raise TypeError(f"check takes the result of fit, not a {type(fits).__name__}")
+    if release not in ("manual", "auto"):
+        raise UsageError(f"release={release} is unknown", "it is manual or auto")
     settings = RunSettings(
         fit=dict(fits.options),
         constants=dict(fits.stated),
@@ -146,7 +153,7 @@ def check(
         limits=limits,
         release=release,
         residual_test=model is not None,
-        model=ModelSettings(name=model or "standard", effects=list(effects)),
+        model=ModelSettings(name=model or "standard", effects=names_of(effects)),
         diagnose="auto" if diagnose else "false",
     )
     check_options(settings)

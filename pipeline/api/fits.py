@@ -13,7 +13,7 @@ from pipeline.api import frames
 from pipeline.api.by_motor import ByMotor
 from pipeline.api.figure import Figure, figure
 from pipeline.api.options import check_options
-from pipeline.api.recordings import Options, Recordings
+from pipeline.api.recordings import Options, Recordings, recordings_of
 from pipeline.estimation.registry import Failure, fit_all
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.capture import Campaign
@@ -189,11 +189,9 @@ def fit(
     (7.0, 'measured')
 
     """
-    from pipeline.api.recordings import read
-
     chosen, stated = dict(options or {}), dict(constants or {})
     check_options(RunSettings(fit=chosen, constants=stated))
-    given = recordings if isinstance(recordings, Recordings) else read(recordings)
+    given = recordings_of(recordings)
     motors = {}
     for name, campaign in given.campaigns.items():
         known = replace(campaign, stated=stated)

@@ -12,8 +12,8 @@ import polars as pl
 from pipeline.api import frames
 from pipeline.api.by_motor import ByMotor
 from pipeline.api.figure import Figure, figure
-from pipeline.api.options import check_constants
-from pipeline.api.recordings import Recordings, read
+from pipeline.api.options import check_constants, names_of
+from pipeline.api.recordings import Recordings, recordings_of
 from pipeline.execution.tasks.start import start_constants
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import Comparison, ModelSpec
@@ -29,6 +29,12 @@ ERROR_SCHEMA = {
     "n": pl.Int64,
     "n_eff": pl.Float64,
 }
+COMPARISON_SCHEMA = {
+    **texts("motor_id model"),
+    "effects": pl.List(pl.String),
+    "held_out": pl.Float64,
+}
+TRACE_SCHEMA = texts("motor_id capture signal kind split") | numbers("t_s measured model residual")
 PARAMETER_SCHEMA = texts("motor_id parameter") | numbers("value u") | texts("unit")
 LADDER_SCHEMA = {
     "motor_id": pl.String,
@@ -103,7 +109,7 @@ class Comparisons(ByMotor[Comparison]):
             for name, model in self.motors.items()
             for one in model.traces
         ]
-        return pl.concat(parts) if parts else pl.DataFrame()
+        return pl.concat(parts) if parts else pl.DataFrame(schema=TRACE_SCHEMA)
 
     def plot(self, signal: str, capture: str, motor: str | None = None) -> Figure:
         """One signal of one capture: measured, model, and the residual below.
@@ -138,8 +144,7 @@ class Comparisons(ByMotor[Comparison]):
 
     def _table(self) -> pl.DataFrame:
         rows = [(n, one.name, list(one.effects), one.held_out) for n, one in self.motors.items()]
-        names = ["motor_id", "model", "effects", "held_out"]
-        return pl.DataFrame(rows, schema=names, orient="row")
+        return pl.DataFrame(rows, schema=COMPARISON_SCHEMA, orient="row")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -201,10 +206,18 @@ class Diagnoses(ByMotor[Diagnosis]):
         Figure
             One line a signal; 1 is the noise floor.
 
+        Raises
+        ------
+        ValueError
+            If the diagnosis has no ladder, as the captures could not fit the model.
+
         """
         from pipeline.report.charts.step_chart import step_chart
 
         motor_id = self.motor_or_first(motor)
+        if not self.motors[motor_id].ladder:
+            notes = "; ".join(self.motors[motor_id].notes)
+            raise ValueError(f"{motor_id}: no ladder to draw: {notes}")
         ladder = self.ladder.filter(pl.col("motor_id") == motor_id)
         steps = ladder.unique("step", maintain_order=True)["added"].to_list()
         over = {
@@ -283,7 +296,7 @@ def compare(
     from pipeline.criticism.comparison import compare as compare_one
 
     spec = model_spec(model, effects, effects_path, policy)
-    campaigns = _stated(_recordings(recordings).campaigns, constants)
+    campaigns = _stated(recordings_of(recordings).campaigns, constants)
     return Comparisons({n: compare_one(c, spec, start_constants(c)) for n, c in campaigns.items()})
 
 
@@ -348,7 +361,7 @@ def diagnose(
     from pipeline.criticism.diagnosis import diagnose as diagnose_one
 
     spec = model_spec(model, effects, effects_path, policy)
-    campaigns = _stated(_recordings(recordings).campaigns, constants)
+    campaigns = _stated(recordings_of(recordings).campaigns, constants)
     return Diagnoses({n: diagnose_one(c, spec, start_constants(c)) for n, c in campaigns.items()})
 
 
@@ -396,12 +409,9 @@ def model_spec(
 
     if name not in MODELS:
         raise UsageError(f"no model {name!r}", f"known are {', '.join(MODELS)}")
-    known_effects(effects, effects_path)
-    return ModelSpec(name, tuple(effects), effects_path, policy_changes(policy or {}))
-
-
-def _recordings(given: Recordings | str | Path) -> Recordings:
-    return given if isinstance(given, Recordings) else read(given)
+    names = names_of(effects)
+    known_effects(names, effects_path)
+    return ModelSpec(name, tuple(names), effects_path, policy_changes(policy or {}))
 
 
 def _only(row: Mapping[str, Any], schema: Mapping[str, Any]) -> dict[str, Any]:

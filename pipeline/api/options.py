@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
 
@@ -48,6 +48,25 @@ def check_options(settings: RunSettings) -> None:
     _check("fit", fits, {e.name: e.options for e in estimators()})
     _check("gates", settings.gates, {g.name: g.settings() for g in gates()})
     _check("crosscheck", settings.crosscheck, {r.name: r.options for r in rules()})
+
+
+def names_of(effects: Sequence[str]) -> list[str]:
+    """The names of effects that a caller gives.
+
+    Parameters
+    ----------
+    effects
+        Names of effects.
+
+    Raises
+    ------
+    UsageError
+        One text, which would be taken letter by letter.
+
+    """
+    if isinstance(effects, str):
+        raise UsageError(f"effects={effects!r} is no list", f"write effects=[{effects!r}]")
+    return list(effects)
 
 
 def check_constants(stated: Mapping[str, Any]) -> None:

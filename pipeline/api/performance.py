@@ -34,7 +34,7 @@ def operate(sheet: Datasheet, *, vdc_v: float, current_a: float, **others: float
     UsageError
         For conditions that no motor is operated at.
     TypeError
-        For a condition that there is not.
+        For a condition that there is not, or anything but one datasheet.
 
     Examples
     --------
@@ -47,6 +47,10 @@ def operate(sheet: Datasheet, *, vdc_v: float, current_a: float, **others: float
     0.663 N·m, 0.662 to 0.664
 
     """
+    if not isinstance(sheet, Datasheet):
+        raise TypeError(
+            f"operate takes one datasheet, sheets[motor_id], not {type(sheet).__name__}"
+        )
     unknown = sorted(set(others) - CONDITIONS)
     if unknown:
         raise TypeError(

@@ -11,6 +11,7 @@ import polars as pl
 
 from pipeline.api import frames
 from pipeline.api.by_motor import Shown
+from pipeline.api.options import check_options
 from pipeline.execution.tasks.captures import ReadTask, usable_captures
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
@@ -21,6 +22,7 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import UsageError
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted
+from pipeline.settings import RunSettings
 
 Options = Mapping[str, Mapping[str, float]]
 """Options by the name of a gate, an estimator or a check."""
@@ -95,7 +97,7 @@ class Recordings(Shown):
         """
         return max(self._capture(path).tables, key=lambda table: table.height)
 
-    def only(self, motor: str | None = None, tests: tuple[str, ...] = ()) -> Recordings:
+    def only(self, motor: str | None = None, tests: str | tuple[str, ...] = ()) -> Recordings:
         """The recordings of one motor, of some tests, or of both.
 
         Parameters
@@ -103,7 +105,7 @@ class Recordings(Shown):
         motor : str, optional
             A motor_id; all motors without it.
         tests : tuple of str
-            Names of tests; all tests where it is empty.
+            Names of tests, or one name; all tests where it is empty.
 
         Returns
         -------
@@ -111,9 +113,9 @@ class Recordings(Shown):
             Motors without any such capture are left out.
 
         """
-        kept = {}
+        kept, named = {}, (tests,) if isinstance(tests, str) else tests
         for name, campaign in self.campaigns.items():
-            captures = campaign.of(*tests) if tests else campaign.captures
+            captures = campaign.of(*named) if named else campaign.captures
             if captures and motor in (None, name):
                 kept[name] = replace(campaign, captures=captures)
         return replace(self, campaigns=kept)
@@ -174,7 +176,7 @@ def read(
     Raises
     ------
     UsageError
-        If the folder, the source map or the motor does not exist.
+        If the folder, the source map, the motor, a gate or its option does not exist.
 
     Examples
     --------
@@ -186,6 +188,7 @@ def read(
     ['motor_id', 'path', 'test']
 
     """
+    check_options(RunSettings(gates=dict(gates or {})))
     place = str(folder)
     input_folder(place)
     sources = source_maps(source)
@@ -203,3 +206,26 @@ def read(
             campaigns[name] = Campaign(name, captures)
     used = {n: tuple(e.source for e in own if e.source) for n, own in entries.items()}
     return Recordings(campaigns, tuple(findings), sources=used)
+
+
+def recordings_of(given: Recordings | str | Path) -> Recordings:
+    """Recordings, or those of a folder.
+
+    Parameters
+    ----------
+    given
+        The result of `read` or `simulate`, or a folder to read.
+
+    Raises
+    ------
+    TypeError
+        If it is neither.
+    UsageError
+        If there is no such folder.
+
+    """
+    if isinstance(given, Recordings):
+        return given
+    if not isinstance(given, (str, Path)):
+        raise TypeError(f"a {type(given).__name__} is neither Recordings nor a folder to read")
+    return read(given)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from pipeline.api.options import check_options
 from pipeline.api.recordings import Options, Recordings
 from pipeline.contracts.validate import validate
 from pipeline.io.ingest.metadata import capture_meta
@@ -18,7 +19,7 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
-from pipeline.settings import SimulateSettings, named_file
+from pipeline.settings import RunSettings, SimulateSettings, named_file
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.catalogue import bench_from, fleet_from, motor_from, seed_of, with_effects
 from pipeline.simulator.design import EXACT, Bench, Motor, Recording
@@ -70,7 +71,7 @@ def simulate(
     Raises
     ------
     UsageError
-        For an unknown design or effect, or an impossible size.
+        For an unknown design, effect, gate or option, or an impossible size.
 
     Examples
     --------
@@ -80,6 +81,7 @@ def simulate(
     ('gimbal-5208-3',)
 
     """
+    check_options(RunSettings(gates=dict(gates or {})))
     words = effects if isinstance(effects, str) else f"[{','.join(effects)}]"
     settings = SimulateSettings(
         output="-", motor=motor, effects=words, outside=outside, seed=seed, exact=exact

@@ -150,6 +150,7 @@ def test_a_terminal_shows_a_table_and_no_arrays(recordings, fits, sheets):
 def test_part_of_the_recordings(recordings):
     few = recordings.only(tests=("spin_down",))
     assert set(few.captures["test"]) == {"spin_down"}
+    assert recordings.only(tests="spin_down").captures.equals(few.captures)
     assert len(recordings.only(motor="nobody")) == 0
     with pytest.raises(KeyError):
         recordings.signals("no/such/capture.csv")
@@ -184,6 +185,50 @@ def test_what_is_wrong_is_said():
         pipeline.fit(pipeline.simulate(exact=True).only(tests=("lcr",)), options={"nothing": {}})
     with pytest.raises(UsageError, match="no model 'perfect'"):
         pipeline.compare(pipeline.simulate().only(tests=("lcr",)), "perfect")
+
+
+def test_arguments_that_cannot_be_meant(recordings, fits, sheets):
+    """Each was taken in silence, or ended in an error that did not name it."""
+    with pytest.raises(UsageError, match="no such gate"):
+        pipeline.read(DEMO / MOTOR, gates={"nothing": {"enabled": 0}})
+    with pytest.raises(UsageError, match="enabled=no is not 1 or 0"):
+        pipeline.simulate(gates={"clock_jump": {"enabled": "no"}})
+    with pytest.raises(UsageError, match="release=at_once is unknown"):
+        pipeline.check(fits, release="at_once")
+    for function, given in (
+        (pipeline.compare, recordings),
+        (pipeline.diagnose, recordings),
+        (pipeline.check, fits),
+    ):
+        with pytest.raises(UsageError, match=r"write effects=\['cogging'\]"):
+            function(given, effects="cogging")
+    for function in (pipeline.fit, pipeline.compare, pipeline.diagnose):
+        with pytest.raises(TypeError, match="a Fits is neither Recordings nor a folder"):
+            function(fits)
+    with pytest.raises(TypeError, match="the result of fit, not a Recordings"):
+        pipeline.check(recordings)
+    with pytest.raises(TypeError, match="one datasheet"):
+        pipeline.operate(sheets, vdc_v=24.0, current_a=9.0)
+
+
+def test_results_of_no_motor(recordings):
+    nobody = recordings.only(motor="nobody")
+    fits, comparisons = pipeline.fit(nobody), pipeline.compare(nobody)
+    assert comparisons.residuals.columns[:3] == ["motor_id", "capture", "signal"]
+    assert comparisons.errors.height == 0
+    for plot in (
+        lambda: fits.plot("current_step"),
+        lambda: comparisons.plot("vq_v", "drive.csv"),
+        pipeline.diagnose(nobody).plot,
+    ):
+        with pytest.raises(KeyError, match="there is no motor"):
+            plot()
+
+
+def test_a_diagnosis_without_a_ladder_says_why(recordings):
+    diagnoses = pipeline.diagnose(recordings.only(tests=("resistance",)))
+    with pytest.raises(ValueError, match="no ladder to draw: the captures cannot fit"):
+        diagnoses.plot()
 
 
 def test_nothing_is_written(tmp_path, monkeypatch):
