@@ -124,7 +124,7 @@ def _no_comparison(
     campaign: Campaign, model: ModelSpec, names: tuple[str, ...], *notes: str
 ) -> Comparison:
     """No errors, and why there are none."""
-    return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), notes)
+    return Comparison(campaign.motor_id, model.name, names, {}, (), None, (), notes)
 
 
 @dataclass(frozen=True, slots=True)

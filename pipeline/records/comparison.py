@@ -210,7 +210,8 @@ class Comparison:
     errors
         One a signal, capture and split.
     held_out
-        Error of captures that the model was not fitted to, over the noise floor [1].
+        Error of captures that the model was not fitted to, over the noise floor [1]; None where no
+        capture could be used.
     where
         What variables the error depends on.
     notes
@@ -237,7 +238,7 @@ class Comparison:
     effects: tuple[str, ...]
     parameters: Mapping[str, ModelParameter]
     errors: tuple[SignalError, ...]
-    held_out: float
+    held_out: float | None
     where: tuple[Dependence, ...] = field(repr=False)
     notes: tuple[str, ...] = field(default=())
     maps: tuple[ErrorMap, ...] = field(default=(), repr=False)

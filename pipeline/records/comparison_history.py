@@ -31,7 +31,14 @@ class Earlier:
         result
             The comparison.
 
+        Raises
+        ------
+        ValueError
+            Nothing was compared.
+
         """
+        if result.held_out is None:
+            raise ValueError(f"{result.motor_id}: nothing was compared")
         return cls(result.name, result.effects, result.held_out, result.bare)
 
 

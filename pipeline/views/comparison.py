@@ -120,7 +120,7 @@ def headline(result: Comparison) -> str:
         The comparison.
 
     """
-    if not result.errors:
+    if not result.errors or result.held_out is None:
         return "; ".join(result.notes)
     held_out = any(error.split == "held_out" for error in result.errors)
     what = "held-out error" if held_out else "error of the fit, none held out,"

@@ -96,6 +96,7 @@ def test_an_ohmmeter_lacks_no_column():
     )
     found = compare(replace(shipped(), captures=readings), STANDARD, Constants())
     assert not found.errors
+    assert found.held_out is None
     (note,) = found.notes
     assert "needs" not in note and "no equation takes the readings of an ohmmeter" in note
     assert all(capture.path in note for capture in readings)

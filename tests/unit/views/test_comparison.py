@@ -117,6 +117,6 @@ def test_hostile_names_stay_text() -> None:
 
 
 def test_without_errors_the_page_says_why() -> None:
-    none = Comparison("m", "standard", (), {}, (), 0.0, (), ("record a torque map",))
+    none = Comparison("m", "standard", (), {}, (), None, (), ("record a torque map",))
     assert "Record a torque map" in render_comparison(none)
     assert comparison_text(none) == "m: record a torque map"
