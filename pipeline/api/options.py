@@ -9,7 +9,7 @@ from typing import Any
 
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.errors import UsageError
-from pipeline.records.stated import may_be_stated
+from pipeline.records.stated import may_be_stated, number_wanted
 from pipeline.settings import RunSettings
 
 KINDS = {"fit": "estimator", "gates": "gate", "crosscheck": "check"}
@@ -70,7 +70,7 @@ def names_of(effects: Sequence[str]) -> list[str]:
 
 
 def check_constants(stated: Mapping[str, Any]) -> None:
-    """Refuses a stated constant that there is not, and a value that is no number.
+    """Refuses a stated constant that there is not, and a value that it cannot have.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ def check_constants(stated: Mapping[str, Any]) -> None:
     Raises
     ------
     UsageError
-        No such constant can be stated, a value is no finite number, or an uncertainty is below 0 or
-        of no stated constant.
+        No such constant can be stated, a value is no number or out of the glossary's range, or an
+        uncertainty is below 0 or of no stated constant.
 
     """
     for key, value in stated.items():
@@ -90,9 +90,9 @@ def check_constants(stated: Mapping[str, Any]) -> None:
             near = get_close_matches(name, filter(may_be_stated, CONSTANTS), 3)
             hint = f"did you mean {', '.join(near)}?" if near else "docs/glossary.md lists them"
             raise UsageError(f"constants.{key}: no constant {name!r} can be stated", hint)
-        term, number = CONSTANTS[name], isinstance(value, (int, float)) and math.isfinite(value)
-        if not number or isinstance(value, bool) or (key != name and value < 0.0):
-            raise UsageError(f"constants.{key}={value} is no number", f"write it in {term.unit}")
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if words := number_wanted(key, value if number else None):
+            raise UsageError(f"constants.{key}={value} is no {words}", "write one, or leave it out")
         if key != name and name not in stated:
             raise UsageError(f"constants.{key} is of no stated constant", f"state {name} as well")
 

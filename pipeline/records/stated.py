@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 
@@ -27,6 +28,31 @@ def may_be_stated(name: str) -> bool:
 
     """
     return name in CONSTANTS and name not in METADATA
+
+
+def number_wanted(key: str, value: float | None) -> str | None:
+    """What a stated number should be, in words; None where it is.
+
+    Parameters
+    ----------
+    key
+        `NAME` or `u_NAME` of a constant that may be stated.
+    value
+        What is stated [the constant's unit]; None where it is no number.
+
+    Returns
+    -------
+    str or None
+        The glossary's range of the constant; an uncertainty is from 0 on.
+
+    """
+    name = key.removeprefix("u_")
+    term = CONSTANTS[name]
+    low, high = (term.low, term.high) if key == name else (0.0, None)
+    low, high = -math.inf if low is None else low, math.inf if high is None else high
+    if value is not None and math.isfinite(value) and low <= value <= high:
+        return None
+    return f"number from {low:g} to {high:g} [{term.unit}]"
 
 
 def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:

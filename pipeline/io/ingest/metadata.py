@@ -15,7 +15,7 @@ from pipeline.records.capture import CaptureMeta
 from pipeline.records.errors import CaptureError, merged
 from pipeline.records.finding import Finding
 from pipeline.records.parse import ParseError, decoded, is_text
-from pipeline.records.stated import may_be_stated
+from pipeline.records.stated import may_be_stated, number_wanted
 
 MANIFEST = "manifest.csv"
 SIDECAR_SUFFIX = ".meta.yaml"
@@ -214,8 +214,9 @@ def capture_meta(values: Mapping[str, str]) -> CaptureMeta:
                     faults.append(fault)
         elif key != "contract":
             extra[key] = value
-            if may_be_stated(key.removeprefix("u_")) and parse.number(value) is None:
-                faults.append(_bad_value(key, value, "write a number in the constant's unit"))
+            if may_be_stated(key.removeprefix("u_")):
+                number = number_wanted(key, parse.number(value))
+                faults += [_bad_value(key, value, f"write a {number}")] if number else []
     if faults:
         raise merged(faults)
     return CaptureMeta(**known, extra=dict(sorted(extra.items())))

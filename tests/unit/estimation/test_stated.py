@@ -89,10 +89,26 @@ def test_the_configuration_goes_before_the_captures_and_the_most_frequent_before
     assert (lq.number, lq.u) == (3e-3, 1e-5)
 
 
-def test_a_statement_that_is_no_number_is_refused():
-    texts = {"contract": "1", "motor_id": "M", "test": "drive", "kt_peak_nm_a": "0,118"}
-    with pytest.raises(CaptureError, match=r"kt_peak_nm_a is '0,118'"):
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [
+        ("kt_peak_nm_a", "0,118"),
+        ("kt_peak_nm_a", "0"),
+        ("psi_pm_wb", "-0.0058"),
+        ("u_psi_pm_wb", "-1e-4"),
+    ],
+)
+def test_a_statement_that_no_motor_has_is_refused(key, text):
+    """A diagnosis of captures that state a negative flux linkage divided by zero."""
+    texts = {"contract": "1", "motor_id": "M", "test": "drive", key: text}
+    with pytest.raises(CaptureError, match=f"{key} is '{text}'; for {key} write a number from"):
         capture_meta(texts)
+
+
+def test_the_range_of_a_statement_is_the_glossary_s():
+    texts = {"psi_pm_wb": "0.0058", "u_psi_pm_wb": "0", "b_visc_nm_s_rad": "-1e-6"}
+    extra = capture_meta({"contract": "1", "motor_id": "M", "test": "drive", **texts}).extra
+    assert extra == texts
 
 
 @pytest.mark.parametrize(
@@ -100,6 +116,7 @@ def test_a_statement_that_is_no_number_is_refused():
     [
         ("constants={kt_peek_nm_a: 1}", "did you mean kt_peak_nm_a"),
         ("constants={kt_peak_nm_a: high}", "is no number"),
+        ("constants={psi_pm_wb: -0.0058}", "psi_pm_wb=-0.0058 is no number from 1e-12 to 100 [Wb]"),
         ("constants={u_kt_peak_nm_a: 0.1}", "state kt_peak_nm_a as well"),
         ("constants={pole_pairs: 7}", "can be stated"),
     ],
