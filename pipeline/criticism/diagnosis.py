@@ -47,9 +47,10 @@ from pipeline.criticism.selection.missing_data import (
 )
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.other_readings import reading_notes
+from pipeline.criticism.selection.removal import loss_without
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of
 from pipeline.criticism.selection.score_test import Score
-from pipeline.criticism.selection.stepwise import LadderStep, loss_without
+from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.criticism.validation.signature import signature
 from pipeline.physics.notation import number_text
 from pipeline.records.capture import Campaign

@@ -12,7 +12,8 @@ from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import Hum, hum_of, with_hum
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
-from pipeline.criticism.selection.stepwise import floored_anew, refitted, reweighted, scored
+from pipeline.criticism.selection.refit import floored_anew, refitted, reweighted
+from pipeline.criticism.selection.stepwise import scored
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from pipeline.criticism.regression.gauss_newton import (
     summed_error,
 )
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.selection.stepwise import floored_anew
+from pipeline.criticism.selection.refit import floored_anew
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -67,7 +67,7 @@ def test_whichever_end_is_better_stays(monkeypatch):
     segments = tuple(log(seed=n, noise=1.0) for n in (1, 2))
     lost = astray(segments)
     monkeypatch.setattr(
-        "pipeline.criticism.selection.stepwise.gauss_newton",
+        "pipeline.criticism.selection.refit.gauss_newton",
         linear_system,
     )
     found = floored_anew(lost)
@@ -85,11 +85,11 @@ def test_a_fit_is_begun_anew_only_from_another_inertia(monkeypatch, share, times
     lost = Fit(segments, STRIBECK, values, floors(segments, STRIBECK, values), values)
     begun = []
     monkeypatch.setattr(
-        "pipeline.criticism.selection.stepwise.first_fit",
+        "pipeline.criticism.selection.refit.first_fit",
         lambda near: begun.append(near) or first_fit(near),
     )
     monkeypatch.setattr(
-        "pipeline.criticism.selection.stepwise.gauss_newton",
+        "pipeline.criticism.selection.refit.gauss_newton",
         linear_system,
     )
     floored_anew(lost)

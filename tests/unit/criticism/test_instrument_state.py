@@ -16,8 +16,9 @@ from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.candidates import candidates, widened
+from pipeline.criticism.selection.refit import begin_from, refitted
 from pipeline.criticism.selection.score_test import score_all
-from pipeline.criticism.selection.stepwise import begin_from, refitted, search
+from pipeline.criticism.selection.stepwise import search
 from pipeline.criticism.selection.unusual_nuisances import with_nuisances
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants

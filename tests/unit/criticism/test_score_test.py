@@ -15,8 +15,8 @@ from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
 from pipeline.criticism.selection.candidates import Candidate, candidates, searched, widened
 from pipeline.criticism.selection.improvement import fall_below_floor, power_share
+from pipeline.criticism.selection.refit import floored_anew
 from pipeline.criticism.selection.score_test import Score, score_all
-from pipeline.criticism.selection.stepwise import floored_anew
 from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, machine, with_drag
 
 

@@ -16,13 +16,14 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.criticism.selection import stepwise
+from pipeline.criticism.selection import best_candidate
 from pipeline.criticism.selection.acceptance import _form_error_factors, _same_hook, is_determined
 from pipeline.criticism.selection.candidates import Candidate
+from pipeline.criticism.selection.refit import floored_anew
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.score_test import Score
 from pipeline.criticism.selection.sizes import material, size_of
-from pipeline.criticism.selection.stepwise import floored_anew, search
+from pipeline.criticism.selection.stepwise import search
 from tests.unit.criticism.machines import (
     BASE,
     LIBRARY,
@@ -183,7 +184,7 @@ def test_an_effect_that_is_not_there_at_its_own_size_shadows_none():
 def test_candidates_are_tried_by_what_they_are_worth(monkeypatch):
     """Of two that tie, the cheaper one comes first: only a few are refitted."""
     tried = []
-    monkeypatch.setattr(stepwise, "_chosen", lambda _, passing, *__: tried.extend(passing))
+    monkeypatch.setattr(best_candidate, "_chosen", lambda _, passing, *__: tried.extend(passing))
     wide = linear_system(fitted((log(noise=1.0),)))
     one = Score(
         Candidate(effects()["windage"], ()),
@@ -196,7 +197,7 @@ def test_candidates_are_tried_by_what_they_are_worth(monkeypatch):
         policy=wide.policy.selection,
     )
     dear, cheap = one, replace(one, fall=49.0, penalty=12.0)
-    stepwise._best(wide, (dear, cheap), 0, frozenset())
+    best_candidate.best_candidate(wide, (dear, cheap), 0, frozenset())
     assert tried == [cheap, dear]
 
 
@@ -320,7 +321,7 @@ def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkey
 
     hidden = tuple(with_drag(curved(0.1), seed) for seed in (5, 6))
     assert search(fitted(hidden), LIBRARY)[-1].added == ("windage",)
-    monkeypatch.setattr("pipeline.criticism.selection.stepwise.is_determined", unsure)
+    monkeypatch.setattr("pipeline.criticism.selection.best_candidate.is_determined", unsure)
     assert search(fitted(hidden), LIBRARY)[-1].added == ()
 
 
@@ -336,7 +337,7 @@ def test_an_explanation_of_unsure_size_does_not_speak_where_it_does_not_act(monk
 
     hidden = tuple(with_drag(curved(0.1), seed) for seed in (5, 6))
     for name, answer in (("is_determined", sure), ("acts_in", acts)):
-        monkeypatch.setattr(f"pipeline.criticism.selection.stepwise.{name}", answer)
+        monkeypatch.setattr(f"pipeline.criticism.selection.best_candidate.{name}", answer)
     added = search(fitted(hidden), LIBRARY)[-1].added
     assert added
     assert "windage" not in added

@@ -20,9 +20,10 @@ from pipeline.criticism.regression.linear_system import LinearSystem, model_colu
 from pipeline.criticism.search import Ladder, ladder_from
 from pipeline.criticism.selection.acceptance import _improves_held_out, is_determined
 from pipeline.criticism.selection.candidates import Candidate
+from pipeline.criticism.selection.refit import refitted
 from pipeline.criticism.selection.requested_model import BaseFit
 from pipeline.criticism.selection.score_test import Score
-from pipeline.criticism.selection.stepwise import LadderStep, refitted, search
+from pipeline.criticism.selection.stepwise import LadderStep, search
 from pipeline.criticism.selection.truncation import contradiction, explained, truncated
 from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, fitted, log, machine, with_drag
@@ -323,8 +324,7 @@ def test_a_refit_begins_again_where_the_tangent_goes_astray(
         deviance = foreseen if asked[-1] == 0.4 else near
         return replace(before, fit=start, residual=np.full(before.size, deviance))
 
-    stepwise = "pipeline.criticism.selection.stepwise"
-    monkeypatch.setattr(f"{stepwise}.gauss_newton", gauss_newton)
+    monkeypatch.setattr("pipeline.criticism.selection.refit.gauss_newton", gauss_newton)
     monkeypatch.setattr(LinearSystem, "deviance", property(lambda one: float(one.residual[0])))
     fit = Fit((log(),), Model(machine(), ()), {**BASE, "r_ohm": 0.3}, (), BASE)
     wide = replace(missing_by(torque_shaft_nm=100.0**2).system, fit=fit)

@@ -14,13 +14,15 @@ from pipeline.criticism.machine.model import zero
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.removal import unsure_effect
 from pipeline.criticism.selection.score_test import Score
-from pipeline.criticism.selection.stepwise import _unsure, search
+from pipeline.criticism.selection.stepwise import search
 from tests.unit.criticism.machines import fitted, with_drag
 
 NAMES = ("coulomb_friction", "windage")
 LIBRARY = {name: effects()[name] for name in NAMES}
-STEPWISE = "pipeline.criticism.selection.stepwise"
+BEST = "pipeline.criticism.selection.best_candidate"
+REMOVAL = "pipeline.criticism.selection.removal"
 
 
 def logs(*curved_nm: float) -> tuple[Segment, ...]:
@@ -67,12 +69,12 @@ def test_a_size_that_may_be_zero_once_all_others_are_in_is_no_name(
         joined.append(system.fit.model.effects[-1].name)
         return True
 
-    monkeypatch.setattr(f"{STEPWISE}.is_determined", joins)
-    monkeypatch.setattr(f"{STEPWISE}._may_join", may_join)
+    monkeypatch.setattr(f"{BEST}.is_determined", joins)
+    monkeypatch.setattr(f"{BEST}._may_join", may_join)
     fit = fitted(logs(0.1, 0.1))
     assert set(search(fit, LIBRARY)[-1].added) == set(joined) == set(NAMES)
-    monkeypatch.setattr(f"{STEPWISE}.sure_amplitudes", sure)
-    monkeypatch.setattr(f"{STEPWISE}.clears", lambda *_: False)
+    monkeypatch.setattr(f"{REMOVAL}.sure_amplitudes", sure)
+    monkeypatch.setattr(f"{REMOVAL}.clears", lambda *_: False)
     joined.clear()
     steps = search(fit, LIBRARY)
     assert [step.added for step in steps] == [(), ("coulomb_friction",)]
@@ -82,7 +84,7 @@ def test_a_size_that_may_be_zero_once_all_others_are_in_is_no_name(
 def test_a_size_of_which_captures_disagree_by_more_than_itself_may_be_zero(
     curved_nm: tuple[float, ...], name: str | None
 ) -> None:
-    found = _unsure(with_all(logs(*curved_nm), *LIBRARY.values()), 0)
+    found = unsure_effect(with_all(logs(*curved_nm), *LIBRARY.values()), 0)
     assert (found and found[0]) == name
 
 
@@ -92,15 +94,15 @@ def test_what_takes_most_of_an_error_is_there_however_badly_its_size_is_known(
     def sure(_: LinearSystem, __: HeldOut, effect: Effect) -> list[str]:
         return [] if effect.name == "windage" else ["size"]
 
-    monkeypatch.setattr(f"{STEPWISE}.sure_amplitudes", sure)
-    assert _unsure(with_all(logs(0.6, 0.6), *LIBRARY.values()), 0) is None
+    monkeypatch.setattr(f"{REMOVAL}.sure_amplitudes", sure)
+    assert unsure_effect(with_all(logs(0.6, 0.6), *LIBRARY.values()), 0) is None
 
 
 def test_of_two_that_stand_for_one_another_one_stays() -> None:
     """Neither is known beside the other, and the captures need one of them."""
     twin = replace(LIBRARY["windage"], name="twin")
     both = with_all(logs(0.1, 0.1), *LIBRARY.values(), twin)
-    found = _unsure(both, 0)
+    found = unsure_effect(both, 0)
     assert found is not None and found[0] in ("windage", "twin")
-    assert _unsure(found[1], 0) is None
-    assert _unsure(both, 3) is None
+    assert unsure_effect(found[1], 0) is None
+    assert unsure_effect(both, 3) is None
