@@ -28,7 +28,8 @@ _SHORTEST = 24
 
 
 def with_values(capture: Capture) -> Capture | None:
-    """The capture without columns that hold no value at the samples of its richest table.
+    """The capture without columns that hold no value at the samples of its richest table, in rows
+    that no gate set aside.
 
     Parameters
     ----------
@@ -47,7 +48,10 @@ def with_values(capture: Capture) -> Capture | None:
         return None
     if capture.meta.test not in TESTS_WITHOUT_CLOCK and not _rises(table):
         return None
-    names_of = [[n for n in t.columns if _has_values(t, n, table)] for t in capture.tables]
+    names_of = [
+        [name for name in t.columns if _has_values(t, name, table, capture.kept(place))]
+        for place, t in enumerate(capture.tables)
+    ]
     if all(set(names) <= {"t_s"} for names in names_of):
         return None
     if all(len(names) == len(t.columns) for names, t in zip(names_of, capture.tables, strict=True)):
@@ -62,9 +66,13 @@ def _rises(table: pl.DataFrame) -> bool:
     return bool((np.diff(table["t_s"].to_numpy()) > 0.0).all())
 
 
-def _has_values(table: pl.DataFrame, name: str, home: pl.DataFrame) -> bool:
-    """Whether a column has a finite value, and one of another clock has it while this one ran."""
-    finite = np.isfinite(table[name].to_numpy())
+def _has_values(
+    table: pl.DataFrame, name: str, home: pl.DataFrame, kept: NDArray[np.bool_]
+) -> bool:
+    """Whether a column has a finite value in the rows that are kept, and one of another clock has
+    it while this one ran.
+    """
+    finite = np.isfinite(table[name].to_numpy()) & kept
     if table is home or not finite.any() or "t_s" not in table.columns:
         return bool(finite.any())
     known, time = table["t_s"].to_numpy()[finite], home["t_s"].to_numpy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -12,7 +13,7 @@ from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.data.traces import with_values
 from pipeline.criticism.residuals.segments import known_tests, segments
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
-from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.capture import Campaign, Capture, CaptureMeta, Mask
 from pipeline.records.constants import Constants
 
 SIGNALS = ("id_a", "iq_a", "vd_v", "vq_v", "ia_a", "vab_v", "vbc_v", "torque_shaft_nm")
@@ -67,6 +68,25 @@ def test_a_column_that_no_row_of_the_capture_s_clock_holds_is_as_good_as_not_the
     (segment,) = made_of(one)
     assert "temp_winding_degc" not in segment.recorded
     assert np.isfinite(segment.weak.project(segment.recorded["iq_a"][None])).all()
+
+
+def test_a_capture_whose_rows_are_all_set_aside_is_left_out():
+    """Its size was NaN, and so was the machine's: a diagnosis ended in a linear algebra error."""
+    one = capture("torque_map", 400, 1e-3 * np.arange(400), 0.03 * np.arange(400))
+    none = replace(one, masks=(Mask("missing_values", 0, np.zeros(400, dtype=bool)),))
+    assert with_values(none) is None
+    scales = machine_of(Campaign("m", (none, one)), Constants()).scales
+    assert scales == machine_of(Campaign("m", (one,)), Constants()).scales
+
+
+def test_a_column_that_holds_no_value_in_the_rows_that_are_kept_is_as_good_as_not_there():
+    one = capture("torque_map", 400, 1e-3 * np.arange(400), 0.03 * np.arange(400))
+    early = np.arange(400) < 100
+    warmth = pl.Series("temp_winding_degc", np.where(early, 25.0, np.nan))
+    tables = (one.tables[0].with_columns(warmth),)
+    late = replace(one, tables=tables, masks=(Mask("clock_jump", 0, ~early),))
+    assert late.has("temp_winding_degc")
+    assert not with_values(late).has("temp_winding_degc")
 
 
 def test_a_capture_that_tells_all_it_says_is_not_copied():
