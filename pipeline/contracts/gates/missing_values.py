@@ -15,6 +15,7 @@ from pipeline.records.finding import Finding
 from pipeline.records.naming import counted
 
 NAME = "missing_values"
+TWO_CLOCKS = "put columns of different clocks on one clock, or in MCAP topics of their own"
 REMEDY = "find out why the channel dropped out, and record again if those rows matter"
 
 
@@ -23,8 +24,9 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
     Notes
     -----
-    Fewer than `fewest` values of a column that the test rests on refuse, in a table with a clock;
-    without one each row is a reading by itself, and one is enough. A column with values in
+    Fewer than `fewest` values of a column that the test rests on refuse, and so do fewer rows that
+    hold all of them, in a table with a clock; without one each row is a reading by itself, and one
+    is enough. A column with values in
     fewer than `dense_share` [1] of the rows is a slow stream written into a fast table, not a
     fault: its blanks are left as they are. A stream that the test does not rest on may hold a
     single row.
@@ -53,7 +55,10 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
         if keep.all():
             continue
         holes = ", ".join(f"{n} {np.count_nonzero(~g)}" for n, g in dense.items() if not g.all())
-        words = f"{np.count_nonzero(~keep)} of {keep.size} rows miss a value ({holes}); set aside"
+        words = f"{np.count_nonzero(~keep)} of {keep.size} rows miss a value ({holes})"
+        if np.count_nonzero(keep) < fewest:
+            raise CaptureError(NAME, words, TWO_CLOCKS)
+        words += "; set aside"
         masks.append(Mask(NAME, index, keep))
         findings.append(warning(capture, NAME, words, REMEDY, span_of(~keep)))
     return Passed(tuple(masks), tuple(findings))

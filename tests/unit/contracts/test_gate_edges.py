@@ -72,6 +72,22 @@ def test_only_columns_with_holes_are_named() -> None:
     assert finding.rows == (3, 4)
 
 
+@pytest.mark.parametrize(("whole", "refused"), [(2, False), (1, True), (0, True)])
+def test_rows_of_which_none_holds_all_columns(whole: int, refused: bool) -> None:
+    """Two clocks in one table: each row held one of them, and all were set aside with a warning."""
+    odd = np.arange(400) % 2 == 1
+    odd[:whole] = True
+    current, voltage = np.where(odd, 1.0, np.nan), np.where(~odd, 1.0, np.nan)
+    voltage[:whole] = 1.0
+    made = capture("drive", iq_a=current, vq_v=voltage, theta_mech_rad=np.arange(400.0))
+    if refused:
+        with pytest.raises(CaptureError, match=r"rows miss a value \(.*; put columns of different"):
+            GATES["missing_values"].check(made, GATES["missing_values"].options)
+        return
+    (mask,) = GATES["missing_values"].check(made, GATES["missing_values"].options).masks
+    assert np.count_nonzero(mask.keep) == whole
+
+
 @pytest.mark.parametrize(("ripple", "clear"), [(0.88, True), (0.90, False)])
 def test_a_sum_stands_six_of_its_scatters_out(ripple: float, clear: bool) -> None:
     """A sum of c ± d in turn: neighbours give c² - d², of c² + d², and 10,000 rows a hundredth."""
