@@ -90,21 +90,23 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     parameters = reported_parameters(system, held_out)
     requested = _before_effects(model_of(model.bare(), machine), parameters, system, held_out)
     return Comparison(
-        campaign.motor_id,
-        model.name,
-        names,
-        parameters,
-        (*_errors(system, held_out), *run_errors(simulated)),
-        held_out.total if requested is None else requested.whole,
-        tuple(_where(maps)),
-        (*_notes(campaign, system, held_out), *hum_notes(base.hum), *held_out.notes),
-        maps,
-        () if requested is None else requested.moved,
-        None if requested is None else requested.total,
-        tuple(traces(system.fit, simulated, None if requested is None else requested.fitted)),
-        reported_combinations(system, held_out),
-        () if requested is None else requested.errors,
-        () if requested is None else requested.added,
+        motor_id=campaign.motor_id,
+        name=model.name,
+        effects=names,
+        parameters=parameters,
+        errors=(*_errors(system, held_out), *run_errors(simulated)),
+        held_out=held_out.total if requested is None else requested.whole,
+        where=tuple(_where(maps)),
+        notes=(*_notes(campaign, system, held_out), *hum_notes(base.hum), *held_out.notes),
+        maps=maps,
+        moved=() if requested is None else requested.moved,
+        bare=None if requested is None else requested.total,
+        traces=tuple(
+            traces(system.fit, simulated, None if requested is None else requested.fitted)
+        ),
+        combinations=reported_combinations(system, held_out),
+        before=() if requested is None else requested.errors,
+        added=() if requested is None else requested.added,
     )
 
 

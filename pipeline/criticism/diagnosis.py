@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from scipy.special import gammaincc
-
 from pipeline.criticism.data.machine_scale import PAIRLESS, PARAMETERS, machine_of
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.discovery.changed_constants import Change
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.ladder import parameters_of, step_record
+from pipeline.criticism.ladder import step_record
 from pipeline.criticism.library.equations import equation_of
-from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import BEND_SPEED
 from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.policy.policy import policy_of
-from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.ranking import ranked
 from pipeline.criticism.regression.goodness import HeldOut, of_motor, over_floor
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import hum_notes
@@ -34,8 +29,7 @@ from pipeline.criticism.regression.reported import (
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import Ladder, SearchResult, search_ladder
-from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
-from pipeline.criticism.selection.candidates import Candidate, candidates
+from pipeline.criticism.selection.candidates import candidates
 from pipeline.criticism.selection.missing_data import (
     loaded_drives,
     mixed_coasts,
@@ -47,9 +41,7 @@ from pipeline.criticism.selection.missing_data import (
 )
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.other_readings import reading_notes
-from pipeline.criticism.selection.removal import loss_without
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of
-from pipeline.criticism.selection.score_test import Score
 from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.criticism.validation.signature import signature
 from pipeline.physics.notation import number_text
@@ -84,8 +76,6 @@ _ALONE = (
     "{} rests on {} alone: predicted from the others, the other captures that it moves do not gain "
     "with it; record that test once more"
 )
-_AGAINST = "captures contradict it: see the note"
-_UNSUPPORTED = "takes some of what is left, but too little to be named beside what nothing explains"
 
 
 def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:
@@ -169,25 +159,25 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
     end = search_ladder(campaign, model, machine, base, library, name)
     ladder, last = end.ladder, end.ladder.steps[-1].system
     offered = candidates(library, last.fit.model)
-    ranking = _ranking(ladder, offered, library)
+    ranking = ranked(ladder, offered, library)
     not_excited = unexcited_effects(campaign, library, ladder.steps[-1], offered)
     verdict = _verdict_of(end, not_excited)
     combinations = reported_combinations(last, ladder.held_out[-1])
     diagnosis = Diagnosis(
-        campaign.motor_id,
-        model.name,
-        verdict,
-        ladder.steps[-1].added,
-        ranking,
-        _records(ladder.steps, ladder.held_out),
-        end.sketch if verdict == "unknown" else None,
-        _as_reported(last, end.remainders),
-        _notes(campaign, machine, end, verdict, combinations),
-        not_excited,
-        model.effects,
-        combinations,
-        policy_digest(last.policy),
-        _constants(last, ladder.held_out[-1]),
+        motor_id=campaign.motor_id,
+        model=model.name,
+        verdict=verdict,
+        missing=ladder.steps[-1].added,
+        ranking=ranking,
+        ladder=_records(ladder.steps, ladder.held_out),
+        unknown=end.sketch if verdict == "unknown" else None,
+        remainder=_as_reported(last, end.remainders),
+        notes=_notes(campaign, machine, end, verdict, combinations),
+        unexcited=not_excited,
+        asked=model.effects,
+        combinations=combinations,
+        policy=policy_digest(last.policy),
+        constants=_constants(last, ladder.held_out[-1]),
     )
     return diagnosis, ladder.base
 
@@ -306,15 +296,15 @@ def _insufficient(
         for e in library.values()
     )
     return Diagnosis(
-        campaign.motor_id,
-        model.name,
-        "insufficient",
-        (),
-        ranking,
-        (),
-        None,
-        (),
-        (note,),
+        motor_id=campaign.motor_id,
+        model=model.name,
+        verdict="insufficient",
+        missing=(),
+        ranking=ranking,
+        ladder=(),
+        unknown=None,
+        remainder=(),
+        notes=(note,),
         asked=model.effects,
         policy=policy_digest(policy_of(model.policy)),
     )
@@ -368,109 +358,3 @@ def _may_be_observer_noise(end: SearchResult) -> bool:
         left_over.capture in by_observer and not left_over.signal.endswith("_v")
         for left_over in end.remainders
     )
-
-
-def _ranking(
-    ladder: Ladder, offered: Sequence[Candidate], library: Mapping[str, Effect]
-) -> tuple[RankedEffect, ...]:
-    """Found effects in the order found, then the others by their score on the last step."""
-    last = ladder.steps[-1]
-    ranked = [_ranked_added(ladder, last.fit.effect(name), offered, library) for name in last.added]
-    others = [
-        _ranked_candidate(s) for s in last.scores if s.candidate.effect.name not in last.added
-    ]
-    reasons = {name: _AGAINST if note else _UNSUPPORTED for name, note in ladder.cut.items()}
-    others = [replace(r, shortfall=reasons.get(r.effect, r.shortfall)) for r in others]
-    return tuple(ranked + sorted(others, key=lambda r: (-r.score, r.effect)))
-
-
-def _ranked_added(
-    ladder: Ladder, effect: Effect, offered: Sequence[Candidate], library: Mapping[str, Effect]
-) -> RankedEffect:
-    """An effect that the ladder found: its evidence, its alternatives and what would part them."""
-    steps, wide = ladder.steps, ladder.steps[-1].system
-    passed_over = _passed_over(steps, effect.name, steps[-1].added)
-    alternatives = alternatives_to(effect.name, wide, offered, passed_over)
-    dof = effect.dof(wide.fit.machine)
-    loss = _loss(wide, effect, dof)
-    parameters = _parameters(steps[-1], effect, ladder.held_out[-1])
-    return RankedEffect(
-        effect.name,
-        loss - dof * math.log(wide.size),
-        _share_of_fall(steps, ladder.held_out, effect.name),
-        _p_value(loss, dof),
-        alternatives,
-        f"{effect.words}; {effect.signature}",
-        experiment_for(effect, alternatives, library),
-        parameters,
-        separations(effect, wide, offered, remedies(effect, alternatives, library)),
-        headline=headline(effect, parameters),
-    )
-
-
-def _loss(last: LinearSystem, effect: Effect, dof: int) -> float:
-    """Rise of deviance without a found effect: to first order, or of a refit where that says that
-    the effect is not worth its parameters. The linear step says little where parameters are
-    strongly correlated.
-    """
-    loss = loss_without(last, (effect.name,))
-    if loss > dof * math.log(last.size):
-        return loss
-    return max(loss, gauss_newton(last.fit.without(effect.name)).deviance - last.deviance)
-
-
-def _passed_over(
-    steps: Sequence[LadderStep], name: str, added: Sequence[str]
-) -> tuple[Candidate, ...]:
-    """Candidates whose predicted gain was close to that of an effect on the step before it was
-    added.
-    """
-    policy = steps[0].fit.policy.selection
-    before = [step for step in steps if name not in step.added][-1]
-    falls = {score.candidate.effect.name: score.fall for score in before.scores}
-    short = max(policy.tie, policy.passed_over_share * falls.get(name, 0.0))
-    least = falls[name] - short if name in falls else math.inf
-    return tuple(
-        score.candidate
-        for score in before.scores
-        if score.fall > least and score.passes and score.candidate.effect.name not in added
-    )
-
-
-def _share_of_fall(steps: Sequence[LadderStep], held_out: Sequence[HeldOut], name: str) -> float:
-    """Share of the removable held-out error, from first to last step, that went where an effect
-    was added; 0 where the error grew there.
-    """
-    totals = [math.log(max(errors.total, 1e-300)) for errors in held_out]
-    number = next(n for n, step in enumerate(steps) if name in step.added)
-    if number == 0 or totals[0] <= totals[-1]:
-        return 0.0
-    return max((totals[number - 1] - totals[number]) / (totals[0] - totals[-1]), 0.0)
-
-
-def _ranked_candidate(score: Score) -> RankedEffect:
-    effect = score.candidate.effect
-    dof = max(len(score.step), 1)
-    return RankedEffect(
-        effect.name,
-        score.fall - score.penalty,
-        0.0,
-        _p_value(score.fall, dof),
-        (),
-        f"{effect.words}; {effect.signature}",
-        effect.experiment,
-        {},
-        size=score.size if math.isfinite(score.size) else None,
-        shortfall=score.shortfall,
-    )
-
-
-def _p_value(fall: float, dof: int) -> float:
-    return float(gammaincc(dof / 2.0, max(fall, 0.0) / 2.0))
-
-
-def _parameters(
-    step: LadderStep, effect: Effect, held_out: HeldOut
-) -> dict[str, ReportedParameter]:
-    reported, start = parameters_of(step, held_out), f"{effect.name}."
-    return {name.removeprefix(start): p for name, p in reported.items() if name.startswith(start)}

@@ -9,31 +9,28 @@ repeated with it in the model, and the last result is reported.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from pipeline.criticism.data.segment import clock
 from pipeline.criticism.discovery.changed_constants import Change, changed_constant
 from pipeline.criticism.discovery.changed_within import ChangeWithin, changed_within
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.named_models import model_of
-from pipeline.criticism.machine.model import EARLY_S, EARLY_SHARES
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.selection.changed_between import SHARES, free_tests
-from pipeline.criticism.selection.changed_over_time import changes
+from pipeline.criticism.selection.changed_between import share_notes
+from pipeline.criticism.selection.changed_over_time import friction_notes
 from pipeline.criticism.selection.drift import drifting_segments
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.order_scan import orders_left
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of
 from pipeline.criticism.selection.stepwise import LadderStep, search
 from pipeline.criticism.selection.truncation import SHAFT, contradiction, explained, truncated
-from pipeline.numerics.identifiability import REACH
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.diagnosis import Remainder, UnknownStructure
@@ -47,24 +44,6 @@ _ALONE = (
     "{} would help {} alone: predicted from the others, the other captures that it moves do not "
     "gain with it; record that test once more"
 )
-_SHARE_OF = {
-    "coast_dry_share": "dry friction",
-    "coast_viscous_share": "viscous friction",
-    "early_dry_share": "dry friction",
-    "early_viscous_share": "viscous friction",
-    "open_flux_share": "psi_wb",
-}
-"""What a share that is left free is of."""
-_STILL_CHANGING = ", which none of these captures reaches"
-_REPEAT = (
-    "let it run warm, then record several coasts from different speeds in each sense, one after "
-    "the other"
-)
-_LOOKS_ALIKE = {
-    "spin_down": "a part on the shaft or a clock that is off there",
-    "open_circuit": "a clock that is off there, or a gain of voltages or torques,",
-}
-"""What else such a share may be."""
 _WITHIN = (
     "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
     "capture shows it: whatever changes as slowly looks the same; record that test once more"
@@ -205,59 +184,9 @@ def search_ladder(
         notes, sketch, remainders = [change.words], None, remainders or ladder.remainders
     else:
         notes, change = notes + _other_side_note(sketch, remainders), None
-    freed = tuple(_freed_share_notes(ladder.steps[-1].system))
+    last = ladder.steps[-1].system
+    freed = (*friction_notes(last), *share_notes(last))
     return SearchResult(ladder, remainders, sketch, change, freed, (*freed, *notes))
-
-
-def _freed_share_notes(system: LinearSystem) -> Iterator[str]:
-    """What the shares that a fit left free say, in a sentence, where they are large enough to
-    matter.
-    """
-    yield from _changing_friction_notes(system)
-    fit = system.fit
-    variance = system.covariance(system.model_columns).diagonal()
-    for test in free_tests(fit):
-        shares = {name: fit.values[name] for name in SHARES[test]}
-        u = {name: math.sqrt(variance[system.place([name])[0]]) for name in shares}
-        known = {n: share for n, share in shares.items() if abs(share) >= REACH * u[n]}
-        if max(map(abs, known.values()), default=0.0) < system.policy.discovery.changed_share:
-            continue
-        captures = ", ".join(sorted({s.capture for s in fit.segments if s.test == test}))
-        sizes = (
-            f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± {100.0 * u[name]:.1g} % "
-            f"{'higher' if share > 0 else 'lower'}"
-            for name, share in known.items()
-        )
-        yield (
-            f"{' and '.join(sizes)} in {captures} than in the other captures: changed between "
-            f"them; {_LOOKS_ALIKE[test]} would look the same"
-        )
-
-
-def _changing_friction_notes(system: LinearSystem) -> Iterator[str]:
-    """How friction changes with time, in a sentence, where that is large enough to matter."""
-    fit = system.fit
-    if not changes(fit):
-        return
-    variance, tau_s = system.covariance(system.model_columns).diagonal(), abs(fit.values[EARLY_S])
-    begin = {s.capture: float(clock(s)[-1]) for s in fit.segments if EARLY_S in s.fixed}
-    over = 1.0 - math.exp(-max(begin.values()) / tau_s)
-    shares = {name: fit.values[name] for name in EARLY_SHARES}
-    if over * max(map(abs, shares.values())) < system.policy.discovery.changed_share:
-        return
-    sizes = (
-        f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± "
-        f"{100.0 * math.sqrt(variance[system.place([name])[0]]):.2g} % "
-        f"{'higher' if share > 0 else 'lower'}"
-        for name, share in shares.items()
-    )
-    yield (
-        f"{' and '.join(sizes)} at the start of {', '.join(sorted(begin))} than it comes to, with "
-        f"a time constant of {tau_s:.3g} s: it changes within these captures, with no state of the "
-        "machine; constants of friction are those that it comes to"
-        + (_STILL_CHANGING if tau_s > max(begin.values()) else "")
-        + f"; {_REPEAT}"
-    )
 
 
 def _changed_constant(system: LinearSystem) -> Change | ChangeWithin | None:

@@ -9,15 +9,28 @@ off by as much, which looks the same.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 from pipeline.criticism.machine.model import COAST_SHARES, OPEN_FLUX
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.numerics.identifiability import REACH
 
 _FREE = 1.0
 """Standard uncertainty of a share that is left free: any change is less than the whole."""
+_SHARE_OF = {
+    "coast_dry_share": "dry friction",
+    "coast_viscous_share": "viscous friction",
+    "open_flux_share": "psi_wb",
+}
+"""What a share is of."""
+_LOOKS_ALIKE = {
+    "spin_down": "a part on the shaft or a clock that is off there",
+    "open_circuit": "a clock that is off there, or a gain of voltages or torques,",
+}
+"""What else such a share may be."""
 SHARES: dict[str, tuple[str, ...]] = {"spin_down": COAST_SHARES, "open_circuit": (OPEN_FLUX,)}
 """Nuisances that are left free together, by test."""
 
@@ -75,3 +88,37 @@ def free_tests(fit: Fit) -> tuple[str, ...]:
     """
     stated = fit.model.machine.stated_u
     return tuple(test for test, names in SHARES.items() if stated.get(names[0]) == _FREE)
+
+
+def share_notes(system: LinearSystem) -> Iterator[str]:
+    """What the shares that a fit left free show, where they are large enough to matter.
+
+    Parameters
+    ----------
+    system
+        Around a fit.
+
+    Yields
+    ------
+    str
+        A sentence for each test.
+
+    """
+    fit = system.fit
+    variance = system.covariance(system.model_columns).diagonal()
+    for test in free_tests(fit):
+        shares = {name: fit.values[name] for name in SHARES[test]}
+        u = {name: math.sqrt(variance[system.place([name])[0]]) for name in shares}
+        known = {n: share for n, share in shares.items() if abs(share) >= REACH * u[n]}
+        if max(map(abs, known.values()), default=0.0) < system.policy.discovery.changed_share:
+            continue
+        captures = ", ".join(sorted({s.capture for s in fit.segments if s.test == test}))
+        sizes = (
+            f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± {100.0 * u[name]:.1g} % "
+            f"{'higher' if share > 0 else 'lower'}"
+            for name, share in known.items()
+        )
+        yield (
+            f"{' and '.join(sizes)} in {captures} than in the other captures: changed between "
+            f"them; {_LOOKS_ALIKE[test]} would look the same"
+        )

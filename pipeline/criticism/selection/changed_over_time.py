@@ -26,6 +26,13 @@ from pipeline.criticism.regression.goodness import over_floor
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.residuals.channels import channel_of
 
+_SHARE_OF = dict(zip(EARLY_SHARES, ("dry friction", "viscous friction"), strict=True))
+_STILL_CHANGING = ", which none of these captures reaches"
+_REPEAT = (
+    "let it run warm, then record several coasts from different speeds in each sense, one after "
+    "the other"
+)
+
 
 def with_changing_friction(system: LinearSystem) -> LinearSystem | None:
     """The fit with a friction that changes with the time since a capture began.
@@ -161,3 +168,41 @@ def _begun(system: LinearSystem, span: float, scales: Array) -> Iterator[tuple[f
         end = around.normal_equations(columns).best(*fit.policy.selection.thorough)
         moved = start.moved([around.columns[n] for n in columns], end.step)
         yield end.deviance, moved.at({EARLY_S: scale})
+
+
+def friction_notes(system: LinearSystem) -> Iterator[str]:
+    """How friction changes with time, where that is large enough to matter.
+
+    Parameters
+    ----------
+    system
+        Around a fit.
+
+    Yields
+    ------
+    str
+        One sentence, or none.
+
+    """
+    fit = system.fit
+    if not changes(fit):
+        return
+    variance, tau_s = system.covariance(system.model_columns).diagonal(), abs(fit.values[EARLY_S])
+    begin = {s.capture: float(clock(s)[-1]) for s in fit.segments if EARLY_S in s.fixed}
+    over = 1.0 - math.exp(-max(begin.values()) / tau_s)
+    shares = {name: fit.values[name] for name in EARLY_SHARES}
+    if over * max(map(abs, shares.values())) < system.policy.discovery.changed_share:
+        return
+    sizes = (
+        f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± "
+        f"{100.0 * math.sqrt(variance[system.place([name])[0]]):.2g} % "
+        f"{'higher' if share > 0 else 'lower'}"
+        for name, share in shares.items()
+    )
+    yield (
+        f"{' and '.join(sizes)} at the start of {', '.join(sorted(begin))} than it comes to, with "
+        f"a time constant of {tau_s:.3g} s: it changes within these captures, with no state of the "
+        "machine; constants of friction are those that it comes to"
+        + (_STILL_CHANGING if tau_s > max(begin.values()) else "")
+        + f"; {_REPEAT}"
+    )

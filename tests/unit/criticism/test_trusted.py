@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.diagnosis import _ranking, _share_of_fall
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.ranking import _share_of_fall, ranked
 from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
@@ -100,8 +100,8 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     ladder = Ladder(
         BaseFit(first.system, ()), (replace(first, scores=(score,)),), held[:1], (), cut
     )
-    (ranked,) = _ranking(ladder, (), {})
-    assert ("contradict" in ranked.shortfall) is (kept == 1)
+    (only,) = ranked(ladder, (), {})
+    assert ("contradict" in only.shortfall) is (kept == 1)
 
 
 def with_waves(*reduced_chi2: float) -> LadderStep:
