@@ -91,15 +91,15 @@ def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
         step = bounded_step(_damped(system), system.columns, fit.model, fit.values)
         if system.deviance - system.predicted_deviance(step) >= policy.converged:
             halvings = policy.halvings if fresh else 1
-            tried, promised = _tried(system, step, halvings)
+            tried, predicted_fall = _tried(system, step, halvings)
             gain = system.deviance - tried.deviance
-            if fresh and gain < policy.kept_share * promised:
-                tried = _over_the_ridge(system, step, _over_inertia(system, step, tried))
+            if fresh and gain < policy.kept_share * predicted_fall:
+                tried = _two_whole_steps(system, step, _over_inertia(system, step, tried))
                 gain = system.deviance - tried.deviance
             if gain > 0:
                 system = tried
             fresh = fresh and gain <= 0
-            if gain >= max(policy.kept_share * promised, policy.converged):
+            if gain >= max(policy.kept_share * predicted_fall, policy.converged):
                 continue
         if fresh:
             break
@@ -115,11 +115,11 @@ def _tried(system: LinearSystem, step: Array, halvings: int) -> tuple[LinearSyst
     for _ in range(halvings):
         moved = system.fit.moved(system.columns, step)
         tried = linear_system(moved, before=system, chord=True)
-        promised = system.deviance - system.predicted_deviance(step)
+        predicted_fall = system.deviance - system.predicted_deviance(step)
         if tried.deviance < system.deviance + policy.converged:
             break
         step = policy.shortening * step
-    return tried, promised
+    return tried, predicted_fall
 
 
 def _over_inertia(system: LinearSystem, step: Array, shortened: LinearSystem) -> LinearSystem:
@@ -133,7 +133,7 @@ def _over_inertia(system: LinearSystem, step: Array, shortened: LinearSystem) ->
     return min(shortened, linear_system(moved, before=system), key=lambda one: one.deviance)
 
 
-def _over_the_ridge(system: LinearSystem, step: Array, shortened: LinearSystem) -> LinearSystem:
+def _two_whole_steps(system: LinearSystem, step: Array, shortened: LinearSystem) -> LinearSystem:
     """The system after the whole of a step and another from there, if that is better than the
     shortened one [3].
 

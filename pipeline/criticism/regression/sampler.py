@@ -70,8 +70,37 @@ def sampler_of(segment: Segment, model: Model, values: Values) -> Sampler:
 class Sampler:
     """Sampled change of a segment's residual along columns; hooks are linear, sensors are not.
 
-    `weak`: the weak samples [R] of columns that were asked for, by their keys. `read`: by the name
-    of a parameter, its columns in a model without the effect, and which values each read.
+    Attributes
+    ----------
+    segment, model, values
+        Where the residual is linearised.
+    weak
+        Weak samples [R] of columns that were requested, by their keys.
+    read
+        By the name of a parameter, its columns in a model without the effect, and which values each
+        read.
+    equation, recorder, constants, hooks
+        What the segment's equation observes, and whose clock it goes by.
+    effects
+        Whether the segment observes an effect, by its name.
+    x, pieces
+        True state of the machine [n], and flux, drops and drags there.
+    start
+        Predicted signals [C, n].
+    base_residual
+        Recorded less predicted signals [C, n].
+    mean
+        The state by the mean current of each sample period.
+    quiet
+        The values without the small terms between samples.
+    by_hook
+        What the hooks of an effect of the model give at the values, and which of these they read.
+    paced
+        Change of the residual along the gain of the clock [C, n], by its step.
+    of_nothing
+        Signals [C, n] that an affine equation predicts of no flux, drop and drag; None until it is
+        needed.
+
     """
 
     def __init__(self, segment: Segment, model: Model, values: dict[str, float]) -> None:

@@ -79,6 +79,6 @@ def fit_of(segments: Sequence[Segment], model: Model) -> BaseFit:
     fit = floored_anew(system.fit, system)
     settled = {effect.name: effect for effect in fit.model.effects}
     model = replace(model, effects=tuple(settled.get(e.name, e) for e in model.effects))
-    unheard = {k: v for effect in shaped.values() for k, v in zero(effect, model).items()}
-    full = replace(fit, model=model, values={**fit.values, **unheard})
+    unobserved = {k: v for effect in shaped.values() for k, v in zero(effect, model).items()}
+    full = replace(fit, model=model, values={**fit.values, **unobserved})
     return BaseFit(reconsidered(gauss_newton(full)), hum)
