@@ -50,7 +50,7 @@ class MotorFit:
     """
 
     campaign: Campaign
-    constants: Constants
+    constants: Constants = field(repr=False)
     evidence: tuple[Evidence, ...] = field(repr=False)
     failures: tuple[Failure, ...]
     sources: tuple[SourceMap, ...] = ()

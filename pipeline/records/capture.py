@@ -197,11 +197,11 @@ class Capture:
     """
 
     path: str
-    sha256: str
+    sha256: str = field(repr=False)
     integrity: Integrity
     meta: CaptureMeta
-    tables: tuple[pl.DataFrame, ...]
-    masks: tuple[Mask, ...] = ()
+    tables: tuple[pl.DataFrame, ...] = field(repr=False)
+    masks: tuple[Mask, ...] = field(default=(), repr=False)
 
     @property
     def columns(self) -> frozenset[str]:
@@ -347,7 +347,7 @@ class Capture:
         raise KeyError(f"{self.path} holds no column {name}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Campaign:
     """All captures of one motor, of whatever day and bench.
 
@@ -365,6 +365,12 @@ class Campaign:
     motor_id: str
     captures: tuple[Capture, ...]
     stated: Mapping[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """The motor, and how many captures there are of each test."""
+        tests = Counter(capture.meta.test for capture in self.captures)
+        counts = ", ".join(f"{count} {test}" for test, count in sorted(tests.items()))
+        return f"Campaign({self.motor_id!r}, captures: {counts or 'none'})"
 
     def of(self, *tests: str) -> tuple[Capture, ...]:
         """The captures of some tests, in the order of their paths.

@@ -237,7 +237,7 @@ class Comparison:
     name: str
     effects: tuple[str, ...]
     parameters: Mapping[str, ModelParameter]
-    errors: tuple[SignalError, ...]
+    errors: tuple[SignalError, ...] = field(repr=False)
     held_out: float | None
     where: tuple[Dependence, ...] = field(repr=False)
     notes: tuple[str, ...] = field(default=())
@@ -245,8 +245,8 @@ class Comparison:
     moved: tuple[Move, ...] = field(default=())
     bare: float | None = None
     traces: tuple[Trace, ...] = field(default=(), repr=False)
-    combinations: tuple[KnownCombination, ...] = field(default=())
-    before: tuple[SignalError, ...] = field(default=())
+    combinations: tuple[KnownCombination, ...] = field(default=(), repr=False)
+    before: tuple[SignalError, ...] = field(default=(), repr=False)
     added: tuple[str, ...] = field(default=())
 
     def document(self) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from pipeline.records.capture import Integrity
@@ -147,15 +147,15 @@ class Datasheet:
     version: str
     status: DatasheetStatus
     why: tuple[str, ...]
-    captures: tuple[CaptureReference, ...]
-    config_sha256: str
-    code_version: str
-    constants: Mapping[str, Estimate]
-    alternatives: tuple[Estimate, ...]
-    checks: tuple[Check, ...]
-    libraries: str = ""
+    captures: tuple[CaptureReference, ...] = field(repr=False)
+    config_sha256: str = field(repr=False)
+    code_version: str = field(repr=False)
+    constants: Mapping[str, Estimate] = field(repr=False)
+    alternatives: tuple[Estimate, ...] = field(repr=False)
+    checks: tuple[Check, ...] = field(repr=False)
+    libraries: str = field(default="", repr=False)
     supersedes: Superseded | None = None
-    model: ModelVerdict | None = None
+    model: ModelVerdict | None = field(default=None, repr=False)
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`, schema motor-datasheet/1."""

@@ -344,16 +344,16 @@ class Diagnosis(PlainRecord):
     model: str
     verdict: Verdict
     missing: tuple[Name, ...]
-    ranking: tuple[RankedEffect, ...]
-    ladder: tuple[StepRecord, ...]
+    ranking: tuple[RankedEffect, ...] = field(repr=False)
+    ladder: tuple[StepRecord, ...] = field(repr=False)
     unknown: UnknownStructure | None
-    remainder: Extension[tuple[Remainder, ...]]
+    remainder: Extension[tuple[Remainder, ...]] = field(repr=False)
     notes: Extension[tuple[str, ...]]
-    unexcited: Extension[tuple[Unexcited, ...]] = ()
+    unexcited: Extension[tuple[Unexcited, ...]] = field(default=(), repr=False)
     asked: Extension[tuple[Name, ...]] = ()
-    combinations: Extension[tuple[KnownCombination, ...]] = ()
-    policy: Extension[str] = ""
-    constants: Extension[Mapping[str, ReportedParameter]] = field(default_factory=dict)
+    combinations: Extension[tuple[KnownCombination, ...]] = field(default=(), repr=False)
+    policy: Extension[str] = field(default="", repr=False)
+    constants: Extension[Mapping[str, ReportedParameter]] = field(default_factory=dict, repr=False)
 
     @property
     def whole_model(self) -> str:

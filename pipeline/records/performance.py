@@ -43,7 +43,7 @@ class Operation(PlainRecord):
     voltage_share: float = 1.0
     drop_v: float | None = None
     on_ohm: float | None = None
-    origin: Mapping[str, str] = field(default_factory=dict)
+    origin: Mapping[str, str] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +69,8 @@ class Derived(PlainRecord):
     value: float
     low: float
     high: float
-    formula: str
-    convention: str = ""
+    formula: str = field(repr=False)
+    convention: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +148,8 @@ class Performance:
     version: str
     operation: Operation | None
     numbers: tuple[Derived, ...] = ()
-    curves: tuple[Curve, ...] = ()
-    cells: tuple[MapCell, ...] = ()
+    curves: tuple[Curve, ...] = field(default=(), repr=False)
+    cells: tuple[MapCell, ...] = field(default=(), repr=False)
     regimes: tuple[str, ...] = ()
     blanks: tuple[Blank, ...] = ()
     notes: tuple[str, ...] = ()

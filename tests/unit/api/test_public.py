@@ -147,6 +147,16 @@ def test_a_terminal_shows_a_table_and_no_arrays(recordings, fits, sheets):
     assert dict(fits.items()) == dict(fits.motors)
 
 
+def test_the_result_of_one_motor_fits_a_terminal(recordings, fits, sheets):
+    """They were 50 to 125 kB each."""
+    results = (recordings[MOTOR], recordings[MOTOR].captures[0], fits[MOTOR], sheets[MOTOR])
+    operated = pipeline.operate(sheets[MOTOR], vdc_v=24.0, current_a=9.0)
+    for one in (*results, operated):
+        assert MOTOR in repr(one)
+        assert len(repr(one)) < 4000, type(one)
+    assert "captures: 2 cogging, 2 current_step" in repr(recordings[MOTOR])
+
+
 def test_part_of_the_recordings(recordings):
     few = recordings.only(tests=("spin_down",))
     assert set(few.captures["test"]) == {"spin_down"}
