@@ -42,6 +42,8 @@ class Recordings(Shown):
         The true parameters of simulated motors; empty for recordings from files.
     sources : mapping of str to tuple of SourceMap
         The source maps by which the captures of each motor were read.
+    note : str
+        Counts and names the files of the folder that are no captures; empty without any.
 
     """
 
@@ -49,6 +51,7 @@ class Recordings(Shown):
     findings: tuple[Finding, ...] = ()
     truth: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     sources: Mapping[str, tuple[SourceMap, ...]] = field(default_factory=dict)
+    note: str = ""
 
     def __getitem__(self, motor_id: str) -> Campaign:
         """The captures of one motor."""
@@ -129,7 +132,8 @@ class Recordings(Shown):
 
     def _title(self) -> str:
         motors, findings = counted(len(self), "motor"), counted(len(self.findings), "finding")
-        return f"Recordings: {motors}, {findings}"
+        note = f"; {self.note}" if self.note and not self.campaigns else ""
+        return f"Recordings: {motors}, {findings}{note}"
 
     def _table(self) -> pl.DataFrame:
         return self.captures.group_by("motor_id", "test", maintain_order=True).agg(
@@ -205,7 +209,7 @@ def read(
         if captures:
             campaigns[name] = Campaign(name, captures)
     used = {n: tuple(e.source for e in own if e.source) for n, own in entries.items()}
-    return Recordings(campaigns, tuple(findings), sources=used)
+    return Recordings(campaigns, tuple(findings), sources=used, note=surveyed.note)
 
 
 def recordings_of(given: Recordings | str | Path) -> Recordings:

@@ -157,6 +157,16 @@ def test_the_result_of_one_motor_fits_a_terminal(recordings, fits, sheets):
     assert "captures: 2 cogging, 2 current_step" in repr(recordings[MOTOR])
 
 
+def test_a_folder_without_a_capture_names_what_it_holds(tmp_path):
+    """Somebody's own CSV gave 0 motors and 0 findings, and nothing said why."""
+    (tmp_path / "log.csv").write_text("Time,Current\n0.0,1.0\n")
+    recordings = pipeline.read(tmp_path)
+    assert repr(recordings).startswith(
+        "Recordings: 0 motors, 0 findings; 1 file is no capture and was left alone: log.csv"
+    )
+    assert pipeline.read(DEMO, motor=MOTOR).note.endswith("README.md")
+
+
 def test_part_of_the_recordings(recordings):
     few = recordings.only(tests=("spin_down",))
     assert set(few.captures["test"]) == {"spin_down"}
