@@ -80,7 +80,8 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
     Shares of friction or magnet left free, or another reading of a column, that explain as much as
     the best effect, within a `tie`, are taken instead; what full logs show of that effect counts
     for it. Friction that changes with time is taken where it explains more by a `tie`: in one coast
-    it looks as friction that changes with speed, which is commoner.
+    it looks as friction that changes with speed, which is commoner. Choices inside effects are made
+    again then: they may have been right by the former reading alone.
 
     An effect of the last step whose size may be zero, now that all others are in, goes with every
     step that has it, unless it takes most of an error; the search goes on without it.
@@ -120,7 +121,7 @@ def _steps_from(
         chosen = best_candidate(wide, scores, base, unsure)
         instead = _instead_of_effect(chosen, wide, library, base, unsure)
         if instead is not None:
-            fit = instead.fit
+            fit = reconsidered(instead).fit
             del steps[-1]
             continue
         chosen = chosen or _with_pair(steps, library, base, unsure)

@@ -95,6 +95,27 @@ def test_an_effect_that_leaves_a_reading_its_share_is_not_in_its_place() -> None
     assert not _is_reading(chosen, wide, reread, LIBRARY, 0, frozenset())
 
 
+def test_what_was_chosen_by_another_reading_is_chosen_again() -> None:
+    """In the wrong frame of the voltage, two shunts stood for the gains of three sensors."""
+
+    def gained(segment: Segment) -> Segment:
+        eps = 7 * log().recorded["theta_mech_rad"]
+        vector = segment.recorded["id_a"] + 1j * segment.recorded["iq_a"]
+        vector = vector + 0.02 * np.conj(vector) * np.exp(-2j * eps)
+        recorded = {**segment.recorded, "id_a": vector.real, "iq_a": vector.imag}
+        return replace(segment, recorded=recorded)
+
+    fit = fitted([gained(held(0.5, log(noise=1.0, seed=seed))) for seed in (5, 6)])
+    gain = effects()["current_gain"]
+    chosen = dict.fromkeys((p.name for p in gain.parameters), 0.0) | {"shunts": 1.0, "bench": 1.0}
+    values = {**fit.values, **{f"current_gain.{name}": value for name, value in chosen.items()}}
+    begun = gauss_newton(replace(fit, model=fit.model.with_effects(gain), values=values)).fit
+    last = search(begun, {})[-1].fit
+    assert {segment.instrument.frame for segment in last.segments} == {0.5}
+    assert last.values["current_gain.shunts"] == 0.0
+    assert last.values["current_gain.cosine"] == pytest.approx(0.02, rel=0.02)
+
+
 def test_an_iron_loss_is_no_voltage_that_is_logged_after_it_acted() -> None:
     """A command is logged before it acts, so of two that tie the other one is named."""
     last, _ = searched([with_iron(0.031, seed) for seed in (5, 6)])
