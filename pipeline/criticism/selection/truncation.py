@@ -15,6 +15,7 @@ from pipeline.criticism.regression.goodness import (
     significant_groups,
 )
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.selection.sizes import is_rare
 from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.records.diagnosis import Remainder
 
@@ -45,7 +46,8 @@ def truncated(
     found do not explain what is left; and those that lowered the held-out error by less than
     `guess_share`, but for a first effect that explains it. A step stays that cleared a signal of
     all waves of the angle, or that takes most of what its own side, winding or shaft, misses in
-    captures held out: a residual of the other side is no evidence against it.
+    captures held out: a residual of the other side is no evidence against it. Not so a rare effect:
+    what benches seldom have is less likely than a part of what nothing explains.
 
     """
     policy = steps[0].fit.policy.selection
@@ -59,11 +61,20 @@ def truncated(
             break
         if contradiction(steps[count - 1]):
             continue
-        if lower or _clears_orders(steps[count - 2].system, system):
+        if lower:
+            break
+        if _adds_a_rare_one(steps[count - 1]):
+            continue
+        if _clears_orders(steps[count - 2].system, system):
             break
         if _clears_its_side(steps[count - 2 : count], held_out[count - 2 : count]):
             break
     return kept, remainders
+
+
+def _adds_a_rare_one(step: LadderStep) -> bool:
+    fit = step.fit
+    return any(is_rare(e, fit) for e in fit.model.effects if e.name in step.added[-1:])
 
 
 def contradiction(step: LadderStep) -> str:

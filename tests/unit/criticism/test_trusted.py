@@ -125,6 +125,22 @@ def test_what_clears_all_waves_is_no_guess_beside_an_unknown(left, kept, monkeyp
     assert len(truncated(steps, held)[0]) == kept
 
 
+@pytest.mark.parametrize(("delay_s", "kept"), [(5e-6, 2), (-5e-6, 1)])
+def test_nothing_rare_is_named_for_its_own_side_beside_an_unknown(delay_s, kept, monkeypatch):
+    """A voltage that is logged after it acted, beside an encoder that sits loose."""
+    steps = with_waves(1e6, 20.0, 5e3), with_waves(1e6, 0.5, 0.5)
+    fit = steps[1].fit
+    values = {"sample_delay.delay_s": delay_s, "sample_delay.of_speed": 0.0}
+    model = fit.model.with_effects(effects()["sample_delay"])
+    late = replace(fit, model=model, values={**fit.values, **values})
+    added = LadderStep(("sample_delay",), replace(steps[1].system, fit=late), ())
+    over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.explained", lambda *_: False)
+    held = [HeldOut(steps[0].system.residual, total) for total in (97.0, 98.0)]
+    assert len(truncated((steps[0], added), held)[0]) == kept
+
+
 @pytest.mark.parametrize(("after", "kept"), [(0.5, 2), (20.0, 1)])
 def test_waves_that_another_signal_keeps_do_not_make_a_guess_of_what_clears_one(
     after, kept, monkeypatch
