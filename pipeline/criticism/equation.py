@@ -47,8 +47,8 @@ class Channel:
     as_torque
         Whether it is reported times the inertia [N·m].
     offset
-        What a sensor may be off by in a whole capture: a share of its noise, the zero of a bench
-        voltmeter as well, or nothing.
+        What a sensor may be off by in a whole capture: a share of its noise, the zero of a bench's
+        voltmeter or torque transducer as well, or nothing.
     counts
         Whether the motor answers for an error in it: not for one of a column that another overrules
         (contract: where the angle is there, the angle counts).
@@ -61,7 +61,7 @@ class Channel:
     reported: str = ""
     acceleration: bool = False
     as_torque: bool = False
-    offset: Literal["noise", "voltmeter", "none"] = "noise"
+    offset: Literal["noise", "voltmeter", "transducer", "none"] = "noise"
     counts: bool = True
 
 

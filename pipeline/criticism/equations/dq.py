@@ -332,7 +332,7 @@ EQUATION = Equation(
     channels=(
         Channel("vd_v", "voltage_v", beside=VOLTS),
         Channel("vq_v", "voltage_v", beside=VOLTS),
-        Channel(TORQUE, "torque_nm"),
+        Channel(TORQUE, "torque_nm", offset="transducer"),
     ),
     cut=cut,
     state=state,

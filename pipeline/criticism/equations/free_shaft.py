@@ -247,7 +247,7 @@ EQUATION = Equation(
     columns=("t_s",),
     channels=(
         Channel(SPEED, "torque_nm", reported="alpha_mech_rad_s2", acceleration=True),
-        Channel(TORQUE, "torque_nm"),
+        Channel(TORQUE, "torque_nm", offset="transducer"),
     ),
     cut=cut,
     state=state,

@@ -135,7 +135,7 @@ EQUATION = Equation(
     words="T = 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags − J dω/dt",
     tests=("torque_map", "drive"),
     columns=("t_s", "iq_a", TORQUE),
-    channels=(Channel(TORQUE, "torque_nm"),),
+    channels=(Channel(TORQUE, "torque_nm", offset="transducer"),),
     cut=cut,
     state=state,
     measured=measured,

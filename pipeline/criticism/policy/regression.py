@@ -146,6 +146,10 @@ class NoiseFloors:
         2e-3, "1", "prior of a terminal voltage's offset, as a share of its largest reading",
         why="with none, the zero of a bench's voltmeter passes for a drop",
     )  # fmt: skip
+    transducer_offset: float = derived(
+        5e-4, "machine scales", "prior of a torque transducer's offset in one capture",
+        source="the negligible size of `torque_offset`, which is what all captures share",
+    )  # fmt: skip
     rough: float = chosen(
         0.05, "machine scales", "what equations may be off by in a rough fit",
         why="smaller, and equations far off are given up before the constants are near",

@@ -14,8 +14,8 @@ from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import COAST_SHARES, CURVED, EARLY_S, EARLY_SHARES, Model
 from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import Policy
-from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.columns import Column, ColumnKey, base_columns, effect_columns
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linearise import Rows, linearise, whitened_anew
@@ -442,7 +442,7 @@ def _with_known(
     carried_over = np.column_stack([known[now.columns[n].key] for n in places]) * lighter[:, None]
     counts = np.bincount(now.segment, minlength=len(segments)).tolist()
     now.matrix[:, places] = _rewhitened(
-        segments, carried_over, (before.row_weight, now.row_weight), counts, now.policy.noise_floors
+        segments, carried_over, (before.row_weight, now.row_weight), counts, now.fit.machine
     )
     made_at = {**now.made_at, **{key: before.made_at[key] for key in known}}
     return replace(now, made_at=made_at)
@@ -453,7 +453,7 @@ def _rewhitened(
     rows: Array,
     weights: tuple[Array, Array],
     counts: Sequence[int],
-    policy: NoiseFloors,
+    machine: Machine,
 ) -> Array:
     """Columns [R, P] that were whitened by the first of the `weights` [R], whitened by the second
     instead; `counts` are the rows of each segment.
@@ -463,7 +463,7 @@ def _rewhitened(
         return rows
     edges = np.cumsum(counts)[:-1]
     parts = zip(*(np.split(one, edges) for one in (rows, before, now)), strict=True)
-    arguments = [(*part, policy) for part in parts]
+    arguments = [(*part, machine) for part in parts]
     return np.concatenate(on_each(whitened_anew, segments, arguments))
 
 

@@ -16,7 +16,7 @@ from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.operating import Array, Values
-from pipeline.criticism.policy.regression import NoiseFloors
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.regression.columns import Column, ColumnKey
 from pipeline.criticism.regression.noise_floors import Floor, offsets, reading_error, window_gain
 from pipeline.criticism.regression.sampler import Sampler, sampler_of
@@ -92,7 +92,7 @@ def linearise(
         np.column_stack([projected(segment, sampler.base_residual)[valid], *weak_columns])
         * row_weight[:, None]
     )
-    absorb(rows, offsets(segment, valid, row_weight, model.policy.noise_floors))
+    absorb(rows, offsets(segment, valid, row_weight, model.machine))
     unit = reported_unit(segment, values) / (row_weight * window_gain(segment))
     noise_ratio = noise * row_weight
     return Rows(
@@ -134,7 +134,7 @@ def trial_residuals(
     )
     rows = np.stack([projected(segment, one)[valid] for one in sampled], axis=1)
     rows *= row_weight[:, None]
-    absorb(rows, offsets(segment, valid, row_weight, model.policy.noise_floors))
+    absorb(rows, offsets(segment, valid, row_weight, model.machine))
     return list(rows.T)
 
 
@@ -188,7 +188,7 @@ def absorb(rows: Array, unknown: Sequence[Array]) -> None:
 
 
 def whitened_anew(
-    segment: Segment, rows: Array, before: Array, after: Array, policy: NoiseFloors
+    segment: Segment, rows: Array, before: Array, after: Array, machine: Machine
 ) -> Array:
     """Rows of one segment, whitened by other weights.
 
@@ -203,8 +203,8 @@ def whitened_anew(
         Weights that they have now [R].
     after
         Weights that they are to have [R].
-    policy
-        Prior sizes of offsets.
+    machine
+        The machine, for the sizes of offsets.
 
     Returns
     -------
@@ -214,9 +214,9 @@ def whitened_anew(
     """
     _, _, valid, _ = row_index(segment)
     unabsorbed = rows.copy()
-    _restore(unabsorbed, offsets(segment, valid, before, policy))
+    _restore(unabsorbed, offsets(segment, valid, before, machine))
     unabsorbed *= (after / before)[:, None]
-    absorb(unabsorbed, offsets(segment, valid, after, policy))
+    absorb(unabsorbed, offsets(segment, valid, after, machine))
     return unabsorbed
 
 

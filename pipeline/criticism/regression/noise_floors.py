@@ -14,6 +14,7 @@ from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
 from pipeline.criticism.operating import Array, Complex, Operating, Values
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.standstill import at_rest, at_reversals
 from pipeline.criticism.residuals.channels import (
@@ -388,7 +389,7 @@ def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Arr
 
 
 def offsets(
-    segment: Segment, valid: NDArray[np.bool_], row_weight: Array, policy: NoiseFloors
+    segment: Segment, valid: NDArray[np.bool_], row_weight: Array, machine: Machine
 ) -> list[Array]:
     """Whitened weak samples of the disturbances that a segment may hold.
 
@@ -400,8 +401,8 @@ def offsets(
         Weak samples that are used [C, W, M].
     row_weight
         Weights of the rows [R].
-    policy
-        Prior sizes of offsets.
+    machine
+        Its scales, and in its policy prior sizes of offsets.
 
     Returns
     -------
@@ -416,12 +417,14 @@ def offsets(
         return of_shapes + constants
     if segment.weak is None:
         return []
-    of_one = segment.weak.functions.sum(axis=2)
+    policy, of_one = machine.policy.noise_floors, segment.weak.functions.sum(axis=2)
     for place, channel in enumerate(segment.channels):
-        offset = channel_of(segment, channel).offset
-        prior = policy.offset * segment.sensors.noise.get(channel, 0.0)
+        observed = channel_of(segment, channel)
+        offset, prior = observed.offset, policy.offset * segment.sensors.noise.get(channel, 0.0)
         if offset == "voltmeter":
             prior = math.hypot(prior, policy.terminal_offset * largest_reading(segment, (channel,)))
+        if offset == "transducer":
+            prior = math.hypot(prior, policy.transducer_offset * machine.scales[observed.scale])
         if offset == "none" or prior == 0.0:
             continue
         constant = np.zeros((len(segment.channels), *of_one.shape))

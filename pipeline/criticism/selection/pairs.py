@@ -81,7 +81,8 @@ def best_pair(
     added
         Effects that the search added to it.
     most_deviance
-        Deviance that the fit must not exceed.
+        Deviance that the fit must not exceed. A pair is not fitted where
+        `policy.selection.choice_falls` times its fall to first order would not do.
 
     Returns
     -------
@@ -93,7 +94,8 @@ def best_pair(
     policy = wide.policy.selection
     best_first: dict[frozenset[str], Pair] = {}
     for pair in sorted(pairs_of(wide, offered, scores), key=lambda pair: pair.penalty - pair.fall):
-        best_first.setdefault(pair.names, pair)
+        if wide.deviance - policy.choice_falls * pair.fall <= most_deviance:
+            best_first.setdefault(pair.names, pair)
     if not best_first:
         return None
     baseline = Baseline.of(wide, added)

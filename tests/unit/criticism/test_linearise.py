@@ -10,7 +10,6 @@ import pytest
 from pipeline.criticism.data.segment import Cache, row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
-from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.columns import effect_columns
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.linear_system import (
@@ -38,9 +37,9 @@ def test_rows_over_another_noise_have_their_offsets_absorbed_by_that():
     bare = 1.0 + rng.normal(size=(count, 3))
     before, after = 300.0 * rng.uniform(1.0, 9.0, (2, count))
     was, expected = bare * before[:, None], bare * after[:, None]
-    absorb(was, offsets(one, valid, before, DEFAULT.noise_floors))
-    absorb(expected, offsets(one, valid, after, DEFAULT.noise_floors))
-    assert whitened_anew(one, was, before, after, DEFAULT.noise_floors) == pytest.approx(
+    absorb(was, offsets(one, valid, before, machine()))
+    absorb(expected, offsets(one, valid, after, machine()))
+    assert whitened_anew(one, was, before, after, machine()) == pytest.approx(
         expected, rel=1e-9
     )
     assert not np.allclose(was * (after / before)[:, None], expected, rtol=0.1)
