@@ -10,6 +10,7 @@ import pytest
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
@@ -25,7 +26,7 @@ from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.design import Bench
 from tests.simulated import campaign_of, design
-from tests.unit.criticism.machines import BASE, log, machine
+from tests.unit.criticism.machines import BASE, fitted, log, machine
 
 ALPHA_A, BETA_A, ZERO_RAD, LATE_S = 0.006, -0.009, 0.0012, 3e-6
 
@@ -55,6 +56,22 @@ def test_the_state_of_the_instruments_undoes_what_it_does():
     assert undone[:, 30:-30] == pytest.approx(clean[:, 30:-30], abs=2e-7)
     off = np.abs(residual(recorded(0.0), plain, BASE) - clean).max(axis=1)
     assert (off > [0.01, 0.003, 0.001]).all()
+
+
+def test_a_transducer_has_a_zero_of_its_own_in_every_capture():
+    """Two zeros of twice their prior size cost no more than two squares of two."""
+
+    def deviance(zero_nm):
+        torques = [(log(noise=1.0, seed=5), zero_nm), (log(noise=1.0, seed=6), -zero_nm)]
+        return linear_system(fitted([moved(*one) for one in torques])).deviance
+
+    def moved(segment, zero_nm):
+        torque = segment.recorded["torque_shaft_nm"] + zero_nm
+        return replace(segment, recorded={**segment.recorded, "torque_shaft_nm": torque})
+
+    usual_nm = DEFAULT.noise_floors.transducer_offset * machine().scales["torque_nm"]
+    assert deviance(2.0 * usual_nm) - deviance(0.0) < 2.0 * 2.0**2
+    assert deviance(20.0 * usual_nm) - deviance(0.0) > 2.0 * 2.0**2
 
 
 @pytest.mark.parametrize(("times", "named"), [(1.0, set()), (20.0, {"current_offset"})])
