@@ -39,9 +39,7 @@ def test_rows_over_another_noise_have_their_offsets_absorbed_by_that():
     was, expected = bare * before[:, None], bare * after[:, None]
     absorb(was, offsets(one, valid, before, machine()))
     absorb(expected, offsets(one, valid, after, machine()))
-    assert whitened_anew(one, was, before, after, machine()) == pytest.approx(
-        expected, rel=1e-9
-    )
+    assert whitened_anew(one, was, before, after, machine()) == pytest.approx(expected, rel=1e-9)
     assert not np.allclose(was * (after / before)[:, None], expected, rtol=0.1)
 
 
