@@ -25,7 +25,7 @@ from pipeline.criticism.residuals.channels import (
 )
 from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.signals.shaft import averaged
-from pipeline.criticism.signals.true_current import unseen_waves
+from pipeline.criticism.signals.true_current import unseen_slopes, unseen_waves
 from pipeline.criticism.signals.voltage import central, unresolved
 
 VOLTS = ("vd_v", "vq_v")
@@ -211,6 +211,7 @@ def _of_voltages(segment: Segment, model: Model, values: Values) -> Array:
         unsampled = _unsampled(segment, values, model.policy.noise_floors.jump)
         total = np.hypot(total, np.abs(projected(segment, unsampled)))
         total = np.hypot(total, _spikes(segment, VOLTS, model.policy.noise_floors)[:, :, None])
+        total = np.hypot(total, _of_unseen_waves(segment, model, values))
     if any(effect.drop is not None for effect in model.effects):
         steep = steep_drops(model, values, operate(segment, segment.recorded, model, values))
         steep = steep[:: steep.size // segment.size]
@@ -232,6 +233,26 @@ def _unsampled(segment: Segment, values: Values, jump: float) -> Array:
         share = unresolved(current, math.sqrt(2.0) * jump * noise)
         total[place] = values[inductance] * share * central(current, segment.ts_s)
     return total
+
+
+def _of_unseen_waves(segment: Segment, model: Model, values: Values) -> Array | float:
+    """Voltage [V, W, M] of each axis by which waves change the current that rows do not show, as
+    weak samples: the rms over their phase.
+
+    Where six electrical turns are nearly a whole number of rows, each row has the same phase of a
+    wave. An instant of the voltage shows one value of what the wave takes, and the rows no change.
+    """
+    slopes = unseen_slopes(segment, model.machine.pole_pairs)
+    if slopes is None or not slopes.any():
+        return 0.0
+    inductances = [values[_WINDING[name][1]] for name in segment.channels if name in VOLTS]
+    power = sum(
+        projected(segment, np.multiply.outer(inductances, part)) ** 2
+        for one in slopes
+        for part in (one.real, one.imag)
+    )
+    missed: Array = np.sqrt(power / 2.0)
+    return missed
 
 
 def _of_torque(segment: Segment, model: Model, values: Values) -> Array | float:

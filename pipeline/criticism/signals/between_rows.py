@@ -189,15 +189,47 @@ class Waves:
             in the mean of the blocks of the log that show it.
 
         """
-        sizes = (self.fit @ current[self.rows][:, :, None]).imag[:, :, 0]
-        power = (sizes**2).reshape(-1, 2, len(ORDERS)).sum(1)
-        there = np.any(self.fit, axis=(1, 2))[:, None] & ~self.slow
-        level = np.sqrt((power * there).sum(0) / np.maximum(there.sum(0), 1))
+        level = self._level(current)
         total = np.zeros((len(ORDERS), size), dtype=np.complex128)
         for order, one in enumerate(total):
             wave = self.beyond[:, :, order] + 1j * self.beyond[:, :, order + len(ORDERS)]
             one[self.places] = level[order] * self.slow[:, order, None] * wave
         return total
+
+    def unseen_slopes(self, current: Complex, eps_rad: Array) -> Complex:
+        """How fast waves may change the current where the rows do not show how large they are.
+
+        Parameters
+        ----------
+        current
+            At the rows [n, A].
+        eps_rad
+            Electrical angle of the rows [n].
+
+        Returns
+        -------
+        array [o, n], complex
+            Of each order, in A a row of the q axis, times a phase that is not known.
+
+        """
+        finer = (int(self.places.max(initial=0)) + eps_rad.size) // eps_rad.size
+        slow = np.zeros((len(ORDERS), eps_rad.size))
+        slow[:, self.places // finer] = self.slow.T[:, :, None]
+        turning = np.array(ORDERS)[:, None] * np.gradient(eps_rad) * slow
+        slopes: Complex = (
+            self._level(current)[:, None]
+            * turning
+            * np.exp(1j * np.multiply.outer(ORDERS, eps_rad))
+        )
+        return slopes
+
+    def _level(self, current: Complex) -> Array:
+        """Size [o, A] of each order in the q axis: its mean over the blocks that show it."""
+        sizes = (self.fit @ current[self.rows][:, :, None]).imag[:, :, 0]
+        power = (sizes**2).reshape(-1, 2, len(ORDERS)).sum(1)
+        there = np.any(self.fit, axis=(1, 2))[:, None] & ~self.slow
+        level: Array = np.sqrt((power * there).sum(0) / np.maximum(there.sum(0), 1))
+        return level
 
 
 def _fast_shares(waves: Array, apart: Array) -> Array:

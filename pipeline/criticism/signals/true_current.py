@@ -130,8 +130,37 @@ def unseen_waves(segment: Segment, size: int) -> Complex | None:
     known = segment.cache.get(WAVES)
     if known is None or not segment.instrument.waves:
         return None
-    signals = segment.recorded
-    return known[2].unseen(signals.get("id_a", 0.0) + 1j * signals["iq_a"], size)
+    return known[2].unseen(_complex_current(segment), size)
+
+
+def unseen_slopes(segment: Segment, pole_pairs: int) -> Complex | None:
+    """How fast waves may change a log's current whose size its rows do not show.
+
+    Parameters
+    ----------
+    segment
+        A log that was looked at between its rows.
+    pole_pairs
+        Turns the angle into an electrical one.
+
+    Returns
+    -------
+    array [o, n], complex, or None
+        In A/s of the q axis, times a phase that is not known (`Waves.unseen_slopes`); None where no
+        wave was looked for.
+
+    """
+    known = segment.cache.get(HOLD_ENDS) or segment.cache.get(WAVES)
+    if known is None or not segment.instrument.waves:
+        return None
+    eps_rad = pole_pairs * segment.recorded["theta_mech_rad"]
+    slopes: Complex = known[2].unseen_slopes(_complex_current(segment), eps_rad) / segment.ts_s
+    return slopes
+
+
+def _complex_current(segment: Segment) -> Complex:
+    i_q = segment.recorded["iq_a"]
+    return segment.recorded.get("id_a", np.zeros(i_q.size)) + 1j * i_q
 
 
 def table_current(

@@ -120,3 +120,11 @@ def test_a_wave_that_rows_do_not_show_is_as_large_as_where_they_do() -> None:
     true = 0.2 * np.cos(6.0 * eps + 0.4)
     beside = true - on_points(true[::POINTS], AT.size)
     assert (np.abs(beside) < 1.1 * np.abs(unseen[0]) + 1e-3)[not_shown].all()
+    # and the current changes no faster than it says, where the rows show no change
+    slopes = np.abs(waves.unseen_slopes(current, eps[::POINTS]))
+    assert not slopes[:, :150].any()
+    assert slopes[0, 250:-1] == pytest.approx(0.2 * 6.0 * 0.999 * sixth, rel=0.1)
+    changes = POINTS * np.abs(np.gradient(true))
+    assert (changes[250 * POINTS : -POINTS] < 1.1 * slopes[0, 250]).all()
+    of_rows = np.diff(current.imag - slow(AT)[::POINTS].imag)[250:]
+    assert np.abs(of_rows).max() < 0.1 * slopes[0, 250]
