@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -12,10 +11,11 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.machine.model import COAST_SHARES, CURVED, EARLY_S, EARLY_SHARES, Model
+from pipeline.criticism.machine.model import Model
 from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import Policy
+from pipeline.criticism.regression.column_validity import is_valid
 from pipeline.criticism.regression.columns import Column, ColumnKey, base_columns, effect_columns
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linearise import Rows, linearise, whitened_anew
@@ -28,9 +28,6 @@ from pipeline.criticism.regression.normal_equations import (
 )
 from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.channels import of_acceleration
-
-_STEADY = ("psi_wb", "ld_h", "lq_h", "r_ohm")
-"""Constants that every column goes with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -487,53 +484,12 @@ def _reusable_columns(
 
     def stays(column: Column) -> bool:
         of_angle = column.effect is not None and column.effect.angle is not None
-        return not (turned and of_angle) and _is_valid(column, before.made_at[column.key], fit)
+        return not (turned and of_angle) and is_valid(column, before.made_at[column.key], fit)
 
     places = {column.key: place for place, column in enumerate(before.columns)}
     carried_over = [column for column in columns if column.key in places]
     unchanged = [column.key for column in carried_over if chord or stays(column)]
     return {key: before.matrix[:, places[key]] for key in unchanged}
-
-
-def _is_valid(column: Column, made_at: Values, fit: Fit) -> bool:
-    """Whether a column is near what it would be at a fit.
-
-    It goes with the constants; that of J with J, since a coasting shaft goes by 1/J; a coast's
-    friction and its share are a product, and so are a friction that changes and the time constant
-    by which it does; those of sensors and shapes go with other effects' parameters, by their
-    typical sizes if these are larger.
-    """
-    model, now, far = fit.model, fit.values, fit.policy.fit.stale_share
-    if any(abs(now[n] - made_at[n]) > far * abs(made_at[n]) for n in _STEADY):
-        return False
-    shares = [n for n in (*COAST_SHARES, *EARLY_SHARES) if n in now]
-    if column.name in shares or any(abs(now[n] - made_at.get(n, 0.0)) > far for n in shares):
-        return False
-    early = any(one.get(n, 0.0) for one in (now, made_at) for n in EARLY_SHARES)
-    if early and abs(now[EARLY_S] / made_at.get(EARLY_S, math.inf) - 1.0) > far:
-        return False
-    if column.name == "j_kgm2":
-        return abs(now["j_kgm2"] / made_at["j_kgm2"] - 1.0) < far
-    if _linear(column, model):
-        return True
-    parameters = model.parameters()
-    out = any(value and "." in name and name not in parameters for name, value in made_at.items())
-    return not out and all(
-        abs(now[name] - made_at.get(name, 0.0))
-        <= far * max(abs(now[name]), p.typical * model.machine.scale(p))
-        for name, (_, p) in parameters.items()
-    )
-
-
-def _linear(column: Column, model: Model) -> bool:
-    """Whether the residual is linear along a column, whatever the other parameters are."""
-    effect = column.effect
-    if effect is None:
-        return not column.name.startswith(CURVED)
-    if effect not in model.effects:
-        return True
-    shaped = any(not (p.amplitude or p.choice) for p in effect.parameters_of(model.machine))
-    return effect.hook != "sensor" and not shaped
 
 
 def _priors(model: Model, columns: Sequence[Column], values: Values) -> tuple[Array, Array]:
