@@ -38,6 +38,10 @@ _HOOKS = (
 _OF_RECORDED = ("i_a", "torque_nm", "eps_rad", "omega_e_rad_s")
 _OF_MACHINE = ("drop", "flux", "motion", "torque")
 """Hooks of the base constants that are of the machine, and no nuisance."""
+_REAL = ("torque", "angle", "load", "shaft", "speed", "clock")
+"""Hooks whose value is no voltage or current of both axes, and no derivative by a complex step."""
+_ABSENT = ("drop", "torque")
+"""Hooks that give nothing where all amplitudes are zero."""
 _MEND = "correct the file"
 _TRIED = 3
 """Samples that a hook is tried on: a few, since it may difference them."""
@@ -45,7 +49,8 @@ _TRIED = 3
 
 @dataclass(frozen=True, slots=True)
 class Hook:
-    """A hook of the effect of a user's file; what it gives is a finite number a sample.
+    """A hook of the effect of a user's file; what it gives is a finite number a sample, a `real`
+    one or one of both axes.
 
     Raises UsageError where it does not, or fails.
     """
@@ -53,6 +58,7 @@ class Hook:
     call: Callable[..., Any]
     what: str
     file: str
+    real: bool = False
 
     def __call__(self, *arguments: Any) -> Any:
         """The hook's value [n]."""
@@ -60,9 +66,11 @@ class Hook:
         with errors_of(Path(self.file), self.what, q):
             value = self.call(*arguments)
         inputs = _inputs(arguments[0])
-        if inputs:
-            self._look(value, inputs)
-        return value
+        if not inputs:
+            return value
+        self._look(value, inputs)
+        shape = inputs[0].shape
+        return value if np.shape(value) == shape else np.broadcast_to(value, shape).copy()
 
     def _look(self, value: Any, inputs: list[NDArray[Any]]) -> None:
         shape, answer = inputs[0].shape, np.asarray(value)
@@ -70,6 +78,8 @@ class Hook:
         if answer.dtype.kind not in "bifc":
             message = f"{where} gives {type(value).__name__} and no numbers"
             raise UsageError(message, "return an array of one number a sample")
+        if self.real and answer.dtype.kind == "c":
+            raise UsageError(f"{where} gives complex numbers", "return real ones")
         try:
             fits = np.broadcast_shapes(answer.shape, shape) == shape
         except ValueError:
@@ -103,7 +113,7 @@ def guarded(effect: Effect, path: Path, text: str) -> Effect:
     """A user's effect with its hooks behind `Hook`s; raises UsageError for what is wrong with it.
 
     Its scales must be known, and every hook is called once, to see that it asks for no parameter
-    that is not there; `text` is the file's.
+    that is not there, and gives nothing without an amplitude; `text` is the file's.
 
     Parameters
     ----------
@@ -122,8 +132,8 @@ def guarded(effect: Effect, path: Path, text: str) -> Effect:
     Raises
     ------
     UsageError
-        A scale is not known, or a hook asks for a parameter that the effect has not; every hook is
-        called once to see that.
+        A scale is not known, a hook asks for a parameter that the effect has not, or a drop or drag
+        is there without an amplitude; every hook is called once to see that.
 
     """
     label = f"effect {effect.name}"
@@ -132,7 +142,7 @@ def guarded(effect: Effect, path: Path, text: str) -> Effect:
     _known_nuisance(effect, path)
     hooks = {name: getattr(effect, name) for name in _HOOKS}
     behind: dict[str, Any] = {
-        name: Hook(hook, f"{name} of {label}", str(path))
+        name: Hook(hook, f"{name} of {label}", str(path), real=name in _REAL)
         for name, hook in hooks.items()
         if hook is not None
     }
@@ -200,7 +210,8 @@ class _Named(dict[str, float]):
 
 
 def _try(effect: Effect, path: Path) -> None:
-    """Calls every hook once; raises UsageError where it asks for a parameter that is not there.
+    """Calls every hook once; raises UsageError where it asks for a parameter that is not there, or
+    gives a drop or drag though all amplitudes are zero.
 
     Other errors do not count here, since this machine is no motor: they are reported on captures.
     """
@@ -221,23 +232,34 @@ def _try(effect: Effect, path: Path) -> None:
     except UsageError:
         return
     for name, arguments in calls.items():
-        _ask(getattr(effect, name), (*arguments, q), q, path)
+        value = _ask(getattr(effect, name), (*arguments, q), q, path)
+        if name in _ABSENT and _is_there(value):
+            message = f"{path.name}: {name} of effect {effect.name} is not zero at zero parameters"
+            raise UsageError(message, "multiply it by a parameter that is its size")
     _ask(effect.speed, (line, q, x.ts_s), q, path)
     _ask(effect.voltage, (line + 0j, x, q, "drive"), q, path)
     _ask(effect.clock, (RECORDERS[0], q), q, path)
 
 
-def _ask(hook: Any, arguments: tuple[Any, ...], q: Mapping[str, float], path: Path) -> None:
-    """Raises UsageError where a hook asks for a parameter that its effect has not."""
+def _is_there(value: Any) -> bool:
+    """Whether any finite number of a hook's value is not zero."""
+    numbers = np.asarray(value)
+    return numbers.dtype.kind in "bifc" and bool((np.isfinite(numbers) & (numbers != 0)).any())
+
+
+def _ask(hook: Any, arguments: tuple[Any, ...], q: Mapping[str, float], path: Path) -> Any:
+    """The value of a hook, None without one; raises UsageError where it asks for a parameter that
+    its effect has not.
+    """
     if hook is None:
-        return
+        return None
     try:
         with np.errstate(all="ignore"):
-            hook.call(*arguments)
+            return hook.call(*arguments)
     except _NoNameError as error:
         raise _fault(error, path, hook.what, q) from error
     except (Exception, SystemExit):  # noqa: BLE001 (see `_try`)
-        return
+        return None
 
 
 @contextmanager

@@ -54,6 +54,7 @@ def folder(tmp_path: Path, was: str = "", now: str = "") -> str:
         ("import numpy", "import nothing_there\nimport numpy", 1, "nothing_there"),
         ("import numpy", "import sys; sys.exit(0)\nimport numpy", 1, "it ends the program"),
         ("parameters=(", "parameters=3 or (", None, "TypeError"),
+        ("return drag", "return 1e-3 + drag", None, "is not zero at zero parameters"),
         *(
             ("torque=torque,", f"torque=torque, in_place_of={named},", None, words)
             for named, words in (
@@ -81,6 +82,7 @@ def test_what_loading_tells(tmp_path: Path, was: str, now: str, line: int | None
         ("raise ValueError('boom')", 5, "ValueError: boom"),
         ("raise SystemExit(0)", 5, "it ends the program"),
         ("return 'much'", 3, "gives str and no numbers"),
+        ("return 1j * drag", 3, "gives complex numbers; return real ones"),
     ],
 )
 def test_what_a_hook_does_wrong_is_told_when_it_does_it(
@@ -101,6 +103,15 @@ def test_a_good_hook_gives_what_it_gave_also_in_another_process(tmp_path: Path):
     expected = 0.1 * x.omega_rad_s / 80.0
     np.testing.assert_array_equal(effect.torque(x, Q), expected)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(effect)).torque(x, Q), expected)
+
+
+def test_a_hook_may_give_one_number_for_all_samples(tmp_path: Path):
+    """A constant drag ended a diagnosis with: 'float' object has no attribute 'any'."""
+    effect = effects(folder(tmp_path, "return drag", 'return q["torque_nm"]'))["eddy_brake"]
+    x = operating()
+    drag = effect.torque(x, Q)
+    assert drag.shape == x.omega_rad_s.shape
+    assert (drag == 0.1).all()
 
 
 def test_samples_that_nothing_is_known_of_may_stay_unknown(tmp_path: Path):
