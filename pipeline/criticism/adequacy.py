@@ -20,7 +20,8 @@ from pipeline.criticism.library.friction_parts import friction_parts
 from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.parameter import Machine
-from pipeline.criticism.regression.goodness import leave_out, remainder
+from pipeline.criticism.regression.cross_validation import leave_out
+from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.selection.drift import drifting_segments

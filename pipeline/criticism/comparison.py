@@ -12,8 +12,8 @@ from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import policy_of
+from pipeline.criticism.regression.cross_validation import HeldOut, in_common, leave_out
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.regression.reported import (

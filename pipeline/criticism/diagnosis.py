@@ -18,7 +18,8 @@ from pipeline.criticism.machine.model import BEND_SPEED
 from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.ranking import ranked
-from pipeline.criticism.regression.goodness import HeldOut, of_motor, over_floor
+from pipeline.criticism.regression.cross_validation import HeldOut
+from pipeline.criticism.regression.goodness import of_motor, over_floor
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.regression.reported import (

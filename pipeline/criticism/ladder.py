@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.regression.goodness import HeldOut, signal_errors
+from pipeline.criticism.regression.cross_validation import HeldOut
+from pipeline.criticism.regression.goodness import signal_errors
 from pipeline.criticism.regression.reported import reported_parameters
 from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.criticism.validation.error_maps import (

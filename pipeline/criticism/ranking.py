@@ -12,8 +12,8 @@ from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.ladder import parameters_of
 from pipeline.criticism.library.headline import headline
+from pipeline.criticism.regression.cross_validation import HeldOut
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.search import Ladder
 from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies

@@ -19,8 +19,9 @@ from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import policy_of
+from pipeline.criticism.regression.cross_validation import HeldOut, in_common, leave_out
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
+from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.changed_between import share_notes

@@ -48,7 +48,7 @@ ARITHMETIC = {
     "signals/between_rows.py": {"ORDERS"},  # of three equal phases
     "selection/other_readings.py": {"_HALF_HOLD"},  # from the start of a hold to its middle
     "regression/fit.py": {"_SEED"},
-    "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart
+    "regression/cross_validation.py": {"_MOST_BLOCKS"},  # numbers that are apart
     "regression/identifiability.py": {"_EDGE"},  # rounding
     "regression/linearise.py": {"_CHUNK"},  # the cache
     "regression/mains_hum.py": {"LINES_HZ", "_BESIDE", "_LOBE", "_FINER"},  # mains; Hann's window

@@ -12,7 +12,8 @@ from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.machine.model import LATE_SPEED, Model
-from pipeline.criticism.regression.goodness import leave_out, signal_errors
+from pipeline.criticism.regression.cross_validation import leave_out
+from pipeline.criticism.regression.goodness import signal_errors
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import measured, residual
 from pipeline.criticism.residuals.segments import segments

@@ -14,8 +14,8 @@ from pipeline.criticism.machine.model import PHYSICAL, base_of
 from pipeline.criticism.operating import Array
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.columns import Column
+from pipeline.criticism.regression.cross_validation import HeldOut
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.numerics.identifiability import Identified, identify
 

@@ -13,7 +13,8 @@ from pipeline.criticism.machine.model import BASE, PHYSICAL, STATE, Model, base_
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.regression import GaussNewton
 from pipeline.criticism.regression.bounds import limits_of
-from pipeline.criticism.regression.goodness import HeldOut, form_error_factor
+from pipeline.criticism.regression.cross_validation import HeldOut
+from pipeline.criticism.regression.goodness import form_error_factor
 from pipeline.criticism.regression.identifiability import POSITIVE, Known, at_bound, known
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.numerics.identifiability import (

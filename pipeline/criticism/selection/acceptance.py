@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Parameter
-from pipeline.criticism.regression.goodness import (
+from pipeline.criticism.regression.cross_validation import (
     HeldOut,
-    floor_factors,
     in_common,
     leave_out,
     predicted_chi2,
-    significant_groups,
 )
+from pipeline.criticism.regression.goodness import floor_factors, significant_groups
 from pipeline.criticism.regression.identifiability import significantly_nonzero, together_nonzero
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.noise_floors import form_tolerance

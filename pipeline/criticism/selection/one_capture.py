@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.criticism.operating import Array
-from pipeline.criticism.regression.goodness import HeldOut, predicted_chi2
+from pipeline.criticism.regression.cross_validation import HeldOut, predicted_chi2
 from pipeline.criticism.regression.linear_system import LinearSystem
 
 

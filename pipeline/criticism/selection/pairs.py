@@ -15,9 +15,10 @@ from itertools import combinations
 import numpy as np
 
 from pipeline.criticism.effect import Effect
+from pipeline.criticism.regression.cross_validation import leave_out
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import leave_out, significant_groups
+from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.acceptance import Baseline, is_determined, matters
 from pipeline.criticism.selection.candidates import Candidate, placed

@@ -8,8 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.regression.cross_validation import leave_out
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import leave_out, significant_groups
+from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.left_out import loss_at
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import NormalEquations

@@ -8,12 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.criticism.machine.model import values_of
-from pipeline.criticism.regression.goodness import (
-    HeldOut,
-    predicted_chi2,
-    remainder,
-    significant_groups,
-)
+from pipeline.criticism.regression.cross_validation import HeldOut, predicted_chi2
+from pipeline.criticism.regression.goodness import remainder, significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.sizes import is_rare
 from pipeline.criticism.selection.stepwise import LadderStep

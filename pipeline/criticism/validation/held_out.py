@@ -13,8 +13,8 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.operating import Array
+from pipeline.criticism.regression.cross_validation import HeldOut
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.validation.error_maps import disjoint

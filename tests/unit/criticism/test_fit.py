@@ -11,8 +11,8 @@ from pipeline.criticism.data.segment import row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.columns import Column
+from pipeline.criticism.regression.cross_validation import HeldOut
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.noise_floors import Floor, reading_error
 from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.regression.normal_equations import Prior

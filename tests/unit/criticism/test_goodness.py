@@ -10,16 +10,18 @@ import pytest
 from pipeline.criticism.diagnosis import _as_reported
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.columns import Column
+from pipeline.criticism.regression.cross_validation import (
+    HeldOut,
+    in_common,
+    leave_out,
+    predicted_chi2,
+)
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import (
-    HeldOut,
     form_error_factor,
-    in_common,
-    leave_out,
     material_size,
     over_floor,
-    predicted_chi2,
     remainder,
 )
 from pipeline.criticism.regression.identifiability import known_by

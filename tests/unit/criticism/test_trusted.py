@@ -13,8 +13,8 @@ from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.ranking import _share_of_fall, ranked
 from pipeline.criticism.regression.columns import Column
+from pipeline.criticism.regression.cross_validation import HeldOut
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.identifiability import significantly_nonzero, together_nonzero
 from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
 from pipeline.criticism.search import Ladder, ladder_from

@@ -11,8 +11,8 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import zero
+from pipeline.criticism.regression.cross_validation import HeldOut
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.removal import unsure_effect
 from pipeline.criticism.selection.score_test import Score
