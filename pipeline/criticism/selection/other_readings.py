@@ -101,15 +101,15 @@ def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
         yield gauss_newton(replace(system.fit, segments=turned))
     if any(ripples(segment) for segment in system.segments):
         yield gauss_newton(replace(system.fit, segments=tuple(map(_other_lines, system.segments))))
-    significant = significant_groups(system)
-    torques = significant & [channel == TORQUE for _, channel, _ in system.labels]
-    if torques.any():
+    torques = np.array([channel == TORQUE for _, channel, _ in system.labels], dtype=bool)
+    if np.any(torques & significant_groups(system)):
         moved = (_at_other_place(s) if _reads_torque(s) else s for s in system.segments)
         # only the inertia's column is another there
         kept = np.flatnonzero([column.name != "j_kgm2" for column in system.columns])
         fit = replace(system.fit, segments=tuple(moved))
         other = gauss_newton(fit, before=system.only(kept))
-        # what neither place explains is an effect's, and no coupling shows at the stator
+        # what neither place explains is an effect's, and no coupling shows at the stator; the
+        # deviance is logarithmic, so what it spoils in other captures counts by its power
         if clears(system, torques, *(one.reduced_chi2(one.residual) for one in (system, other))):
             yield other
 

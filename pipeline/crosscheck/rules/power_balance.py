@@ -18,7 +18,7 @@ NAME = "power_balance"
 COLUMNS = ("t_s", "vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm")
 SPEEDS = ("theta_mech_rad", "omega_mech_rad_s")
 SPEED_S = 0.005
-BINS, LEAST_ROWS = 400, 40
+BINS, LEAST_ROWS = 100, 40
 
 
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
@@ -27,11 +27,16 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     Notes
     -----
     Block means of 1.5 (v_d i_d + v_q i_q) are regressed on shaft power P, dP/dt (a transducer that
-    lags by τ reads P - τ dP/dt), i² (copper), |i| (inverter drop), |ω| and ω² (friction, iron): the
-    coefficient of shaft power is 1 in any machine, whatever it loses, and lands on a convention's
-    number where one is wrong. i_q ω is the instrument for shaft power, so that a shaft that rings
-    does not pull it to zero, and its rate the one for dP/dt. Its uncertainty is that of the
-    regression and of the gains of current, voltage and torque; the option `allowance` [1] is added.
+    lags by τ reads P - τ dP/dt), i² (copper), |i| (inverter drop), |ω| and ω² (friction, iron), and
+    on what is stored: dω²/dt (the rotor's inertia, before a transducer in the shaft), di_d²/dt and
+    di_q²/dt (the field). The coefficient of shaft power is 1 in any machine, whatever it loses or
+    stores, and lands on a convention's number where one is wrong. i_q ω is the instrument for shaft
+    power, so that a shaft that rings does not pull it to zero, and its rate the one for dP/dt. Its
+    uncertainty is that of the regression and of the gains of current, voltage and torque; the
+    option `allowance` [1] is added.
+
+    A block mean of the rate of ω² is a difference of two, whose noise pulls the inertia to zero in
+    short blocks: blocks are some tens of milliseconds.
 
     References
     ----------
@@ -77,8 +82,8 @@ def _speed(data: Mapping[str, Array]) -> Array:
 
 
 def _blocks(capture: Capture, r_phase_ohm: float | None) -> Array:
-    """Block means [n, 10]: net power; i_q omega, shaft power, a rate behind each; then i², |i|,
-    |omega|, omega², 1; SI.
+    """Block means [n, 13]: net power; i_q omega, shaft power, a rate behind each; then i², |i|,
+    |omega|, omega², rates of omega², i_d² and i_q², 1; SI.
 
     Copper loss at the winding's temperature is taken off where R and the temperature are known,
     so that its slow growth is not read as anything else.
@@ -87,7 +92,7 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> Array:
     wanted = (*COLUMNS, speed, *(n for n in ("temp_winding_degc",) if capture.has(n)))
     data = capture.finite(*wanted)
     if data["t_s"].size < LEAST_ROWS:
-        return np.empty((0, 10))
+        return np.empty((0, 13))
     i_squared = data["id_a"] ** 2 + data["iq_a"] ** 2
     power = 1.5 * (data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"])
     if r_phase_ohm is not None and "temp_winding_degc" in data:
@@ -105,6 +110,9 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> Array:
         np.sqrt(i_squared),
         np.abs(omega),
         omega**2,
+        np.gradient(omega**2, data["t_s"]),
+        np.gradient(data["id_a"] ** 2, data["t_s"]),
+        np.gradient(data["iq_a"] ** 2, data["t_s"]),
     )
     rows = np.column_stack([*columns, np.ones(omega.size)])
     size = max(1, rows.shape[0] // BINS)

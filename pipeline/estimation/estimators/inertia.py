@@ -23,7 +23,7 @@ from pipeline.estimation.mechanical.drive_windows import (
     too_short,
     torque_is_separable,
 )
-from pipeline.estimation.mechanical.sampled_current import sampling_drag
+from pipeline.estimation.mechanical.sampled_current import in_step, sampling_drag
 from pipeline.estimation.mechanical.setups import another_setup, setups_of
 from pipeline.estimation.mechanical.shaft_doubts import DRAGS, Doubts
 from pipeline.estimation.mechanical.shaft_nuisances import (
@@ -201,7 +201,7 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
         return METHOD.nothing(GIVES, f"{missing}; {EXPERIMENT}")
     nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
     nuisances += [] if torque.reluctance_known else [RELUCTANCE]
-    nuisances += [SAMPLED] if coasts_decide(rows) else []
+    nuisances += [SAMPLED] if coasts_decide(rows) and in_step(rows.captures) else []
     y, driving = rows.acceleration_rad_s2, driving_torque(rows, torque, {})
     if float(np.ptp(driving)) == 0.0:
         return METHOD.nothing(GIVES, f"the drive log holds no torque; {EXPERIMENT}")
@@ -220,7 +220,8 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
     if not drag.steady:
         regimes = drag_disagreements(rows, drag, options["level"])
         doubts = Doubts(strange, regimes, _over_time(rows, driving, drag, options["level"]))
-    sampled = () if coasts_decide(rows) else sampling_drag(rows.captures, torque.kt_nm_a, known)
+    sampled = sampling_drag(rows.captures, torque.kt_nm_a, known)
+    sampled = () if SAMPLED in drag.names else sampled
     estimates = _estimates(rows, torque, drag, doubts, _left_out(rows, campaign), sampled)
     if strange > policy().drag.unexplained_share and not _load_logged(rows):
         drags = METHOD.nothing(GIVES[1:], f"{words_of_no_torque(strange)}; {LOAD}").estimates

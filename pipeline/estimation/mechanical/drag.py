@@ -20,7 +20,13 @@ from pipeline.estimation.mechanical.drag_forms import (
     low_end,
 )
 from pipeline.estimation.mechanical.drive_windows import coasts_decide, drive_columns, freedom
-from pipeline.estimation.mechanical.shaft_nuisances import BY_SENSE, COAST_LOAD, OF_CURRENT, TIMING
+from pipeline.estimation.mechanical.shaft_nuisances import (
+    BY_SENSE,
+    COAST_LOAD,
+    OF_CURRENT,
+    SAMPLED,
+    TIMING,
+)
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.estimation.policy import policy
 from pipeline.numerics.clusters import cluster_covariance
@@ -220,6 +226,9 @@ def _additions(
     if not TIMING.isdisjoint(chosen):
         # they take much the same of the torque, and which of them it is chance says
         chosen += sorted(n for n in TIMING.difference(chosen) if n in pool)
+    if SAMPLED in pool and SAMPLED not in chosen:
+        # no pulse is sampled in its very middle: without it drives say what coasts alone know
+        chosen.append(SAMPLED)
     start = np.column_stack([law, *(candidates[n] for n in chosen)])
     shapes = {n: candidates[n] for n in STRIBECK}
     chosen += needed_columns(start, shapes, y, sigma, level, 1, tau)

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from pipeline.estimation.policy import policy
 from pipeline.records.capture import Capture
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import Contribution
+
+
+def in_step(captures: Iterable[Capture]) -> bool:
+    """Whether some log of a current is in step with an inverter's pulses.
+
+    Parameters
+    ----------
+    captures
+        Those with currents, coasts among them.
+
+    """
+    metas = [capture.meta for capture in captures]
+    return any(m.voltage_kind == "commanded" or m.voltage_timing == "held" for m in metas)
 
 
 def sampling_drag(
@@ -39,9 +52,7 @@ def sampling_drag(
 
     """
     inductance = known.best("lq_h")
-    metas = [capture.meta for capture in captures]
-    driven = any(m.voltage_kind == "commanded" or m.voltage_timing == "held" for m in metas)
-    if inductance is None or not driven:
+    if inductance is None or not in_step(captures):
         return ()
     per_second = kt_nm_a**2 / (1.5 * inductance.number)
     u = per_second * policy().drag.sampling_u_s

@@ -79,6 +79,23 @@ def test_a_place_that_leaves_most_of_the_torque_open_is_not_taken(monkeypatch, l
     assert (by_best_readings(here) is elsewhere) == moves
 
 
+@pytest.mark.parametrize(("spoilt", "moves"), [(1.0, True), (60.0, False)])
+def test_a_place_that_spoils_other_captures_is_not_taken(monkeypatch, spoilt, moves):
+    """The deviance is logarithmic: a wave of one capture counts as much as a drive that is lost."""
+    system = linear_system(fitted((log(noise=1.0), log(noise=1.0, seed=6))))
+    torque = np.array([channel == TORQUE for _, channel, _ in system.labels])[system.group]
+    first = torque & (system.segment == 0)
+
+    def missing(one, other, volts):
+        times = np.where(first, one, np.where(torque, other, volts))
+        return replace(system, residual=times * system.residual)
+
+    here, elsewhere = missing(40.0, 1.0, 6.0), missing(0.1, spoilt, 1.0)
+    monkeypatch.setattr(f"{by_best_readings.__module__}.gauss_newton", lambda *_, **__: elsewhere)
+    assert elsewhere.deviance < here.deviance - here.policy.selection.tie
+    assert (by_best_readings(here) is elsewhere) == moves
+
+
 @pytest.mark.parametrize("rippling", [True, False])
 def test_straight_lines_between_rows_are_tried_where_rows_show_waves(monkeypatch, rippling):
     """And taken, as here, where they explain more."""

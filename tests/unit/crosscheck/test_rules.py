@@ -265,6 +265,33 @@ def test_a_transducer_that_lags_does_not_unbalance_the_power() -> None:
     assert check.value == pytest.approx(1.0, abs=0.01)
 
 
+def test_what_rotor_and_field_store_does_not_unbalance_the_power() -> None:
+    """A heavy rotor whose speed swings by half, before a transducer in the shaft, and an inductance
+    of 20 ms R: what they store comes back, and is most of the power for a while.
+    """
+    rng, t = np.random.default_rng(4), 1e-4 * np.arange(80_000)
+    omega = 120.0 + 70.0 * np.sin(7.0 * t)
+    load = 0.3 + 0.2 * np.sin(2.3 * t + 1.0)
+    id_a = -2.0 + 1.5 * np.sin(31.0 * t)
+    stored = 2e-3 * np.gradient(omega, t)
+    iq_a = (load + stored) / (1.5 * P * PSI)
+    inductance = 0.02 * R
+    vd = R * id_a + inductance * (np.gradient(id_a, t) - P * omega * iq_a)
+    vq = R * iq_a + inductance * (np.gradient(iq_a, t) + P * omega * id_a) + P * omega * PSI
+    columns = {
+        "t_s": t,
+        "id_a": id_a,
+        "iq_a": iq_a,
+        "vd_v": vd + rng.normal(0, 0.05, t.size),
+        "vq_v": vq + rng.normal(0, 0.05, t.size),
+        "omega_mech_rad_s": omega,
+        "torque_shaft_nm": load + rng.normal(0, 0.005, t.size),
+    }
+    check = judge("power_balance", constants(), campaign_of("torque_map", columns))
+    assert check.status == "pass"
+    assert check.value == pytest.approx(1.0, abs=0.01)
+
+
 def test_line_voltage_taken_for_phase_unbalances_the_power() -> None:
     check = judge("power_balance", constants(), torque_map(gain=math.sqrt(3.0)))
     assert check.status == "fail"
