@@ -1,4 +1,6 @@
-"""Constants of the shaft less what effects add to them, or of the fit that has these effects."""
+"""Constants less what effects add to them, or of the fit that has these effects: of the shaft, and
+those that an effect makes something else.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +14,9 @@ from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.uncertainty import BETWEEN, propagate, type_a
 
 INERTIA, TAU = "j_rotor_kgm2", "tau_mech_s"
+_FOLLOWING = ((INERTIA, TAU, 1), ("lq_h", "tau_elec_s", 1), ("lq_h", "saliency_ratio", 1),
+              ("ld_h", "saliency_ratio", -1))  # fmt: skip
+"""A constant, another that was derived from it, and the power by which that goes with it."""
 MECHANICAL = (INERTIA, "torque_coulomb_nm", "b_visc_nm_s_rad")
 """Constants that tests of a shaft share with every effect that turns or brakes it."""
 FIT = "model"
@@ -53,9 +58,11 @@ def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[st
                 budget=(*one.budget, *type_a(_source(effect, name), -u)),
                 note="; ".join(part for part in (words, one.note) if part),
             )
-    for name in (one for one in MECHANICAL if one in changed and one in model.constants):
+    held = (*MECHANICAL, *(one for one in model.touches if one not in MECHANICAL))
+    for name in (one for one in held if one in changed and one in model.constants):
         changed[name] = _held_against(changed[name], model)
-    changed |= _with_its_inertia(constants, changed)
+    for name, derived, power in _FOLLOWING:
+        changed |= _with_what_it_follows(constants, changed, name, derived, power)
     for effect, share in list(model.far_inertia.items())[:1]:
         changed |= {
             name: _near(changed[name], effect, share)
@@ -65,18 +72,23 @@ def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[st
     return changed
 
 
-def _with_its_inertia(
-    before: Mapping[str, Estimate], after: Mapping[str, Estimate]
+def _with_what_it_follows(
+    before: Mapping[str, Estimate],
+    after: Mapping[str, Estimate],
+    name: str,
+    derived: str,
+    power: int,
 ) -> dict[str, Estimate]:
-    """The mechanical time constant of an inertia that was replaced; empty where it was not."""
-    old, new, tau = before.get(INERTIA), after.get(INERTIA), after.get(TAU)
-    if old is None or new is None or tau is None or not (old.known and new.known and tau.known):
+    """A constant derived from one that was replaced; empty where that was not."""
+    old, new, one = before.get(name), after.get(name), after.get(derived)
+    if old is None or new is None or one is None or not (old.known and new.known and one.known):
         return {}
-    ratio = new.number / old.number
+    ratio = (new.number / old.number) ** power
     if ratio == 1.0:
         return {}
-    budget = propagate([(ratio, tau.budget)])
-    return {TAU: replace(tau, value=ratio * tau.number, budget=budget)}
+    own = power * ratio * one.number / new.number
+    budget = propagate([(ratio, one.budget), (own, new.budget)])
+    return {derived: replace(one, value=ratio * one.number, budget=budget)}
 
 
 def _held_against(estimate: Estimate, model: ModelVerdict) -> Estimate:

@@ -66,6 +66,7 @@ EFFECT = Effect(
     ),
     signals=("id_a", "iq_a"),
     alternatives={"bemf_harmonics": "an open-circuit spin", "dead_time": "two speeds"},
+    touches=dict.fromkeys(("ld_h", "lq_h"), "goes with the angle at which the rotor was locked"),
     coenergy=_coenergy,
     torque=_torque,
 )

@@ -94,7 +94,8 @@ def _chosen(
 def _refit_best(
     wide: LinearSystem, passing: Sequence[Score], added: Sequence[Effect]
 ) -> LinearSystem | None:
-    """Refits candidates that are close to the best fall of deviance; the best one that passes.
+    """Refits candidates that may be the best one by a refit, which may fall by 1/`close_share` of a
+    score, their penalty paid; the best one that passes.
 
     Each must pass all of:
 
@@ -109,8 +110,8 @@ def _refit_best(
     policy = wide.policy.selection
     usual = Baseline.of(wide, added)
     tests = {segment.test for segment in wide.segments}
-    most = max((s.fall for s in passing), default=0.0)
-    close = [s for s in passing if s.fall >= policy.close_share * most]
+    most = max((s.fall - s.penalty for s in passing), default=0.0)
+    close = [s for s in passing if s.fall / policy.close_share - s.penalty >= most]
     best: LinearSystem | None = None
     least = 0.0
     for score in close:

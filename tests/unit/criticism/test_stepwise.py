@@ -201,6 +201,30 @@ def test_candidates_are_tried_by_what_they_are_worth(monkeypatch):
     assert tried == [cheap, dear]
 
 
+@pytest.mark.parametrize(("fall", "both"), [(176.0, True), (165.0, False)])
+def test_who_may_be_best_by_a_refit_is_refitted(monkeypatch, fall, both):
+    """Cogging of ten terms has the larger fall, and the friction of a coast less to pay."""
+    tried = []
+
+    def judged(wide, score):
+        tried.append(score.candidate.effect.name)
+        return wide
+
+    monkeypatch.setattr(best_candidate, "reweighted", judged)
+    monkeypatch.setattr(best_candidate, "refitted", lambda wide, _: wide)
+    monkeypatch.setattr(best_candidate, "matters", lambda *_: False)
+    monkeypatch.setattr(best_candidate, "is_rare", lambda *_: False)
+    wide = linear_system(fitted((log(noise=1.0),)))
+
+    def score(name, fall, penalty):
+        of = wide.policy.selection
+        return Score(Candidate(effects()[name], ()), fall, penalty, {}, {}, 1.0, 2.0, policy=of)
+
+    passing = [score("cogging", 290.0, 73.0), score("stribeck", fall, 26.7)]
+    best_candidate._refit_best(wide, passing, ())
+    assert tried == ["cogging", "stribeck"][: 1 + both]
+
+
 def test_windage_is_found_with_its_size():
     def drag(omega, _):
         return 0.035 * omega * np.abs(omega) / 250.0**2
