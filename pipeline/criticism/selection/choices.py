@@ -14,13 +14,15 @@ from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 
 
-def reconsidered(system: LinearSystem) -> LinearSystem:
+def reconsidered(system: LinearSystem, at_floor: bool = False) -> LinearSystem:
     """The fit with other choices inside its effects, where these are better.
 
     Parameters
     ----------
     system
         The fit.
+    at_floor
+        Whether to look for a better choice although nothing is over the floor.
 
     Returns
     -------
@@ -36,7 +38,7 @@ def reconsidered(system: LinearSystem) -> LinearSystem:
 
     """
     for effect in system.fit.model.effects:
-        if not significant_groups(system).any():
+        if not at_floor and not significant_groups(system).any():
             break
         if effect.discriminator is not None:
             continue

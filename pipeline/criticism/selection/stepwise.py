@@ -81,7 +81,8 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
     the best effect, within a `tie`, are taken instead; what full logs show of that effect counts
     for it. Friction that changes with time is taken where it explains more by a `tie`: in one coast
     it looks as friction that changes with speed, which is commoner. Choices inside effects are made
-    again then: they may have been right by the former reading alone.
+    again then: they may have been right by the former reading alone. One that explains as much by
+    itself is taken instead.
 
     An effect of the last step whose size may be zero, now that all others are in, goes with every
     step that has it, unless it takes most of an error; the search goes on without it.
@@ -157,9 +158,11 @@ def _instead_of_effect(
     if changing is not None and changing.deviance < least - tie:
         better = instead is None or changing.deviance < instead.deviance - tie
         instead = changing if better else instead
-    if instead is None and _is_reading(chosen, wide, reread, library, base, unsure):
-        return reread
-    return instead
+    if instead is None:
+        is_reading = _is_reading(chosen, wide, reread, library, base, unsure)
+        return reread if is_reading else None
+    rechosen = reconsidered(wide, at_floor=True)
+    return instead if rechosen is wide or rechosen.deviance > instead.deviance + tie else rechosen
 
 
 def _with_pair(

@@ -16,6 +16,7 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import linear_system
+from pipeline.criticism.selection import stepwise
 from pipeline.criticism.selection.other_readings import by_best_readings, reading_notes
 from pipeline.criticism.selection.sizes import is_rare
 from pipeline.criticism.selection.stepwise import _is_reading, search
@@ -114,6 +115,24 @@ def test_what_was_chosen_by_another_reading_is_chosen_again() -> None:
     assert {segment.instrument.frame for segment in last.segments} == {0.5}
     assert last.values["current_gain.shunts"] == 0.0
     assert last.values["current_gain.cosine"] == pytest.approx(0.02, rel=0.02)
+
+
+@pytest.mark.parametrize(("times", "taken"), [(10.02, True), (15.0, False), (20.0, False)])
+def test_a_choice_that_explains_as_much_is_taken_in_place_of_changing_friction(
+    times: float, taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether a wave's torque reaches the shaft looked like friction of a time constant."""
+    wide = linear_system(fitted([log(noise=1.0), log(noise=1.0, seed=6)]))
+    here, changing, chosen = (
+        replace(wide, residual=one * wide.residual) for one in (20.0, 10.0, times)
+    )
+    chosen = here if times == 20.0 else chosen
+    monkeypatch.setattr(stepwise, "by_best_readings", lambda system: system)
+    monkeypatch.setattr(stepwise, "with_free_shares", lambda _: None)
+    monkeypatch.setattr(stepwise, "with_changing_friction", lambda _: changing)
+    monkeypatch.setattr(stepwise, "reconsidered", lambda *_, **__: chosen)
+    instead = stepwise._instead_of_effect(None, here, LIBRARY, 0, frozenset())
+    assert instead is (chosen if taken else changing)
 
 
 def test_an_iron_loss_is_no_voltage_that_is_logged_after_it_acted() -> None:
