@@ -71,11 +71,11 @@ class Baseline:
         same_hook = _same_hook(score.candidate.effect, self.added)
         doubts = _form_error_factors(wide, same_hook), self.doubt
         below = policy.same_hook_penalties if same_hook else policy.held_out_penalties
-        promised = policy.held_out_penalties * score.penalty, below * score.penalty
+        least = policy.held_out_penalties * score.penalty, below * score.penalty
         one, other = in_common((wide, tried), (self.held_out, leave_out(tried)))
         without = predicted_chi2(wide, one) * self.shrunk
         after = predicted_chi2(tried, other) * floor_factors(tried)
-        holds = _improves_held_out(wide, without, tried, after, promised, doubts)
+        holds = _improves_held_out(wide, without, tried, after, least, doubts)
         relief = float(wide.prior_costs().sum() - tried.prior_costs().sum())
         return holds and not spoils(tried, without, after, relief)
 

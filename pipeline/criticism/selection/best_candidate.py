@@ -64,8 +64,8 @@ def _chosen(
     added: Sequence[Effect],
     unsure: Set[str],
 ) -> LinearSystem | None:
-    """The fit with the best candidate of the first few; of the next few, if none of these keeps its
-    predicted fall and differs significantly from zero; an effect that is `unsure` does not.
+    """The fit with the best candidate of the first few; of the next few, if none of these passes
+    as a refit and differs significantly from zero; an effect that is `unsure` does not.
 
     That fit is finished with columns of its own, and without terms that are not worth their
     penalty. Where one that explains more by over a `tie` is not sure of its size, no other that
