@@ -9,9 +9,33 @@ from typing import TypeVar
 
 import polars as pl
 
+from pipeline.records.errors import meant
 from pipeline.records.naming import counted
 
 One = TypeVar("One")
+
+
+def of_name(kind: str, name: str, known: Mapping[str, One]) -> One:
+    """One of several by its name.
+
+    Parameters
+    ----------
+    kind
+        What they are, for the message.
+    name
+        The name.
+    known
+        All of them by name.
+
+    Raises
+    ------
+    KeyError
+        There is none of that name; the message has those there are.
+
+    """
+    if name not in known:
+        raise KeyError(f"no {kind} {name!r}; {meant(str(name), known)}")
+    return known[name]
 
 
 class Shown(ABC):
@@ -48,7 +72,7 @@ class ByMotor(Shown, Mapping[str, One]):
 
     def __getitem__(self, motor_id: str) -> One:
         """The result of one motor."""
-        return self.motors[motor_id]
+        return of_name("motor", motor_id, self.motors)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.motors)

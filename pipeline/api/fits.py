@@ -117,9 +117,9 @@ class Fits(ByMotor[MotorFit]):
         from pipeline.report.charts.chart import chart
 
         motor_id = self.motor_or_first(motor)
-        drawn = [e for e in self.motors[motor_id].evidence if e.estimator == estimator]
+        drawn = [e for e in self[motor_id].evidence if e.estimator == estimator]
         if not drawn:
-            known = dict.fromkeys(e.estimator for e in self.motors[motor_id].evidence)
+            known = dict.fromkeys(e.estimator for e in self[motor_id].evidence)
             raise KeyError(f"{motor_id}: no plot of {estimator}; there are {', '.join(known)}")
         return tuple(figure(f"{motor_id}: {one.title}", chart(one)) for one in drawn)
 

@@ -135,7 +135,7 @@ class Comparisons(ByMotor[Comparison]):
         from pipeline.report.charts.chart import chart
 
         motor_id = self.motor_or_first(motor)
-        for one in self.motors[motor_id].traces:
+        for one in self[motor_id].traces:
             if (one.signal, one.capture) == (signal, capture):
                 series = Series("", one.t_s, one.measured, one.model)
                 drawn = Evidence("model", signal, "t_s", signal, "line", (series,), capture)
@@ -215,8 +215,8 @@ class Diagnoses(ByMotor[Diagnosis]):
         from pipeline.report.charts.step_chart import step_chart
 
         motor_id = self.motor_or_first(motor)
-        if not self.motors[motor_id].ladder:
-            notes = "; ".join(self.motors[motor_id].notes)
+        if not self[motor_id].ladder:
+            notes = "; ".join(self[motor_id].notes)
             raise ValueError(f"{motor_id}: no ladder to draw: {notes}")
         ladder = self.ladder.filter(pl.col("motor_id") == motor_id)
         steps = ladder.unique("step", maintain_order=True)["added"].to_list()
@@ -225,7 +225,7 @@ class Diagnoses(ByMotor[Diagnosis]):
             for name, part in ladder.group_by("signal", maintain_order=True)
             if part.height == len(steps)
         }
-        whole = self.motors[motor_id].whole_model
+        whole = self[motor_id].whole_model
         names = [f"+ {added}" if added else whole for added in steps]
         return figure(f"{motor_id}: error by step", step_chart(names, over))
 

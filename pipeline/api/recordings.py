@@ -10,7 +10,7 @@ from typing import Any
 import polars as pl
 
 from pipeline.api import frames
-from pipeline.api.by_motor import Shown
+from pipeline.api.by_motor import Shown, of_name
 from pipeline.api.options import check_options
 from pipeline.execution.tasks.captures import ReadTask, usable_captures
 from pipeline.io.ingest.files import input_folder
@@ -55,7 +55,7 @@ class Recordings(Shown):
 
     def __getitem__(self, motor_id: str) -> Campaign:
         """The captures of one motor."""
-        return self.campaigns[motor_id]
+        return of_name("motor", motor_id, self.campaigns)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.campaigns)
@@ -124,11 +124,8 @@ class Recordings(Shown):
         return replace(self, campaigns=kept)
 
     def _capture(self, path: str) -> Capture:
-        for campaign in self.campaigns.values():
-            for capture in campaign.captures:
-                if capture.path == path:
-                    return capture
-        raise KeyError(path)
+        captures = (capture for one in self.campaigns.values() for capture in one.captures)
+        return of_name("capture", path, {capture.path: capture for capture in captures})
 
     def _title(self) -> str:
         motors, findings = counted(len(self), "motor"), counted(len(self.findings), "finding")

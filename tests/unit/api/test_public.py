@@ -172,8 +172,18 @@ def test_part_of_the_recordings(recordings):
     assert set(few.captures["test"]) == {"spin_down"}
     assert recordings.only(tests="spin_down").captures.equals(few.captures)
     assert len(recordings.only(motor="nobody")) == 0
-    with pytest.raises(KeyError):
-        recordings.signals("no/such/capture.csv")
+    with pytest.raises(KeyError, match="no capture 'spin_down'; "):
+        recordings.signals("spin_down")
+
+
+def test_a_motor_that_is_not_there_is_named_with_those_that_are(recordings, fits, sheets):
+    for get in (recordings, fits, sheets):
+        with pytest.raises(KeyError, match=f"no motor 'G52-0602'; did you mean {MOTOR}"):
+            get["G52-0602"]
+        assert "G52-0602" not in get
+    assert sheets.get("G52-0602") is None
+    with pytest.raises(KeyError, match="no motor 'G52-0602'"):
+        fits.plot("current_step", motor="G52-0602")
 
 
 def test_a_plot_is_a_document_of_its_own(fits, tmp_path):
