@@ -16,6 +16,9 @@ METHOD = "stated"
 UNSTATED_SHARE = 0.05
 """Relative standard uncertainty of a constant that is stated without one; chosen: makers of small
 motors commonly promise their constants within 10 %, which is taken as two standard ones."""
+EXACT_SHARE = 1e-6
+"""Least relative standard uncertainty of a stated constant; chosen: no instrument is as good, and a
+prior of none at all has no weight that could be computed with."""
 
 
 def may_be_stated(name: str) -> bool:
@@ -72,7 +75,7 @@ def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:
     -----
     `NAME` is its value and `u_NAME` its standard uncertainty, both in the constant's unit. What the
     configuration says goes before what captures say; of captures that differ the most frequent pair
-    counts. Without `u_NAME` it is `UNSTATED_SHARE` of the value.
+    counts. Without `u_NAME` it is `UNSTATED_SHARE` of the value; it is at least `EXACT_SHARE`.
 
     """
     estimates = []
@@ -99,7 +102,8 @@ def _pair(extra: Mapping[str, str], name: str) -> tuple[float, float | None] | N
 
 def _estimate(name: str, value: float, u: float | None, captures: tuple[str, ...]) -> Estimate:
     note = "" if u is not None else f"u_{name} is not stated, taken as {UNSTATED_SHARE:.0%}"
-    spread = UNSTATED_SHARE * abs(value) if u is None else u
+    size = abs(value)
+    spread = UNSTATED_SHARE * size if u is None else max(u, EXACT_SHARE * size)
     budget = type_b(f"stated:{name}", spread)
     unit = CONSTANTS[name].unit
     return Estimate(name, value, unit, "stated", METHOD, budget, captures=captures, note=note)

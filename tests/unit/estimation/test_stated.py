@@ -9,12 +9,13 @@ import pytest
 
 from pipeline.__main__ import main
 from pipeline.contracts.motor import agree
+from pipeline.criticism.data.machine_scale import stated_parameters
 from pipeline.crosscheck.registry import check_all
 from pipeline.estimation.registry import fit_all
 from pipeline.io.ingest.metadata import capture_meta
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import CaptureError
-from pipeline.records.stated import UNSTATED_SHARE, stated_constants
+from pipeline.records.stated import EXACT_SHARE, UNSTATED_SHARE, stated_constants
 from pipeline.simulator.design import EXACT
 from tests.recovery.simulated import BENCH, MOTOR, recorded
 
@@ -103,6 +104,14 @@ def test_a_statement_that_no_motor_has_is_refused(key, text):
     texts = {"contract": "1", "motor_id": "M", "test": "drive", key: text}
     with pytest.raises(CaptureError, match=f"{key} is '{text}'; for {key} write a number from"):
         capture_meta(texts)
+
+
+def test_what_is_stated_as_exact_is_a_prior_as_well():
+    """A diagnosis ignored it, and asked for the torque constant that was stated."""
+    stated = {"kt_peak_nm_a": 0.12, "u_kt_peak_nm_a": 0.0}
+    (kt,) = stated_constants(Campaign("m", (), stated))
+    prior = stated_parameters([kt], pole_pairs=4)["psi_wb"]
+    assert prior == pytest.approx((0.02, EXACT_SHARE * 0.02))
 
 
 def test_the_range_of_a_statement_is_the_glossary_s():
