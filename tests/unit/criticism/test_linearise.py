@@ -123,15 +123,15 @@ def test_the_column_of_a_sensor_is_what_the_residual_moves_by(name):
     with_it = PLAIN.with_effects(LIBRARY[name])
     still = {**values, **zero(LIBRARY[name], PLAIN)}
     sampler = Sampler(segment, PLAIN, values)
-    heard = 0
+    observed = 0
     for column in effect_columns(LIBRARY[name], PLAIN):
         moved = {**still, column.name: column.step}
         expected = residual(segment, with_it, moved) - residual(segment, with_it, still)
         found = sampler.change(column)
         if found is not None:
-            heard += 1
+            observed += 1
             assert found * column.step == pytest.approx(expected, rel=1e-9, abs=1e-12)
-    assert heard
+    assert observed
 
 
 def test_a_drag_s_column_has_the_gain_of_the_transducer_in_it():

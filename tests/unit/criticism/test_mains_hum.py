@@ -36,7 +36,7 @@ def logs(rms=0.0, freq=50.0, count=3, n=8000):
     ]
 
 
-def test_a_line_is_heard_with_its_size_in_the_signal_that_has_it():
+def test_a_line_is_found_with_its_size_in_the_signal_that_has_it():
     (hum,) = hum_of(logs(rms=0.02), PLAIN, BASE)
     assert (hum.kind, hum.signal, hum.freq_hz) == ("dq", "vq_v", 50.0)
     assert hum.rms == pytest.approx(0.02, rel=0.15)
@@ -64,8 +64,8 @@ def test_two_captures_alone_do_not_make_a_building():
 def test_captures_of_any_signal_make_a_building():
     """Two drive logs and two spins of an open winding have it in signals of their own."""
     made = [*logs(rms=0.02, count=2), *(spin(n, 0.02) for n in range(2))]
-    heard = hum_of(made, PLAIN, TURNED)
-    assert {("dq", "vq_v"), ("open", "vbc_v")} <= {(one.kind, one.signal) for one in heard}
+    lines = hum_of(made, PLAIN, TURNED)
+    assert {("dq", "vq_v"), ("open", "vbc_v")} <= {(one.kind, one.signal) for one in lines}
 
 
 def test_once_a_turn_of_a_steady_shaft_is_not_taken_for_it():
@@ -92,7 +92,7 @@ def test_what_a_thinned_log_leaves_between_its_windows_is_no_hum(rate_hz):
     assert hum_of(recorded, PLAIN, BASE) == ()
 
 
-def test_hum_is_heard_in_a_thinned_log():
+def test_hum_is_found_in_a_thinned_log():
     """On the log's own clock: where a third of every 30 ms is left out, cycles are left out."""
     long = logs(0.1, n=40_000)
     recorded = [cut_to_windows(one, 33.0, 400) for one in long]
@@ -129,10 +129,10 @@ def test_hum_of_the_size_of_the_signals_is_no_instrument_s():
     assert hum_of(logs(rms=0.25), PLAIN, BASE) == ()
 
 
-def missed(segment, heard):
-    """χ²/n of vq_v where the lines `heard` are known."""
+def missed(segment, lines):
+    """χ²/n of vq_v where the lines `lines` are known."""
     sigma = noise_floor(segment, PLAIN, BASE, 1)
-    (known,) = with_hum([segment], heard, PLAIN, BASE)
+    (known,) = with_hum([segment], lines, PLAIN, BASE)
     rows = linearise(known, PLAIN, BASE, [], Floor(sigma, BASE))
     mine = [n for n, (channel, _) in enumerate(rows.groups) if channel == "vq_v"]
     return float((rows.residual[np.isin(rows.group, mine)] ** 2).mean())
@@ -192,9 +192,9 @@ TURNED = {**BASE, "bench_angle_rad": 0.3}
 
 def test_hum_of_an_open_winding_is_that_of_its_lines():
     """In the rotor's frame it is two lines, at 50 Hz less and more than the field turns."""
-    heard = hum_of([spin(n, 0.02) for n in range(3)], PLAIN, TURNED)
-    assert {(one.kind, one.freq_hz) for one in heard} == {("open", 50.0)}
-    loud = max(heard, key=lambda one: one.rms)
+    lines = hum_of([spin(n, 0.02) for n in range(3)], PLAIN, TURNED)
+    assert {(one.kind, one.freq_hz) for one in lines} == {("open", 50.0)}
+    loud = max(lines, key=lambda one: one.rms)
     # the mean of three lines is nothing: the one with hum keeps two thirds of it
     assert loud.signal == "vbc_v"
     assert loud.rms == pytest.approx(0.02 * 2 / 3, rel=0.1)
@@ -203,10 +203,10 @@ def test_hum_of_an_open_winding_is_that_of_its_lines():
 
 def test_an_open_winding_s_hum_no_longer_misses_the_floor():
     one = spin(4, 0.02)
-    heard = hum_of([spin(n, 0.02) for n in range(3)], PLAIN, TURNED)
+    lines = hum_of([spin(n, 0.02) for n in range(3)], PLAIN, TURNED)
     sigma = noise_floor(one, PLAIN, TURNED, 1)
     spreads = []
-    for (known,) in ((one,), with_hum([one], heard, PLAIN, TURNED)):
+    for (known,) in ((one,), with_hum([one], lines, PLAIN, TURNED)):
         rows = linearise(known, PLAIN, TURNED, [], Floor(sigma, TURNED))
         spreads.append(float((rows.residual**2).mean()))
     assert spreads[0] > 5.0

@@ -18,11 +18,11 @@ from tests.unit.criticism.machines import BASE, machine
 SATURATION = effects()["saturation"]
 Q_FALL, Q_BEND, D_ODD, D_FALL, D_BEND = range(1, 6)
 NEEDED = {D_ODD: 20.0, Q_FALL: 0.1, Q_BEND: 0.0, D_FALL: 0.3, D_BEND: 0.0}
-"""What the misfit loses by the removal of each term."""
+"""What the deviance loses by the removal of each term."""
 
 
 class Known:
-    """A system of 40 samples around a fit whose misfit is known."""
+    """A system of 40 samples around a fit whose deviance is known."""
 
     size = 40
 

@@ -186,7 +186,7 @@ def test_a_jump_is_known_to_a_quarter_of_a_sample(signal):
     later changes that by height times the test function at k, of which a quarter is allowed.
     """
     model, segment = Model(machine(), ()), log()
-    calm = reading_error(segment, model, BASE)
+    without = reading_error(segment, model, BASE)
     weak, jump, at = segment.weak, 5.0, 4000
     jumping, place = segment.recorded[signal].copy(), segment.channels.index(signal)
     jumping[at:] += jump
@@ -196,7 +196,7 @@ def test_a_jump_is_known_to_a_quarter_of_a_sample(signal):
     told = np.zeros(weak.starts.size)
     told[over] = 0.25 * jump * weak.functions[0, 0][at - weak.starts[over]]
     assert over.sum() >= 2
-    near = np.sqrt(np.maximum(allowed**2 - calm[place, :, 0] ** 2, 0.0))
+    near = np.sqrt(np.maximum(allowed**2 - without[place, :, 0] ** 2, 0.0))
     assert near[over] == pytest.approx(np.abs(told[over]), rel=0.05, abs=0.02 * told.max())
     assert near[~over].max() < 0.1 * told.max(), "of the reading itself"
 
@@ -266,10 +266,10 @@ def test_friction_at_rest_may_be_anything_between_both_its_senses():
     # turns round there, at an instant that is known to half a sample
     at = 3000 - running.weak.starts
     over = (at > 0) & (at < length - 1)
-    calm = reading_error(running, Model(machine(), ()), BASE)[2, :, 0]
-    turned = np.sqrt(moving[over] ** 2 - calm[over] ** 2)
+    without = reading_error(running, Model(machine(), ()), BASE)[2, :, 0]
+    turned = np.sqrt(moving[over] ** 2 - without[over] ** 2)
     assert turned == pytest.approx(0.5 * 2.0 * 0.2 * window[at[over]], rel=0.05, abs=1e-3 * late)
-    assert moving[~over][:-2] == pytest.approx(calm[~over][:-2])
+    assert moving[~over][:-2] == pytest.approx(without[~over][:-2])
 
 
 def test_a_row_beside_a_rest_is_partly_of_it():

@@ -112,7 +112,7 @@ def test_zero_of_an_effect_takes_the_trial_shape():
 def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
     """One capture of two comes to its floor from χ²/n = 3, the other stays where it is.
 
-    By logarithms, that would be an eighth of all misfit beside a capture at 1000.
+    By logarithms, that would be an eighth of all deviance beside a capture at 1000.
     """
     effect, model = effects()["windage"], Model(machine(), ())
     (column,) = effect_columns(effect, model)

@@ -1,4 +1,4 @@
-"""How often the ladder is climbed, and which climb is believed."""
+"""How often the search is repeated, and which of its results is reported."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from tests.unit.criticism.machines import machine
 
 
 @pytest.fixture
-def climbs(monkeypatch):
-    """Ladders that are no more than the orders their equations look at; `sketched` says which of
-    them leave something that a state of the machine predicts, `drifts` gives a calmer one.
+def searches(monkeypatch):
+    """Ladders that are no more than the orders their equations observe; `sketched` says which of
+    them leave something that a state of the machine predicts, `drifts` gives one with drift.
     """
     made = SimpleNamespace(
         orders=[],
@@ -40,19 +40,19 @@ def climbs(monkeypatch):
         def large(self):
             return ("large", *self.remainders)
 
-    def climbed(base, _):
-        looked = base if isinstance(base, tuple) else "calm"
-        made.orders.append(looked)
+    def searched(base, _):
+        observed = base if isinstance(base, tuple) else "drift"
+        made.orders.append(observed)
         fit = Fit((), Model(machine(), ()), {}, (), {})
         step = SimpleNamespace(system=None, fit=fit)
         inside = SimpleNamespace(system=SimpleNamespace(fit=fit), hum=())
-        return Ladder(looked=looked, remainders=(looked,), steps=(step,), base=inside)
+        return Ladder(observed=observed, remainders=(observed,), steps=(step,), base=inside)
 
     def sketched(ladder, left, name, in_parts=False):
-        what = ladder.looked, in_parts
+        what = ladder.observed, in_parts
         return (what, made.gains.get(what, 1.0)) if what in made.sketched else (None, 0.0)
 
-    monkeypatch.setattr(search, "ladder_from", climbed)
+    monkeypatch.setattr(search, "ladder_from", searched)
     monkeypatch.setattr(search, "_sketched", sketched)
     monkeypatch.setattr(search, "_other_side_note", lambda *_: [])
     monkeypatch.setattr(search, "share_notes", lambda _: made.freed)
@@ -72,69 +72,69 @@ def end():
     return search_ladder(SimpleNamespace(), ModelSpec("standard"), machine(), (), {}, "m_unknown")
 
 
-def test_orders_that_are_whole_join_at_once(climbs):
-    climbs.seen, climbs.explained = (16, 37), True
-    assert end().ladder.looked == (16, 37)
-    assert climbs.orders == [(), (16, 37)]
+def test_orders_that_are_whole_join_at_once(searches):
+    searches.seen, searches.explained = (16, 37), True
+    assert end().ladder.observed == (16, 37)
+    assert searches.orders == [(), (16, 37)]
 
 
-@pytest.mark.parametrize(("sketched", "looked"), [(True, (16, 4.83)), (False, (16,))])
-def test_others_join_where_they_alone_give_a_sketch(climbs, sketched, looked):
-    climbs.seen = (16, 4.83)
-    climbs.sketched = {((16, 4.83), False)} if sketched else set()
+@pytest.mark.parametrize(("sketched", "observed"), [(True, (16, 4.83)), (False, (16,))])
+def test_others_join_where_they_alone_give_a_sketch(searches, sketched, observed):
+    searches.seen = (16, 4.83)
+    searches.sketched = {((16, 4.83), False)} if sketched else set()
     found = end()
-    assert found.ladder.looked == looked
-    assert climbs.orders == [(), (16,), (16, 4.83)]
+    assert found.ladder.observed == observed
+    assert searches.orders == [(), (16,), (16, 4.83)]
     assert (found.sketch is not None) is sketched
 
 
-@pytest.mark.parametrize(("gain", "looked"), [(900.0, (4.83,)), (0.5, ())])
-def test_others_join_where_the_sketch_takes_more_with_them(climbs, gain, looked):
+@pytest.mark.parametrize(("gain", "observed"), [(900.0, (4.83,)), (0.5, ())])
+def test_others_join_where_the_sketch_takes_more_with_them(searches, gain, observed):
     """A sketch of 15 mV was believed, and the belt that made 95 floors of torque was not tried."""
-    climbs.seen, climbs.sketched = (4.83,), {((), False), ((4.83,), False)}
-    climbs.gains = {((4.83,), False): gain}
+    searches.seen, searches.sketched = (4.83,), {((), False), ((4.83,), False)}
+    searches.gains = {((4.83,), False): gain}
     found = end()
-    assert (found.ladder.looked, found.sketch) == (looked, (looked, False))
+    assert (found.ladder.observed, found.sketch) == (observed, (observed, False))
 
 
-def test_others_are_not_tried_where_nothing_is_left(climbs):
-    climbs.seen, climbs.explained = (4.83,), True
+def test_others_are_not_tried_where_nothing_is_left(searches):
+    searches.seen, searches.explained = (4.83,), True
     assert end().sketch is None
-    assert climbs.orders == [()]
+    assert searches.orders == [()]
 
 
-def test_drift_is_looked_for_where_nothing_predicts_what_is_left(climbs):
-    climbs.drifts = True
+def test_drift_is_looked_for_where_nothing_predicts_what_is_left(searches):
+    searches.drifts = True
     found = end()
-    assert found.ladder.looked == "calm"
-    assert found.remainders == ("large", "calm")
+    assert found.ladder.observed == "drift"
+    assert found.remainders == ("large", "drift")
     assert "drift" in found.notes[0]
-    climbs.sketched = {((), False)}
+    searches.sketched = {((), False)}
     assert end().notes == ()
 
 
-def test_a_sketch_held_out_in_parts_is_said_to_be_so(climbs):
+def test_a_sketch_held_out_in_parts_is_said_to_be_so(searches):
     """What is left stays as it was told then, also where it is large only beside little voltage."""
-    climbs.sketched = {((), True)}
+    searches.sketched = {((), True)}
     found = end()
     assert found.sketch is not None
     assert (found.remainders, len(found.notes)) == (((),), 1)
-    climbs.sketched = set()
+    searches.sketched = set()
     assert (end().remainders, end().notes) == (("large", ()), ())
 
 
 @pytest.mark.parametrize(("gain", "reported"), [(2.0, True), (0.5, False)])
-def test_a_changed_constant_is_reported_where_it_takes_more_than_a_sketch(climbs, gain, reported):
-    climbs.sketched = {((), False)}
-    climbs.change = SimpleNamespace(gain=gain, words="psi_wb is lower")
+def test_a_changed_constant_is_reported_where_it_takes_more_than_a_sketch(searches, gain, reported):
+    searches.sketched = {((), False)}
+    searches.change = SimpleNamespace(gain=gain, words="psi_wb is lower")
     found = end()
     assert (found.change is not None) is reported
     assert (found.sketch is None) is reported
     assert found.notes == (("psi_wb is lower",) if reported else ())
 
 
-def test_a_changed_constant_is_no_matter_where_the_names_explain_all(climbs):
-    climbs.explained, climbs.change = True, SimpleNamespace(gain=9.0, words="psi_wb is lower")
+def test_a_changed_constant_is_no_matter_where_the_names_explain_all(searches):
+    searches.explained, searches.change = True, SimpleNamespace(gain=9.0, words="psi_wb is lower")
     assert (end().change, end().notes) == (None, ())
 
 

@@ -121,7 +121,7 @@ def change_by(name: str, segment: Segment) -> float:
 @pytest.mark.parametrize("kind", [kind for kind in RECORDED if kind != "lcr"])
 @pytest.mark.parametrize("name", LIBRARY)
 def test_what_a_segment_does_not_hear_changes_nothing_in_it(kind: str, name: str) -> None:
-    """No column is computed for it: were it heard, the fit would not know."""
+    """No column is computed for it: were it observed, the fit would not know."""
     segment, effect = segment_of(kind), LIBRARY[name]
     if not observes(segment, effect):
         assert change_by(name, segment) == 0.0
