@@ -30,10 +30,9 @@ and with one chosen number halved and doubled; `fields=all` takes every number. 
 cases that read the number; in the others it can move nothing, and they are not run again. *right*,
 *wrong* and *silent* count the cases' marks (silent: nothing named with confidence where something
 is hidden); *moved* counts cases whose verdict or names differ from the default's. A share of few
-cases says little: no row here calibrates a number. Rows without figures have not been run.
-[policy.md](policy.md) says what each number is.
+cases says little: no row here calibrates a number. [policy.md](policy.md) says what each number is.
 
-Cases: {cases}. Code {code}, seed {seed}.
+Cases: {cases}. Code {code}, seed {seed}. Run so far: {rows} of {all} numbers.
 """
 _COLUMNS = "right | wrong | silent | moved"
 
@@ -101,26 +100,35 @@ def _read(case: Case, book: Book) -> frozenset[str]:
 
 
 def page(cases: Sequence[Case], book: Book, fields: Sequence[str], seed: int) -> str:
-    """The table of all chosen numbers, as far as they have been run."""
+    """The table of the chosen numbers that have been run."""
     listed = ", ".join(f"{case.family} {case.line} ({case.motor})" for case in cases)
-    lines = [HEAD.format(count=len(cases), cases=listed, code=book.code, seed=seed)]
-    lines += [f"| field | value | read | halved: {_COLUMNS} | doubled: {_COLUMNS} |"]
-    lines += ["| --- | --- | --- |" + " --- |" * 8]
-    lines.append(f"| *default* | | | {_marks(cases, book, Variant())} | | | | |")
-    known = all(book_of(book, Variant()).document(case) is not None for case in cases)
-    for entry in chosen_entries(fields):
-        both = (_marks(cases, book, Variant(entry, factor)) for factor in FACTORS)
-        value = entry.value if not isinstance(entry.value, tuple) else "row"
-        count = sum(entry.name in _read(case, book) for case in cases) if known else ""
-        lines.append(f"| `{entry.name}` | {value} | {count} | {' | '.join(both)} |")
-    return "\n".join([*lines, ""])
+    numbers = chosen_entries(fields)
+    rows = [row for entry in numbers if (row := _row(entry, cases, book))]
+    count = {"count": len(cases), "rows": len(rows), "all": len(numbers)}
+    lines = [
+        HEAD.format(cases=listed, code=book.code, seed=seed, **count),
+        f"| field | value | read | halved: {_COLUMNS} | doubled: {_COLUMNS} |",
+        "| --- | --- | --- |" + " --- |" * 8,
+        f"| *default* | | | {_marks(cases, book, Variant())} | | | | |",
+    ]
+    return "\n".join([*lines, *rows, ""])
+
+
+def _row(entry: Entry, cases: Sequence[Case], book: Book) -> str:
+    """The row of a number; empty where a case has no result of it yet."""
+    both = [_marks(cases, book, Variant(entry, factor)) for factor in FACTORS]
+    if not all(both) or not _marks(cases, book, Variant()):
+        return ""
+    value = entry.value if not isinstance(entry.value, tuple) else "row"
+    count = sum(entry.name in _read(case, book) for case in cases)
+    return f"| `{entry.name}` | {value} | {count} | {' | '.join(both)} |"
 
 
 def _marks(cases: Sequence[Case], book: Book, variant: Variant) -> str:
-    """Right, wrong, silent and moved as cells; empty cells where a case has no result yet."""
+    """Right, wrong, silent and moved as cells; empty where a case has no result yet."""
     pairs = list(_pairs(cases, book, variant))
     if len(pairs) < len(cases):
-        return " | | | "
+        return ""
     marks = [judged(case, document).mark for case, document, _ in pairs]
     silent = sum(mark in ("unknown", "missed") for mark in marks)
     moved = sum(_told(document) != _told(plain) for _, document, plain in pairs)

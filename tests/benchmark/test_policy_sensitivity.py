@@ -58,23 +58,24 @@ def test_cases_are_spread_over_the_list(nulls: list[Case]) -> None:
     assert len(spread(many, 50)) == 10
 
 
-def test_a_row_counts_what_was_run_and_is_empty_where_it_was_not(
+def test_a_number_has_a_row_once_both_its_variants_were_run(
     nulls: list[Case], tmp_path: Path
 ) -> None:
     """Two captures of sound motors: one is named wrongly once the tie is halved."""
     book, tie = Book(tmp_path, "code"), chosen_entries(["selection.tie"])[0]
-    half = book_of(book, Variant(tie, 0.5))
+    half, twice = (book_of(book, Variant(tie, factor)) for factor in (0.5, 2.0))
     assert half.code != book.code
     for case in nulls:
         keep(book_of(book, Variant()), case, read=("selection.tie",))
-    keep(half, nulls[0], "windage")
-    rows = page(nulls, book, ["selection.tie"], 3).splitlines()
-    (row,) = (row for row in rows if "`selection.tie`" in row)
-    assert row == "| `selection.tie` | 12.0 | 2 |  | | |  |  | | |  |"
-    keep(half, nulls[1])
-    rows = page(nulls, book, ["selection.tie"], 3).splitlines()
-    (row,) = (row for row in rows if "`selection.tie`" in row)
-    assert row == "| `selection.tie` | 12.0 | 2 | 1 | 1 | 0 | 1 |  | | |  |"
+        keep(half, case, *["windage"][: case is nulls[0]])
+    keep(twice, nulls[0])
+    assert "`selection.tie`" not in page(nulls, book, ["selection.tie"], 3)
+    keep(twice, nulls[1])
+    text = page(nulls, book, ["selection.tie"], 3)
+    (row,) = (row for row in text.splitlines() if "`selection.tie`" in row)
+    assert row == "| `selection.tie` | 12.0 | 2 | 1 | 1 | 0 | 1 | 2 | 0 | 0 | 0 |"
+    of_all = len(chosen_entries([]))
+    assert f"{of_all} of {of_all} numbers" in text  # no other one is read by these
 
 
 def test_a_number_that_no_case_reads_moves_nothing(nulls: list[Case], tmp_path: Path) -> None:
