@@ -272,8 +272,8 @@ class _Scoring:
     def confounder(
         self, score: Score, best: Mapping[str, tuple[Score, NDArray[np.int64]]]
     ) -> str | None:
-        """The clearest effect that explains what a candidate does as well, at a size too small to
-        matter, and beside which the candidate is not worth its penalty.
+        """The clearest effect that explains as much as a candidate, its penalty paid, at a size too
+        small to matter, and beside which the candidate is not worth its own.
 
         A loss that is too small to be reported must not be reported under a wrong name.
         """
@@ -285,7 +285,7 @@ class _Scoring:
             if score.policy.absent_size < other.size
             and not other.matters
             and other.fall > other.penalty
-            and other.fall > score.fall - score.policy.tie
+            and other.fall - other.penalty > score.fall - score.penalty - score.policy.tie
             and other.candidate.effect.discriminator is None
         ]
         if not small:

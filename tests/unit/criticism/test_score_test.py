@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from pipeline.criticism.regression.linear_system import LinearSystem, model_colu
 from pipeline.criticism.selection.candidates import Candidate, candidates, searched, widened
 from pipeline.criticism.selection.improvement import fall_below_floor, power_share
 from pipeline.criticism.selection.refit import floored_anew
-from pipeline.criticism.selection.score_test import Score, score_all
+from pipeline.criticism.selection.score_test import Score, _Scoring, score_all
 from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, machine, with_drag
 
 
@@ -196,3 +197,24 @@ def test_the_best_of_several_choices_has_had_as_many_chances():
     )
     more = searched(offered, clock) - searched(offered, plain)
     assert more == pytest.approx(2.0 * np.log(len(recorders)))
+
+
+@pytest.mark.parametrize(("penalty", "named"), [(15.0, "stribeck"), (32.0, None)])
+def test_a_small_effect_that_costs_more_does_not_explain_as_well(penalty, named):
+    """Two further parameters of friction took what the windage of a map is."""
+    some = np.zeros(1, dtype=np.int64)
+    candidate = Candidate(effects()["windage"], ())
+    score = Score(candidate, 119.0, 15.0, {}, {}, 1.0, 2.0, policy=DEFAULT.selection)
+    other = replace(
+        score, candidate=Candidate(effects()["stribeck"], ()), fall=108.0, penalty=penalty, size=0.5
+    )
+    assert score.passes
+    assert not other.matters
+    fitted_so = SimpleNamespace(best=lambda *_: SimpleNamespace(deviance=0.0))
+    scoring = SimpleNamespace(
+        system=SimpleNamespace(policy=DEFAULT),
+        model_columns=some,
+        normal_equations=SimpleNamespace(only=lambda _: fitted_so),
+    )
+    best = {"windage": (score, some), "stribeck": (other, some)}
+    assert _Scoring.confounder(scoring, score, best) == named
