@@ -104,7 +104,7 @@ class Score:
         if self.confounder is not None:
             return f"{self.confounder} explains it as well, and is too small to matter"
         if self.passes:
-            return "refitted, it does not hold on captures held out, or may be zero"
+            return "refitted, it is below the floor, not seen in captures held out, or may be zero"
         if self._below_floor:
             return "what it would explain lies below the noise floor"
         return "takes too small a share of what is over the noise floor"

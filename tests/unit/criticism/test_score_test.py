@@ -28,11 +28,17 @@ from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, ma
         ({"size": 0.25, "share": 0.5}, "seen, at 0.25 of the least size that matters"),
         (
             {"size": 0.25, "share": 0.5, "clears": True},
-            "refitted, it does not hold on captures held out, or may be zero",
+            "refitted, it is below the floor, not seen in captures held out, or may be zero",
         ),
         ({"share": 0.05}, "takes too small a share of what is over the noise floor"),
-        ({"share": 0.5}, "refitted, it does not hold on captures held out, or may be zero"),
-        ({"below_floor": 40.0}, "refitted, it does not hold on captures held out, or may be zero"),
+        (
+            {"share": 0.5},
+            "refitted, it is below the floor, not seen in captures held out, or may be zero",
+        ),
+        (
+            {"below_floor": 40.0},
+            "refitted, it is below the floor, not seen in captures held out, or may be zero",
+        ),
         (
             {"below_floor": 40.0, "effect": "sample_delay"},
             "what it would explain lies below the noise floor",
@@ -43,7 +49,7 @@ from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, ma
         ),
         (
             {"other_inertia": True},
-            "refitted, it does not hold on captures held out, or may be zero",
+            "refitted, it is below the floor, not seen in captures held out, or may be zero",
         ),
     ],
 )
@@ -55,7 +61,7 @@ def test_what_an_effect_lacks_is_said(what, told):
     )
     assert score.shortfall == told
     assert score.passes == (
-        told == "refitted, it does not hold on captures held out, or may be zero"
+        told == "refitted, it is below the floor, not seen in captures held out, or may be zero"
     )
 
 
