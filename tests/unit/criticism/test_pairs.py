@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.diagnosis import diagnose
-from pipeline.criticism.selection import stepwise
+from pipeline.criticism.selection import pairs, stepwise
 from pipeline.criticism.selection.pairs import Pair
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
@@ -80,7 +80,10 @@ def test_the_coasts_are_what_they_say() -> None:
 def test_a_pair_that_explains_less_than_what_is_named_does_not_join(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    given = stepwise.best_pair
+    """Nor is it fitted, where twice its fall to first order would not do."""
+    given, fits = stepwise.best_pair, []
     monkeypatch.setattr(stepwise, "best_pair", lambda *all_but: given(*all_but[:4], -math.inf))
+    monkeypatch.setattr(pairs, "gauss_newton", lambda *fit, **_: fits.append(fit))
     found = diagnose(two_drags(), ModelSpec(), Constants())
     assert sorted(found.missing) != ["stribeck", "windage"]
+    assert not fits
