@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.machine import Ripple
+from pipeline.criticism.regression import noise_floors
+from pipeline.criticism.regression.noise_floors import reading_error, window_gain
 from pipeline.criticism.signals.between_rows import Waves, evenly, on_points
-from tests.unit.criticism.machines import log
+from tests.unit.criticism.machines import BASE, log, machine
 
 ROWS, POINTS, ROW_S = 400, 8, 1e-3
 POLICY = Ripple()
@@ -128,3 +131,18 @@ def test_a_wave_that_rows_do_not_show_is_as_large_as_where_they_do() -> None:
     assert (changes[250 * POINTS : -POINTS] < 1.1 * slopes[0, 250]).all()
     of_rows = np.diff(current.imag - slow(AT)[::POINTS].imag)[250:]
     assert np.abs(of_rows).max() < 0.1 * slopes[0, 250]
+
+
+def test_a_voltage_is_allowed_what_an_unseen_wave_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 3 kA/s whose phase is not known, each axis by its own inductance."""
+    segment = log(noise=1.0)
+    segment = replace(segment, instrument=replace(segment.instrument, timing="instant"))
+    model = Model(machine(), ())
+    before = reading_error(segment, model, BASE)
+    slopes = np.stack([np.full(segment.size, 3e3 + 0.0j), np.zeros(segment.size)])
+    monkeypatch.setattr(noise_floors, "unseen_slopes", lambda *_: slopes)
+    volts = [segment.channels.index(name) for name in ("vd_v", "vq_v")]
+    after = reading_error(segment, model, BASE)
+    added = np.sqrt(after[volts, :, 0] ** 2 - before[volts, :, 0] ** 2) / window_gain(segment)
+    for axis, name in zip(added, ("ld_h", "lq_h"), strict=True):
+        assert axis == pytest.approx(3e3 * BASE[name] / np.sqrt(2.0), rel=1e-6)

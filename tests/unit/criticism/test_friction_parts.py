@@ -205,3 +205,5 @@ def test_an_inductance_that_goes_with_the_locked_angle_is_that_of_the_fit(touche
     held = separated(known, model)
     assert held[l_q].number == number
     assert held[ratio].number == pytest.approx(2.1 * number / 4.2e-4)
+    of_fit = 2.0 * 1e-6 / 4e-4 if touched else 0.0
+    assert held[ratio].u == pytest.approx(math.hypot(2e-3 * number / 4.2e-4, of_fit))

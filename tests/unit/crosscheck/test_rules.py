@@ -272,7 +272,7 @@ def test_what_rotor_and_field_store_does_not_unbalance_the_power() -> None:
     rng, t = np.random.default_rng(4), 1e-4 * np.arange(80_000)
     omega = 120.0 + 70.0 * np.sin(7.0 * t)
     load = 0.3 + 0.2 * np.sin(2.3 * t + 1.0)
-    id_a = -2.0 + 1.5 * np.sin(31.0 * t)
+    id_a = -8.0 - 6.0 * np.cos(2.3 * t + 1.0)
     stored = 2e-3 * np.gradient(omega, t)
     iq_a = (load + stored) / (1.5 * P * PSI)
     inductance = 0.02 * R
