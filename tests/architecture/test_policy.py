@@ -62,7 +62,7 @@ ARITHMETIC = {
     "data/clocks.py": {"_REACH"},  # a cubic goes through four samples
     "data/segment.py": {"PAIR_RAD"},  # a turn
     # the grid of a search for a step; rounding; of a fixed point
-    "data/sensor_noise.py": {
+    "data/rounding.py": {
         "_LOOKED_AT",
         "_STEPS",
         "_FIRST_WINDOW",

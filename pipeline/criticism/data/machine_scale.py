@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.criticism.data.holding_orders import holding_orders
 from pipeline.criticism.data.instruments import stated_u
-from pipeline.criticism.data.sensor_noise import rounding_step
+from pipeline.criticism.data.rounding import rounding_step
 from pipeline.criticism.data.settling import settling_of
 from pipeline.criticism.data.traces import LINES_V, with_values
 from pipeline.criticism.operating import Array

@@ -9,8 +9,9 @@ import numpy as np
 
 from pipeline.criticism.data.hysteresis import play_lag, with_travel
 from pipeline.criticism.data.locked_waves import LockedWaves
+from pipeline.criticism.data.rounding import coarse_step
 from pipeline.criticism.data.segment import Sensors, SpeedSensor
-from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
+from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.policy import Policy

@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.data.rounding import coarse_step, scatter
 from pipeline.criticism.data.segment import UNSMOOTHED, Sensors, SpeedSensor
-from pipeline.criticism.data.sensor_noise import coarse_step, scatter, sensor_noise, slow_noise
+from pipeline.criticism.data.sensor_noise import sensor_noise, slow_noise
 from pipeline.criticism.data.traces import parabolas, smoothed, window_of
 from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Machine

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.criticism.data.rounding import resolution
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
-from pipeline.criticism.data.sensor_noise import resolution
 from pipeline.criticism.equation import Channel, Equation, Observes
 from pipeline.criticism.machine.model import PHASE_LCR, Model, Pieces, evaluate
 from pipeline.criticism.operating import Array, Operating, Signals, Values

@@ -9,13 +9,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.data.rounding import coarse_step
 from pipeline.criticism.data.segment import (
     PAIR_RAD,
     Segment,
     Sensors,
     segment_of,
 )
-from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
+from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.data.sensors import prepared
 from pipeline.criticism.data.shaft_angle import ANGLES, shaft_angle, with_angle
 from pipeline.criticism.data.traces import (

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.data.rounding import rounding_error, smoothed, unrounded
 from pipeline.criticism.data.segment import (
     UNSMOOTHED,
     Segment,
@@ -17,7 +18,6 @@ from pipeline.criticism.data.segment import (
     projected,
     row_index,
 )
-from pipeline.criticism.data.sensor_noise import rounding_error, smoothed, unrounded
 from pipeline.criticism.data.traces import LINES_V, parabolas
 from pipeline.criticism.data.traces import smoothed as box_mean
 from pipeline.criticism.machine.model import Model, zero

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.instruments import gains_of
+from pipeline.criticism.data.rounding import dither_of, is_rounded, rounding_step
 from pipeline.criticism.data.segment import UNSMOOTHED, Cache, Segment, joins, with_lines
-from pipeline.criticism.data.sensor_noise import dither_of, is_rounded, rounding_step
 from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equation_of, equations

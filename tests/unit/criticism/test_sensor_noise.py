@@ -7,18 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.segment import Sensors, projected, row_index
-from pipeline.criticism.data.sensor_noise import (
+from pipeline.criticism.data.rounding import (
     coarse_step,
     dither_of,
     is_rounded,
     resolution,
     rounding_error,
     rounding_step,
-    sensor_noise,
-    slow_noise,
     smoothed,
 )
+from pipeline.criticism.data.segment import Sensors, projected, row_index
+from pipeline.criticism.data.sensor_noise import sensor_noise, slow_noise
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, current_floors_grown, floors

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 import pipeline
-from pipeline.criticism.data.sensor_noise import smoothed
+from pipeline.criticism.data.rounding import smoothed
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 
