@@ -33,6 +33,7 @@ is hidden); *moved* counts cases whose verdict or names differ from the default'
 cases says little: no row here calibrates a number. [policy.md](policy.md) says what each number is.
 
 Cases: {cases}. Code {code}, seed {seed}. Run so far: {rows} of {all} numbers.
+Those that move a verdict or a name, halved or doubled: {moving}.
 """
 _COLUMNS = "right | wrong | silent | moved"
 
@@ -103,15 +104,16 @@ def page(cases: Sequence[Case], book: Book, fields: Sequence[str], seed: int) ->
     """The table of the chosen numbers that have been run."""
     listed = ", ".join(f"{case.family} {case.line} ({case.motor})" for case in cases)
     numbers = chosen_entries(fields)
-    rows = [row for entry in numbers if (row := _row(entry, cases, book))]
+    rows = {entry.name: row for entry in numbers if (row := _row(entry, cases, book))}
+    moving = ", ".join(f"`{name}`" for name, row in rows.items() if _moves(row)) or "none"
     count = {"count": len(cases), "rows": len(rows), "all": len(numbers)}
     lines = [
-        HEAD.format(cases=listed, code=book.code, seed=seed, **count),
+        HEAD.format(cases=listed, code=book.code, seed=seed, moving=moving, **count),
         f"| field | value | read | halved: {_COLUMNS} | doubled: {_COLUMNS} |",
         "| --- | --- | --- |" + " --- |" * 8,
         f"| *default* | | | {_marks(cases, book, Variant())} | | | | |",
     ]
-    return "\n".join([*lines, *rows, ""])
+    return "\n".join([*lines, *rows.values(), ""])
 
 
 def _row(entry: Entry, cases: Sequence[Case], book: Book) -> str:
@@ -122,6 +124,12 @@ def _row(entry: Entry, cases: Sequence[Case], book: Book) -> str:
     value = entry.value if not isinstance(entry.value, tuple) else "row"
     count = sum(entry.name in _read(case, book) for case in cases)
     return f"| `{entry.name}` | {value} | {count} | {' | '.join(both)} |"
+
+
+def _moves(row: str) -> bool:
+    """Whether a row counts a case that moved, the number halved or doubled."""
+    cells = [cell.strip() for cell in row.strip("| ").split("|")]
+    return any(int(cell) for cell in (cells[-5], cells[-1]))
 
 
 def _marks(cases: Sequence[Case], book: Book, variant: Variant) -> str:
