@@ -114,11 +114,25 @@ def share_notes(system: LinearSystem) -> Iterator[str]:
             continue
         captures = ", ".join(sorted({s.capture for s in fit.segments if s.test == test}))
         sizes = (
-            f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± {100.0 * u[name]:.1g} % "
-            f"{'higher' if share > 0 else 'lower'}"
-            for name, share in known.items()
+            share_words(_SHARE_OF[n], share, f"{100.0 * u[n]:.1g}") for n, share in known.items()
         )
         yield (
             f"{' and '.join(sizes)} in {captures} than in the other captures: changed between "
             f"them; {_LOOKS_ALIKE[test]} would look the same"
         )
+
+
+def share_words(of: str, share: float, u_percent: str) -> str:
+    """A share in words.
+
+    Parameters
+    ----------
+    of
+        What it is a share of.
+    share
+        The share [1], above 0 where that is higher.
+    u_percent
+        Its standard uncertainty in per cent.
+
+    """
+    return f"{of} is {100.0 * abs(share):.3g} ± {u_percent} % {'higher' if share > 0 else 'lower'}"

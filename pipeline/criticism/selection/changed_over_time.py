@@ -25,6 +25,7 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import over_floor
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.residuals.channels import channel_of
+from pipeline.criticism.selection.changed_between import share_words
 
 _SHARE_OF = dict(zip(EARLY_SHARES, ("dry friction", "viscous friction"), strict=True))
 _STILL_CHANGING = ", which none of these captures reaches"
@@ -193,12 +194,8 @@ def friction_notes(system: LinearSystem) -> Iterator[str]:
     shares = {name: fit.values[name] for name in EARLY_SHARES}
     if over * max(map(abs, shares.values())) < system.policy.discovery.changed_share:
         return
-    sizes = (
-        f"{_SHARE_OF[name]} is {100.0 * abs(share):.3g} ± "
-        f"{100.0 * math.sqrt(variance[system.place([name])[0]]):.2g} % "
-        f"{'higher' if share > 0 else 'lower'}"
-        for name, share in shares.items()
-    )
+    u_percent = {n: 100.0 * math.sqrt(variance[system.place([n])[0]]) for n in shares}
+    sizes = (share_words(_SHARE_OF[n], one, f"{u_percent[n]:.2g}") for n, one in shares.items())
     yield (
         f"{' and '.join(sizes)} at the start of {', '.join(sorted(begin))} than it comes to, with "
         f"a time constant of {tau_s:.3g} s: it changes within these captures, with no state of the "

@@ -85,6 +85,8 @@ class Waves:
     slow
         Which orders [b, o] look like a slow current in the rows of a block: of their size there
         these rows show nothing.
+    points
+        Of a row.
 
     """
 
@@ -93,6 +95,7 @@ class Waves:
     places: NDArray[np.int64]
     beyond: Array
     slow: NDArray[np.bool_]
+    points: int
 
     @classmethod
     def of(
@@ -149,8 +152,8 @@ class Waves:
         share = (at - before)[:, :, None]
         eps = np.interp(at, np.arange(eps_rad.size), eps_rad)
         straight = (1.0 - share) * _waves(eps_rad[before]) + share * _waves(eps_rad[before + 1])
-        places = len(parts) * own + part
-        return cls(rows, fit, places, _waves(eps) - straight, ~shown[:, : len(ORDERS)])
+        places, unshown = len(parts) * own + part, ~shown[:, : len(ORDERS)]
+        return cls(rows, fit, places, _waves(eps) - straight, unshown, len(parts))
 
     def added(self, current: Complex, size: int) -> Complex:
         """What the waves add to straight lines.
@@ -212,9 +215,8 @@ class Waves:
             Of each order, in A a row of the q axis, times a phase that is not known.
 
         """
-        finer = (int(self.places.max(initial=0)) + eps_rad.size) // eps_rad.size
         slow = np.zeros((len(ORDERS), eps_rad.size))
-        slow[:, self.places // finer] = self.slow.T[:, :, None]
+        slow[:, self.places // self.points] = self.slow.T[:, :, None]
         turning = np.array(ORDERS)[:, None] * np.gradient(eps_rad) * slow
         slopes: Complex = (
             self._level(current)[:, None]

@@ -36,7 +36,7 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     option `allowance` [1] is added.
 
     A block mean of the rate of ω² is a difference of two, whose noise pulls the inertia to zero in
-    short blocks: blocks are some tens of milliseconds.
+    short blocks: a block is a hundredth of a capture.
 
     References
     ----------

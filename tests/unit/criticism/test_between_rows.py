@@ -131,6 +131,13 @@ def test_a_wave_that_rows_do_not_show_is_as_large_as_where_they_do() -> None:
     assert (changes[250 * POINTS : -POINTS] < 1.1 * slopes[0, 250]).all()
     of_rows = np.diff(current.imag - slow(AT)[::POINTS].imag)[250:]
     assert np.abs(of_rows).max() < 0.1 * slopes[0, 250]
+    # and so where the last rows are too few for a block
+    t_s = ROW_S * (np.arange(ROWS) + 500.0 * (np.arange(ROWS) > 349))
+    short = Waves.of(clock(t_s), current, eps[::POINTS], PARTS, POLICY)
+    ended = np.abs(short.unseen_slopes(current, eps[::POINTS]))
+    assert ended[0, 250:349] == pytest.approx(slopes[0, 250:349], rel=0.05)
+    assert not ended[:, :150].any()
+    assert not ended[:, 350:].any()
 
 
 def test_a_voltage_is_allowed_what_an_unseen_wave_takes(monkeypatch: pytest.MonkeyPatch) -> None:
