@@ -130,7 +130,7 @@ def _named(tested: ModelVerdict, diagnosis: Diagnosis) -> ModelVerdict:
         unknown="" if unknown is None else f"{unknown.signal}, {unknown.shape}",
         unexcited=unseen,
         fitted=_fitted(diagnosis),
-        constants={} if diagnosis.verdict == "unknown" else diagnosis.constants,
+        constants=diagnosis.constants,
     )
 
 

@@ -119,7 +119,7 @@ class ModelVerdict(PlainRecord):
         [1]; the datasheet's is of the rotor alone.
     constants
         Constants of the machine that the captures determine, fitted with all effects of `sizes`; of
-        all that turns. None where something else is left.
+        all that turns.
 
     """
 

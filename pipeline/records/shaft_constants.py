@@ -1,6 +1,4 @@
-"""Constants less what effects add to them, or of the fit that has these effects: of the shaft, and
-those that an effect makes something else.
-"""
+"""Constants less what effects add to them, and held against the fit of all captures."""
 
 from __future__ import annotations
 
@@ -14,9 +12,13 @@ from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.uncertainty import BETWEEN, propagate, type_a
 
 INERTIA, TAU = "j_rotor_kgm2", "tau_mech_s"
-_FOLLOWING = ((INERTIA, TAU, 1), ("lq_h", "tau_elec_s", 1), ("lq_h", "saliency_ratio", 1),
-              ("ld_h", "saliency_ratio", -1))  # fmt: skip
-"""A constant, another that was derived from it, and the power by which that goes with it."""
+FOLLOWING: Mapping[str, Mapping[str, float]] = {
+    "saliency_ratio": {"lq_h": 1.0, "ld_h": -1.0},
+    "tau_elec_s": {"lq_h": 1.0, "r_phase_ohm": -1.0},
+    "kt_from_ke_nm_a": {"psi_pm_wb": 1.0},
+    TAU: {INERTIA: 1.0, "r_phase_ohm": 1.0, "psi_pm_wb": -2.0},
+}
+"""Constants that are derived from others, and the powers of these."""
 MECHANICAL = (INERTIA, "torque_coulomb_nm", "b_visc_nm_s_rad")
 """Constants that tests of a shaft share with every effect that turns or brakes it."""
 FIT = "model"
@@ -25,8 +27,8 @@ FIT = "model"
 
 def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[str, Estimate]:
     """The constants less what they contain of effects that the model knows: drag in friction, a
-    mass beyond a coupling in the inertia and the time constant that goes with it; and constants of
-    the shaft of the fit with these effects, where an estimate without them is another.
+    mass beyond a coupling in the inertia and the time constant that goes with it; and held against
+    the fit of all captures.
 
     Parameters
     ----------
@@ -58,11 +60,11 @@ def separated(constants: Mapping[str, Estimate], model: ModelVerdict) -> dict[st
                 budget=(*one.budget, *type_a(_source(effect, name), -u)),
                 note="; ".join(part for part in (words, one.note) if part),
             )
-    held = (*MECHANICAL, *(one for one in model.touches if one not in MECHANICAL))
-    for name in (one for one in held if one in changed and one in model.constants):
+    for name in (one for one in changed if one in model.constants):
         changed[name] = _held_against(changed[name], model)
-    for name, derived, power in _FOLLOWING:
-        changed |= _with_what_it_follows(constants, changed, name, derived, power)
+    for derived, powers in FOLLOWING.items():
+        for name, power in powers.items():
+            changed |= _with_what_it_follows(constants, changed, name, derived, power)
     for effect, share in list(model.far_inertia.items())[:1]:
         changed |= {
             name: _near(changed[name], effect, share)
@@ -77,45 +79,53 @@ def _with_what_it_follows(
     after: Mapping[str, Estimate],
     name: str,
     derived: str,
-    power: int,
+    power: float,
 ) -> dict[str, Estimate]:
-    """A constant derived from one that was replaced; empty where that was not."""
+    """A constant derived from one that was replaced or is in more doubt; else empty."""
     old, new, one = before.get(name), after.get(name), after.get(derived)
     if old is None or new is None or one is None or not (old.known and new.known and one.known):
         return {}
-    ratio = (new.number / old.number) ** power
-    if ratio == 1.0:
+    added = tuple(part for part in new.budget if part not in old.budget)
+    if not added:
         return {}
+    ratio = (new.number / old.number) ** power
     own = power * ratio * one.number / new.number
-    budget = propagate([(ratio, one.budget), (own, new.budget)])
+    budget = propagate([(ratio, one.budget), (own, added)])
     return {derived: replace(one, value=ratio * one.number, budget=budget)}
 
 
 def _held_against(estimate: Estimate, model: ModelVerdict) -> Estimate:
-    """An estimate that was made without an effect, or that of the fit which has the effect.
+    """An estimate that was made from its own captures, or that of the fit of all captures.
 
-    Where both differ by more than twice the uncertainty of that, or the estimate has no value or
-    one of more than twice the uncertainty, the effect is in the way. Where another effect explains
-    the captures as well, none is taken.
+    They differ where the distance is more than twice its uncertainty. Of a constant that an effect
+    touches, known to the fit alone, the fit's is taken where they differ, or where the estimate has
+    no value or one of more than twice the uncertainty. Where nothing says which of both is right
+    (no effect is known, something is left that none explains, or two explain the same), the
+    estimate stays, and the distance is in its budget.
     """
     value, u, unit = model.constants[estimate.name]
-    if estimate.status == "stated" or value is None or u is None or not model.sizes:
+    if estimate.status == "stated" or value is None or u is None:
         return estimate
     apart = abs(estimate.number - value) if estimate.known else math.inf
-    if estimate.known and apart <= 2.0 * math.hypot(estimate.u, u) and estimate.u <= 2.0 * u:
-        return estimate
+    differ = apart > 2.0 * (math.hypot(estimate.u, u) if estimate.known else u)
     names = " and ".join(model.sizes)
-    if any(found.confused_with for found in model.missing.values()):
-        words = f"a fit with {names} has {value:.4g} ± {u:.2g} {unit}"
-        source = f"{BETWEEN}residual_test:{estimate.name}"
-        between = type_a(source, apart / math.sqrt(2.0)) if estimate.known else ()
-        held = replace(estimate, budget=(*estimate.budget, *between))
-    else:
+    confused = any(found.confused_with for found in model.missing.values())
+    touched = bool(names) and (estimate.name in MECHANICAL or estimate.name in model.touches)
+    if touched and not confused and model.verdict != "unknown":
+        if not differ and estimate.u <= 2.0 * u:
+            return estimate
         words = f"by a fit with {names}"
         if estimate.known:
             words += f"; without, {estimate.number:.4g} ± {estimate.u:.2g} {unit}"
         budget = type_a(_source(FIT, estimate.name), u)
         held = replace(estimate, value=value, status="measured", budget=budget)
+    elif differ and estimate.known:
+        words = f"a fit of all captures{f' with {names}' if names else ''} has "
+        words += f"{value:.4g} ± {u:.2g} {unit}"
+        between = type_a(f"{BETWEEN}residual_test:{estimate.name}", apart / math.sqrt(2.0))
+        held = replace(estimate, budget=(*estimate.budget, *between))
+    else:
+        return estimate
     return replace(held, note="; ".join(part for part in (words, estimate.note) if part))
 
 

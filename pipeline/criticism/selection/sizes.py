@@ -57,18 +57,15 @@ def shaped(fit: Fit, effect: Effect) -> bool:
 
 def _beyond(fit: Fit, effect: Effect) -> bool:
     """Whether a fit would have more of an effect than there can be: at a bound other than zero
-    stands every amplitude that has a negligible size, or one that goes with these.
+    stands an amplitude that has a negligible size, or one that goes with these.
     """
     limits = limits_of(fit.model)
-
-    def at_end(p: Parameter) -> bool:
-        name = f"{effect.name}.{p.name}"
-        return fit.values[name] != 0.0 and fit.values[name] in limits[name]
-
-    amplitudes = [p for p in effect.parameters_of(fit.machine) if p.amplitude]
-    own = [at_end(p) for p in amplitudes if p.negligible > 0.0]
-    along = [at_end(p) for p in amplitudes if p.negligible == 0.0 and not p.optional]
-    return any(along) or (bool(own) and all(own))
+    held = [
+        f"{effect.name}.{p.name}"
+        for p in effect.parameters_of(fit.machine)
+        if p.amplitude and (p.negligible > 0.0 or not p.optional)
+    ]
+    return any(fit.values[name] != 0.0 and fit.values[name] in limits[name] for name in held)
 
 
 def size_of(fit: Fit, effect: Effect, parameters: Iterable[Parameter]) -> float:

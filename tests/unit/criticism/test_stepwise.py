@@ -328,6 +328,16 @@ def test_no_more_of_an_effect_is_named_than_there_can_be(part, possible):
     assert material(Fit((), model, values, (), values), clock) is possible
 
 
+@pytest.mark.parametrize(("cosine", "possible"), [(0.19, True), (-0.2, False)])
+def test_of_a_vector_no_part_is_at_its_bound(cosine, possible):
+    """A spring on an arm was named an encoder 0.2 rad off its centre, at 4330 noise floors."""
+    disc = effects()["angle_eccentricity"]
+    model = Model(machine(), (disc,))
+    sizes = {"sine": 0.01, "cosine": cosine, "sine2": 0.0, "cosine2": 0.0}
+    values = {**BASE, **{f"angle_eccentricity.{name}_rad": size for name, size in sizes.items()}}
+    assert material(Fit((), model, values, (), values), disc) is possible
+
+
 @pytest.mark.parametrize(("mean", "possible"), [(0.01, True), (-0.3, False)])
 def test_what_goes_with_an_effect_is_no_larger_than_there_can_be(mean, possible):
     """No current sensor reads a third too little: with that, its ripple stood for a dead time."""
