@@ -44,6 +44,7 @@ class Control(NamedTuple):
     angle_offset: float
     angle_wobble: float
     angle_wobble_phase: float
+    angle_wobble_order: float
     angle_play: float
     angle_late_s: float
     lsb_angle: float

@@ -146,6 +146,7 @@ def _in_the_loop(session: Session) -> dict[str, float]:
         "angle_offset": session.fault("angle_offset") / session.motor.pole_pairs,
         "angle_wobble": session.fault("angle_eccentricity"),
         "angle_wobble_phase": session.fault("angle_eccentricity", "phase_rad"),
+        "angle_wobble_order": session.fault("angle_eccentricity", "order"),
         "angle_play": session.bench.encoder_play_rad,
         "angle_late_s": session.bench.late_angle_s,
         "lsb_angle": 2.0 * math.pi / 2.0**session.bench.encoder_bits,

@@ -128,8 +128,8 @@ FORMS: dict[str, Form] = {
     "angle_offset": Form("rad", "electrical angle plus size", lambda _: {"size": 0.03}),
     "angle_eccentricity": Form(
         "rad",
-        "mechanical angle plus size * sin(theta + phase_rad)",
-        lambda m: {"size": 0.04 / m.pole_pairs, "phase_rad": 0.6},
+        "mechanical angle plus size * sin(order * theta + phase_rad)",
+        lambda m: {"size": 0.04 / m.pole_pairs, "phase_rad": 0.6, "order": 1.0},
     ),
     "saturation": Form(
         "1",

@@ -67,7 +67,7 @@ def sensed_angle(theta: float, noise: float, c: Control) -> float:
         The drive and its sensors.
 
     """
-    wobble = c.angle_wobble * math.sin(theta + c.angle_wobble_phase)
+    wobble = c.angle_wobble * math.sin(c.angle_wobble_order * theta + c.angle_wobble_phase)
     return rounded(theta + c.angle_offset + wobble + noise, c.lsb_angle)
 
 

@@ -348,7 +348,9 @@ class Session:
         seen = theta + self.fault("angle_offset") / self.motor.pole_pairs
         wobble = self.fault("angle_eccentricity")
         if wobble != 0.0:
-            seen = seen + wobble * np.sin(theta + self.fault("angle_eccentricity", "phase_rad"))
+            order = self.fault("angle_eccentricity", "order")
+            phase = order * theta + self.fault("angle_eccentricity", "phase_rad")
+            seen = seen + wobble * np.sin(phase)
         if bench.encoder_noise_rad > 0.0:
             seen = seen + self.noise(theta.size, bench.encoder_noise_rad)
         return to_grid(seen, 2.0 * math.pi / 2.0**bench.encoder_bits)

@@ -271,13 +271,19 @@ def test_a_late_current_is_turned_back_and_not_lengthened():
     assert found[1:-2] == pytest.approx(true[1:-2], rel=1e-12)
 
 
-def test_an_encoder_off_its_centre_and_at_a_tilt_errs_once_and_twice_a_turn():
+def test_an_encoder_errs_once_and_twice_a_turn_and_a_resolver_an_electrical_one():
     x = operating()
     q = {"sine_rad": 2e-3, "cosine_rad": -1e-3, "sine2_rad": 5e-4, "cosine2_rad": 3e-4}
-    once = 2e-3 * np.sin(x.theta_rad) - 1e-3 * np.cos(x.theta_rad)
-    twice = 5e-4 * np.sin(2 * x.theta_rad) + 3e-4 * np.cos(2 * x.theta_rad)
-    found = LIBRARY["angle_eccentricity"].angle(x, q)
-    assert found == pytest.approx(7 * (once + twice), abs=1e-15)
+    of_resolver = {"sine_elec_turn_rad": 4e-4, "cosine_elec_turn_rad": 1e-4}
+    of_resolver |= {"sine2_elec_turn_rad": -6e-4, "cosine2_elec_turn_rad": 2e-4}
+    sines, cosines = [*{**q, **of_resolver}.values()][::2], [*{**q, **of_resolver}.values()][1::2]
+    angles = np.outer([1, 2, 7, 14], x.theta_rad)
+    waves = sines @ np.sin(angles) + cosines @ np.cos(angles)
+    eccentric = LIBRARY["angle_eccentricity"]
+    assert {p.name for p in eccentric.parameters_of(x.machine)} == {*q, *of_resolver}
+    assert eccentric.angle(x, q | of_resolver) == pytest.approx(7 * waves, abs=1e-15)
+    two_poles = replace(x.machine, pole_pairs=1)
+    assert {p.name for p in eccentric.parameters_of(two_poles)} == {*q}
 
 
 def test_a_torque_behind_two_lags_is_brought_forward_by_both():

@@ -70,6 +70,21 @@ def test_an_encoder_off_its_centre_is_found_beside_a_scope():
     assert size == pytest.approx(0.01, rel=0.03)
 
 
+def test_a_resolver_that_errs_twice_an_electrical_turn_is_no_gain_of_a_phase():
+    """Both make waves of twice the electrical angle; the gain was named, as sure as could be."""
+    sound = replace(design("servo-ipm"), effects={})
+    size, order = 5e-4, 2.0 * sound.pole_pairs
+    motor = sound.having(angle_eccentricity={"size": size, "order": order})
+    plan = (("drive_0", "drive", {"load": 0.0}), ("spin_down", "spin_down", {}))
+    found = diagnose(campaign_of(campaign(motor, Bench(), 4, plan)), ModelSpec(), Constants())
+    assert found.missing == ("angle_eccentricity",)
+    last = found.ladder[-1].parameters
+    waves = [
+        last[f"angle_eccentricity.{one}2_elec_turn_rad"].value or 0.0 for one in ("sine", "cosine")
+    ]
+    assert np.hypot(*waves) == pytest.approx(size, rel=0.02)
+
+
 def test_a_swing_of_the_shaft_is_no_voltage():
     """A swing by 0.05 rad electrical at 50 Hz, near the electrical frequency, to a tenth of it.
 

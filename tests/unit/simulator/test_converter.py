@@ -47,6 +47,7 @@ def loop(motor, period_s=5e-5, **change):
         "angle_offset": 0.0,
         "angle_wobble": 0.0,
         "angle_wobble_phase": 0.0,
+        "angle_wobble_order": 1.0,
         "angle_play": 0.0,
         "angle_late_s": 0.0,
         "lsb_angle": 0.0,
