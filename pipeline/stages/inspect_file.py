@@ -50,6 +50,7 @@ def main(settings: InspectSettings) -> Outcome:
         refusal = CaptureError(error.code, message, error.remedy, error.rows)
         refusal.file = settings.file
         raise refusal from error
+    inspect_map.check_fields(settings, [seen])
     text = render(seen.report)
     code = CaptureError.exit_code if seen.refusals else 0
     refused = tuple(finding.line() for finding in seen.refusals)

@@ -15,6 +15,7 @@ from pipeline.execution.tasks.inspect_tasks import InspectTask, Looked, in_worke
 from pipeline.io.ingest.files import list_files, size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading
 from pipeline.io.ingest.metadata import is_about_others
+from pipeline.io.inspection.proposals import answer_key
 from pipeline.io.storage.publish import write_whole
 from pipeline.physics.glossary import METADATA, OHMMETER, TESTS_WITHOUT_CLOCK
 from pipeline.records.errors import CaptureError, UsageError
@@ -64,6 +65,32 @@ def check_answers(settings: InspectSettings) -> None:
         raise UsageError(f"map={settings.map} is there already", "remove it, or name another file")
 
 
+def check_fields(settings: InspectSettings, looked: Sequence[Looked]) -> None:
+    """Raises UsageError for an answer on a field that no file has, which would change nothing.
+
+    Parameters
+    ----------
+    settings
+        The keys of `inspect`.
+    looked
+        The files.
+
+    """
+    fields = [f for one in looked for stream in one.report.streams for f in stream.fields]
+    names = sorted({answer_key(field.name) for field in fields})
+    columns = {answer_key(field.name) for field in fields if field.column}
+    for key in settings.answers:
+        kind, _, name = key.partition(".")
+        if not name or not fields:
+            continue
+        if name not in names:
+            raise UsageError(
+                f"{key}: no file has a field {name!r}", f"fields are {', '.join(names)}"
+            )
+        if kind != "column" and name not in columns:
+            raise UsageError(f"{key}: {name!r} is no column yet", f"answer column.{name}= as well")
+
+
 def folder(settings: InspectSettings) -> Outcome:
     """What the files of a folder hold, by shape, and one map for those that need one.
 
@@ -80,6 +107,7 @@ def folder(settings: InspectSettings) -> Outcome:
     tasks = [InspectTask(settings.file, path, limits, settings.answers) for path in paths]
     seen = in_workers(_look_or_fault, tasks)
     looked = [one for one in seen if isinstance(one, Looked)]
+    check_fields(settings, looked)
     unread = [one for one in seen if isinstance(one, str)]
     unmapped = [one for one in looked if one.report.shape and not one.report.source]
     known = [one for one in looked if one not in unmapped and one.report.streams]

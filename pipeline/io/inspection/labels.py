@@ -11,7 +11,7 @@ from functools import cache
 from pipeline.io.inspection.aliases import alias
 from pipeline.io.inspection.vocabulary import QUALIFIERS, QUANTITIES, SYMBOLS
 from pipeline.io.maps.columns import last_part
-from pipeline.io.maps.units import COUNTS, FOREIGN_UNITS, normal_unit
+from pipeline.io.maps.units import COUNTS, FOREIGN_UNITS, OF_FRAME, normal_unit
 from pipeline.physics.glossary import COLUMNS
 
 _BRACKET = re.compile(r"^(.+?)\s*[(\[{<]\s*([^)\]}>]*?)\s*[)\]}>]\s*$")
@@ -22,6 +22,7 @@ _LETTERS = frozenset("acfhkv")
 """Ends of a name that are a phase as well as a unit: `current_a`."""
 _COMPANIONS = {"a": "bc", "v": "uw", "c": "ab"}
 """Letters of the other phases beside one that is a unit too."""
+_RMS = frozenset({"rms", "eff", "effektiv", "efficace"})
 _IMPLIED = {"rpm": "rpm", "erpm": "rpm", "mstoday": "ms", "second": "s", "seconds": "s", "sec": "s"}
 
 
@@ -87,7 +88,12 @@ def read_label(name: str, unit_row: str | None = None, beside: Collection[str] =
     if columns and not text:
         names = _key(stem), *words_of(stem)[-1:]
         implied = next((_IMPLIED[name] for name in names if name in _IMPLIED), None)
-    return Label(columns, unit or implied, text)
+    unit = unit or implied
+    if text and columns and OF_FRAME.issuperset(columns) and not _RMS.isdisjoint(words_of(stem)):
+        # the word may stand beside the unit: `Iq rms (A)`
+        text = f"{normal_unit(text)}_rms"
+        unit = known_unit(COLUMNS[columns[0]].unit, text)
+    return Label(columns, unit, text)
 
 
 def _is_lone(name: str, tail: str, beside: Collection[str]) -> bool:

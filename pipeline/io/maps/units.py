@@ -75,7 +75,7 @@ def _prefixed(unit: str, *prefixes: str) -> dict[str, Scale]:
 
 _RMS = Scale(math.sqrt(2.0))
 """Of a rotor frame that is scaled to rms: an amplitude is √2 times as much."""
-_OF_FRAME = frozenset({"id_a", "iq_a", "vd_v", "vq_v"})
+OF_FRAME = frozenset({"id_a", "iq_a", "vd_v", "vq_v"})
 """Columns that may be in rms; a wave has instants."""
 _SHARE = {"percent": Scale(0.01), "%": Scale(0.01), "1": Scale(1.0)}
 _ANGLE = {
@@ -197,7 +197,7 @@ def scale_of(unit: str, column: str) -> Scale:
         As `scale_to`; and of an rms value of a column that is in no rotor frame (`unknown_unit`).
 
     """
-    if normal_unit(unit) in ("A_rms", "V_rms") and column not in _OF_FRAME:
+    if normal_unit(unit) in ("A_rms", "V_rms") and column not in OF_FRAME:
         raise CaptureError(
             "unknown_unit",
             f"{column} is a wave, and {unit!r} is the unit of an amplitude",

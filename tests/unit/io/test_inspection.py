@@ -55,6 +55,9 @@ from pipeline.records.errors import UsageError
         ("X [Nm]", "torque_shaft_nm", "N·m"),
         ("time_ms", "t_s", "ms"),
         ("phase_current_a", "ia_a", None),
+        ("Iq rms (A)", "iq_a", "A_rms"),
+        ("vd_eff [V]", "vd_v", "V_rms"),
+        ("Iq_rms [mA]", "iq_a", None),
     ],
 )
 def test_names_of_six_languages_and_their_units(name: str, column: str, unit: str | None) -> None:
@@ -284,6 +287,24 @@ def test_what_nothing_asks_for_and_a_map_that_is_there_are_usage_errors(
     (tmp_path / "m.yaml").write_text("")
     assert main(["inspect", str(tmp_path), f"map={tmp_path / 'm.yaml'}"]) == 2
     assert "is there already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        ("unit.Moment=mNm", "no file has a field 'Moment'"),
+        ("column.speed=omega_mech_rad_s", "fields are t, w, xyz"),
+        ("unit.xyz=rpm", "'xyz' is no column yet"),
+    ],
+)
+def test_an_answer_that_changes_nothing_is_a_usage_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], answer: str, words: str
+) -> None:
+    """`unit.` of a name that was not quite the field's left q currents √2 too small, unsaid."""
+    (tmp_path / "x.csv").write_text("t,w,xyz\n0,1,5\n1,2,5\n2,3,5\n")
+    for where in (tmp_path, tmp_path / "x.csv"):
+        assert main(["inspect", str(where), answer]) == 2
+        assert words in capsys.readouterr().err
 
 
 SAMPLES = Path(__file__).parent / "samples"
