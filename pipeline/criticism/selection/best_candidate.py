@@ -110,24 +110,27 @@ def _refit_best(
     policy = wide.policy.selection
     usual = Baseline.of(wide, added)
     tests = {segment.test for segment in wide.segments}
-    most = max((s.fall - s.penalty for s in passing), default=0.0)
-    close = [s for s in passing if s.fall / policy.close_share - s.penalty >= most]
     best: LinearSystem | None = None
-    least = 0.0
-    for score in close:
-        effect = score.candidate.effect
-        begun = reweighted(wide, score)
-        tried = refitted(begun, score)
-        baseline = usual if begun is wide else Baseline.of(gauss_newton(begun.fit, begun), added)
-        base = baseline.wide
-        # of two that tie, the one that benches have and that some capture here was made to show
-        far = is_rare(effect, tried.fit) or set(effect.tests).isdisjoint(tests)
-        unsought = policy.tie if far else 0.0
-        cost = tried.deviance - base.deviance + score.penalty + unsought
-        if (
-            matters(tried, base, baseline.significant)
-            and cost < least
-            and baseline.is_improved_by(tried, score)
-        ):
-            best, least = tried, cost
+    least, left = 0.0, list(passing)
+    while left and best is None:
+        most = max(s.fall - s.penalty for s in left)
+        close = [s for s in left if s.fall / policy.close_share - s.penalty >= most]
+        # where none of these passes, the best of the others may
+        left = [s for s in left if s not in close]
+        for score in close:
+            effect = score.candidate.effect
+            begun = reweighted(wide, score)
+            tried = refitted(begun, score)
+            baseline = usual if begun is wide else Baseline.of(gauss_newton(begun.fit, begun), added)
+            base = baseline.wide
+            # of two that tie, the one that benches have and that some capture here was made to show
+            far = is_rare(effect, tried.fit) or set(effect.tests).isdisjoint(tests)
+            unsought = policy.tie if far else 0.0
+            cost = tried.deviance - base.deviance + score.penalty + unsought
+            if (
+                matters(tried, base, baseline.significant)
+                and cost < least
+                and baseline.is_improved_by(tried, score)
+            ):
+                best, least = tried, cost
     return best
