@@ -95,42 +95,51 @@ def _refit_best(
     wide: LinearSystem, passing: Sequence[Score], added: Sequence[Effect]
 ) -> LinearSystem | None:
     """Refits candidates that may be the best one by a refit, which may fall by 1/`close_share` of a
-    score, their penalty paid; the best one that passes.
+    score, their penalty paid; the best one that passes. Where none does, the best of the others
+    may.
+    """
+    usual, left = Baseline.of(wide, added), list(passing)
+    while left:
+        most = max(s.fall - s.penalty for s in left)
+        share = wide.policy.selection.close_share
+        close = [s for s in left if s.fall / share - s.penalty >= most]
+        if (best := _best_that_passes(usual, close)) is not None:
+            return best
+        left = [s for s in left if s not in close]
+    return None
+
+
+def _best_that_passes(usual: Baseline, close: Sequence[Score]) -> LinearSystem | None:
+    """The best refit of those that pass.
 
     Each must pass all of:
 
     1. it matters at its refitted size, and as a friction drives the shaft in neither sense;
     2. the deviance falls by more than its penalty;
     3. predicted from all other captures, it falls by `held_out_penalties`, even if the forms of
-       effects `added` with the same hook are a little wrong (`form_error`);
+       effects added before with the same hook are a little wrong (`form_error`);
     4. evidence below the floor does so even if any form found is wrong, and beside an effect of the
        same hook by `same_hook_penalties`, since what a form leaves there is of that size;
     5. so predicted, what it mends is more than what it spoils where it acts.
     """
-    policy = wide.policy.selection
-    usual = Baseline.of(wide, added)
+    wide, added = usual.wide, usual.added
     tests = {segment.test for segment in wide.segments}
     best: LinearSystem | None = None
-    least, left = 0.0, list(passing)
-    while left and best is None:
-        most = max(s.fall - s.penalty for s in left)
-        close = [s for s in left if s.fall / policy.close_share - s.penalty >= most]
-        # where none of these passes, the best of the others may
-        left = [s for s in left if s not in close]
-        for score in close:
-            effect = score.candidate.effect
-            begun = reweighted(wide, score)
-            tried = refitted(begun, score)
-            baseline = usual if begun is wide else Baseline.of(gauss_newton(begun.fit, begun), added)
-            base = baseline.wide
-            # of two that tie, the one that benches have and that some capture here was made to show
-            far = is_rare(effect, tried.fit) or set(effect.tests).isdisjoint(tests)
-            unsought = policy.tie if far else 0.0
-            cost = tried.deviance - base.deviance + score.penalty + unsought
-            if (
-                matters(tried, base, baseline.significant)
-                and cost < least
-                and baseline.is_improved_by(tried, score)
-            ):
-                best, least = tried, cost
+    least = 0.0
+    for score in close:
+        effect = score.candidate.effect
+        begun = reweighted(wide, score)
+        tried = refitted(begun, score)
+        baseline = usual if begun is wide else Baseline.of(gauss_newton(begun.fit, begun), added)
+        base = baseline.wide
+        # of two that tie, the one that benches have and that some capture here was made to show
+        far = is_rare(effect, tried.fit) or set(effect.tests).isdisjoint(tests)
+        unsought = wide.policy.selection.tie if far else 0.0
+        cost = tried.deviance - base.deviance + score.penalty + unsought
+        if (
+            matters(tried, base, baseline.significant)
+            and cost < least
+            and baseline.is_improved_by(tried, score)
+        ):
+            best, least = tried, cost
     return best

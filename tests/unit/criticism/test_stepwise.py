@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -201,27 +202,37 @@ def test_candidates_are_tried_by_what_they_are_worth(monkeypatch):
     assert tried == [cheap, dear]
 
 
-@pytest.mark.parametrize(("fall", "both"), [(176.0, True), (165.0, False)])
-def test_who_may_be_best_by_a_refit_is_refitted(monkeypatch, fall, both):
-    """Cogging of ten terms has the larger fall, and the friction of a coast less to pay."""
+@pytest.mark.parametrize(
+    ("fall", "first_matters", "both"),
+    [(176.0, True, True), (165.0, True, False), (165.0, False, True)],
+)
+def test_who_may_be_best_by_a_refit_is_refitted(monkeypatch, fall, first_matters, both):
+    """Cogging of ten terms has the larger fall, and the friction of a coast less to pay. A coupling
+    too small to matter kept an angle off by 18 noise floors from being tried.
+    """
     tried = []
+    wide = linear_system(fitted((log(noise=1.0),)))
+    lower = SimpleNamespace(deviance=wide.deviance - 300.0, fit=wide.fit)
 
     def judged(wide, score):
         tried.append(score.candidate.effect.name)
         return wide
 
+    def matters(*_):
+        return first_matters or tried[-1] != "cogging"
+
     monkeypatch.setattr(best_candidate, "reweighted", judged)
-    monkeypatch.setattr(best_candidate, "refitted", lambda wide, _: wide)
-    monkeypatch.setattr(best_candidate, "matters", lambda *_: False)
+    monkeypatch.setattr(best_candidate, "refitted", lambda *_: lower)
+    monkeypatch.setattr(best_candidate, "matters", matters)
     monkeypatch.setattr(best_candidate, "is_rare", lambda *_: False)
-    wide = linear_system(fitted((log(noise=1.0),)))
+    monkeypatch.setattr(best_candidate.Baseline, "is_improved_by", lambda *_: True)
 
     def score(name, fall, penalty):
         of = wide.policy.selection
         return Score(Candidate(effects()[name], ()), fall, penalty, {}, {}, 1.0, 2.0, policy=of)
 
     passing = [score("cogging", 290.0, 73.0), score("stribeck", fall, 26.7)]
-    best_candidate._refit_best(wide, passing, ())
+    assert best_candidate._refit_best(wide, passing, ()) is lower
     assert tried == ["cogging", "stribeck"][: 1 + both]
 
 
