@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 import polars.selectors as cs
 
+from pipeline.contracts.clocks import held_apart, streams_split
 from pipeline.contracts.gates import missing_values
 from pipeline.contracts.protocol import warning, with_time
 from pipeline.contracts.registry import gates
@@ -64,9 +65,10 @@ def validate(
     capture, unfilled = _filled_rows(capture)
     capture, twice = _rows_once(capture)
     check_tables(capture)
+    capture, held = held_apart(capture)
     capture, findings = _without_blanks(capture)
     capture, computed = _without_computed_torque(capture)
-    findings = [*turned, *unfilled, *twice, *findings, *computed]
+    findings = [*turned, *unfilled, *twice, *held, *findings, *computed]
     refusals: dict[str, CaptureError] = {}
     broken: list[CaptureError] = []
     for gate in gates():
@@ -85,7 +87,7 @@ def validate(
     if refusals or broken:
         raise merged(_causes_first(refusals) or broken)
     settings = {**missing_values.GATE.settings(), **options.get(missing_values.NAME, {})}
-    split = _streams_split(capture, settings["dense_share"])
+    split = streams_split(capture, settings["dense_share"])
     return split.with_masks(*masks), tuple(findings)
 
 
@@ -173,30 +175,6 @@ def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:
     remedy = "find out why the channel gave nothing, or leave it out of the file"
     blank_columns = warning(capture, "empty_column", words, remedy)
     return replace(capture, tables=tuple(tables)), [blank_columns]
-
-
-def _streams_split(capture: Capture, dense_share: float) -> Capture:
-    """The capture with every slow stream of a fast table in a further table, on its own clock.
-
-    A stream is slow where fewer than `dense_share` of the rows hold a value, most of them with
-    blank rows in between, and another column is there in more. Rows that need every column keep
-    to the fast clock then, on which the slow one is interpolated.
-    """
-    tables, streams = [], []
-    for table in capture.tables:
-        slow = _slow_columns(table, dense_share) if "t_s" in table.columns else []
-        streams += [table.select("t_s", name).filter(pl.col(name).is_finite()) for name in slow]
-        tables.append(table.drop(slow))
-    return replace(capture, tables=(*tables, *streams)) if streams else capture
-
-
-def _slow_columns(table: pl.DataFrame, dense_share: float) -> list[str]:
-    places = {n: np.flatnonzero(np.isfinite(table[n].to_numpy())) for n in table.columns}
-    dense = [n for n, rows in places.items() if rows.size >= dense_share * table.height]
-    if not set(dense) - {"t_s"}:
-        return []
-    blanks = {n: rows for n, rows in places.items() if n not in dense and rows.size > 1}
-    return [name for name, rows in blanks.items() if np.median(np.diff(rows)) > 1.0]
 
 
 def _broken(name: str, error: Exception) -> CaptureError:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.rounding import coarse_step
@@ -39,6 +40,7 @@ from pipeline.records.capture import Capture
 
 _VOLTAGE_FRAME = "own_frame"
 """Number of a segment whose angle is that of its voltage, for want of an encoder."""
+_PHASES_V = ("va_v", "vb_v", "vc_v")
 _LINE_RAD = {f"v{pair}_v": angle for pair, angle in PAIR_RAD.items()}
 """Where each line voltage stands [rad, electrical]."""
 
@@ -60,6 +62,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         itself.
 
     """
+    capture = _with_lines(capture)
     lines = [n for n in LINES_V if capture.has(n)]
     if len(lines) < 2:
         return None
@@ -97,6 +100,21 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         weak=weak,
         fixed={} if encoder else {_VOLTAGE_FRAME: 1.0},
     )
+
+
+def _with_lines(capture: Capture) -> Capture:
+    """The capture with line voltages, where it holds those of all three phases to the star point.
+
+    What all phases have in common, such as their third harmonic, is in no line.
+    """
+    if any(capture.has(name) for name in LINES_V) or not capture.has(*_PHASES_V):
+        return capture
+    lines = [
+        (pl.col(one) - pl.col(other)).alias(line)
+        for line, one, other in zip(LINES_V, _PHASES_V, (*_PHASES_V[1:], _PHASES_V[0]), strict=True)
+    ]
+    tables = (t.with_columns(lines) if {*_PHASES_V} <= {*t.columns} else t for t in capture.tables)
+    return replace(capture, tables=tuple(tables))
 
 
 def _beside_waves(

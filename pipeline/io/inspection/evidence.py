@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 _MOST_COLUMNS = 60
 _LEAST_ROWS = 20
 _FILLED = 0.9
+_ROUNDED = 1e-3
+"""What the digits of a file may add to the range of its readings, over that range."""
 _ALIKE = 0.999
 """Least correlation of a signal with another's integral, both without their straight line."""
 _SAME = 0.99999
@@ -120,7 +122,8 @@ def span_of(values: Array) -> float | None:
     onward = float(np.median(usual)) or float(np.mean(usual))
     span = float(np.median(np.abs(steps[falls]) + abs(onward)))
     slack = max(float(np.abs(usual).max()), 1e-3 * span)
-    low, high = max(span - slack, reach), span + slack
+    # as it is written, a turn from -3.142 to 3.142 is longer than a turn
+    low, high = max(span - slack, (1.0 - _ROUNDED) * reach), span + slack
     known = next((one for one in _KNOWN_SPANS if low <= one <= high), None)
     if known is not None or not (np.sign(steps[falls]) == -np.sign(onward)).all():
         return known

@@ -8,14 +8,9 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.contracts.clocks import _slow_columns, held_apart, streams_split
 from pipeline.contracts.schemas import check_columns, check_tables
-from pipeline.contracts.validate import (
-    _filled_rows,
-    _rows_once,
-    _slow_columns,
-    _streams_split,
-    _without_blanks,
-)
+from pipeline.contracts.validate import _filled_rows, _rows_once, _without_blanks
 from pipeline.records.errors import CaptureError
 from tests.unit.contracts.signals import OPTIONS
 from tests.unit.contracts.test_gate_limits import GATES, capture
@@ -30,18 +25,77 @@ def test_slow_streams_have_a_table_of_their_own() -> None:
     every = np.where(np.arange(size) % 3 == 0, 1.0 * t_s, np.nan)
     early = np.where(np.arange(size) < 100, t_s, np.nan)
     table = pl.DataFrame({"t_s": t_s, "iq_a": t_s, "temp_case_degc": every, "id_a": early})
-    assert _slow_columns(table, 0.5) == ["temp_case_degc"]
-    assert _slow_columns(table, 0.3) == []
-    assert _slow_columns(table.drop("iq_a"), 0.5) == []
+    assert [*_slow_columns(table, 0.5)] == ["temp_case_degc"]
+    assert _slow_columns(table, 0.3) == {}
+    assert _slow_columns(table.drop("iq_a"), 0.5) == {}
     made = replace(capture("drive", iq_a=t_s), tables=(table,))
-    parted = _streams_split(made, 0.5)
+    parted = streams_split(made, 0.5)
     assert [t.columns for t in parted.tables] == [
         ["t_s", "iq_a", "id_a"],
         ["t_s", "temp_case_degc"],
     ]
     assert parted.tables[1].height == 134
     assert parted.tables[1]["t_s"][1] == pytest.approx(3e-3)
-    assert _streams_split(made, 0.3) is made
+    assert streams_split(made, 0.3) is made
+
+
+def test_blanks_in_the_same_rows_are_one_stream() -> None:
+    """Currents and voltages of every tenth row, parted, were drawn out to the angle's clock."""
+    blank = np.where(np.arange(1000) % 10 == 3, np.sin(30.0 * CLOCK), np.nan)
+    made = capture("drive", t_s=CLOCK, theta_mech_rad=CLOCK, iq_a=blank, vq_v=2.0 * blank)
+    parted = streams_split(made, 0.5)
+    assert [t.columns for t in parted.tables] == [
+        ["t_s", "theta_mech_rad"],
+        ["t_s", "iq_a", "vq_v"],
+    ]
+    assert parted.tables[1].height == 100
+
+
+def held(values: np.ndarray, shift: np.ndarray | int = 0) -> np.ndarray:
+    """Each value for ten rows of the clock, the first ones for `shift` rows less."""
+    place = (np.arange(CLOCK.size) + shift) // 10
+    return values[np.clip(place, 0, values.size - 1)]
+
+
+def test_values_that_a_bus_holds_are_samples_once() -> None:
+    """A sound motor missed by 12 noise floors: nine rows of ten repeated the last message."""
+    generator = np.random.default_rng(3)
+    current, speed = generator.normal(size=(2, 101))
+    current[40] = current[39]
+    jitter = generator.integers(0, 2, CLOCK.size // 10).repeat(10)
+    made = capture(
+        "drive",
+        t_s=CLOCK,
+        theta_mech_rad=CLOCK**2,
+        iq_a=held(current),
+        vq_v=held(2.0 * current),
+        omega_mech_rad_s=held(speed, 4 + jitter),
+    )
+    kept, findings = held_apart(made)
+    assert [t.columns for t in kept.tables] == [
+        ["t_s", "theta_mech_rad"],
+        ["t_s", "iq_a", "vq_v"],
+        ["t_s", "omega_mech_rad_s"],
+    ]
+    assert kept.tables[1]["t_s"].to_numpy() == pytest.approx(CLOCK[10::10])
+    assert kept.tables[1]["iq_a"].to_numpy() == pytest.approx(current[1:100])
+    assert [f.code for f in findings] == ["held_values"]
+    assert "iq_a, vq_v, omega_mech_rad_s: new in every 10th row" in findings[0].message
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.round(np.sin(40.0 * CLOCK) + 0.01 * np.random.default_rng(1).normal(size=1000), 1),
+        np.repeat(np.arange(10.0), 100),
+        np.random.default_rng(2).normal(size=1000),
+        np.zeros(1000),
+    ],
+    ids=["coarse", "plateaus", "new in every row", "constant"],
+)
+def test_coarse_values_and_plateaus_are_not_held(values: np.ndarray) -> None:
+    made = capture("drive", t_s=CLOCK, theta_mech_rad=held(CLOCK[::10]), iq_a=values)
+    assert held_apart(made) == (made, [])
 
 
 def test_columns_without_a_value_are_not_there() -> None:

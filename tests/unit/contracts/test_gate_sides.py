@@ -10,11 +10,11 @@ import polars as pl
 import pytest
 
 from pipeline.contracts import duplicates, motor, waveform
+from pipeline.contracts.clocks import _slow_columns
 from pipeline.contracts.duplicates import _finding, _holds, once
 from pipeline.contracts.gates import saturation, torque_sign
 from pipeline.contracts.gates.phase_sum import sum_share
 from pipeline.contracts.schemas import broken, check_metadata
-from pipeline.contracts.validate import _slow_columns
 from pipeline.physics.glossary import COLUMNS, METADATA
 from pipeline.records.capture import Campaign, CaptureMeta
 from pipeline.records.errors import CaptureError
@@ -262,7 +262,7 @@ def test_a_channel_is_slow_from_two_values_on() -> None:
         values = np.full(100, np.nan)
         values[places] = 1.0
         table = pl.DataFrame({"t_s": t_s, "iq_a": t_s, "temp_case_degc": values})
-        assert _slow_columns(table, 0.5) == ["temp_case_degc"] * slow
+        assert [*_slow_columns(table, 0.5)] == ["temp_case_degc"] * slow
 
 
 # Ranges of the glossary

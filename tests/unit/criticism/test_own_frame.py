@@ -85,6 +85,26 @@ def test_a_resolver_that_errs_twice_an_electrical_turn_is_no_gain_of_a_phase():
     assert np.hypot(*waves) == pytest.approx(size, rel=0.02)
 
 
+def test_voltages_to_the_star_point_are_lines_without_their_third_harmonic():
+    """`run` read them, and `diagnose` said that there were too few even samples."""
+    t = np.arange(20_000) * 1e-4
+    eps = 120.0 * t
+    noise = 1e-3 * np.random.default_rng(2).standard_normal((3, t.size))
+    phases = np.array([5.0 * np.cos(eps - 2.0 * np.pi / 3.0 * k) for k in range(3)]) + noise
+    third = phases + 0.9 * np.cos(3.0 * eps)
+    lines = phases - np.roll(phases, -1, axis=0)
+    given = dict(zip(("vab_v", "vbc_v", "vca_v"), lines, strict=True))
+    star = dict(zip(("va_v", "vb_v", "vc_v"), third, strict=True))
+    known = machine(1)
+    by_lines, by_star = (
+        cut(capture("open_circuit", t_s=t, theta_mech_rad=eps, **columns), known)
+        for columns in (given, star)
+    )
+    for name in ("vab_v", "vbc_v", "vca_v"):
+        assert by_star.recorded[name] == pytest.approx(by_lines.recorded[name], abs=1e-9)
+    assert cut(capture("open_circuit", t_s=t, theta_mech_rad=eps, va_v=third[0]), known) is None
+
+
 def test_a_swing_of_the_shaft_is_no_voltage():
     """A swing by 0.05 rad electrical at 50 Hz, near the electrical frequency, to a tenth of it.
 

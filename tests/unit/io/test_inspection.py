@@ -123,6 +123,7 @@ def test_a_straight_line_is_no_evidence() -> None:
     [
         (np.arange(3000) * 50 % 65_536, 65_536.0),
         (np.cumsum(np.sin(np.arange(4000) / 300)) * 0.05 % (2 * np.pi), 2 * np.pi),
+        (np.round(np.linspace(0, 60, 60_000) % (2 * np.pi) - np.pi, 3), 2 * np.pi),
         (np.repeat([0.0, 5.0, 0.0], 100), None),
         (np.random.default_rng(1).normal(0, 1, 1000), None),
         (np.arange(100.0), None),

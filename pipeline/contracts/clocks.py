@@ -1,0 +1,126 @@
+"""Columns of one table that were recorded on clocks of their own, each in a table of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from pipeline.contracts.protocol import warning
+from pipeline.records.capture import Capture
+from pipeline.records.finding import Finding
+
+Rows = NDArray[np.int64]
+
+_SAMPLED = ("_v", "_a", "_nm", "omega_mech_rad_s")
+"""Ends of columns that are new in every sample; an angle or a temperature may stay."""
+_LEAST_HELD = 50
+"""Values from which on a clock is known."""
+_MOST_HELD_S = 0.05
+"""Longest that a bus holds a value [s]; a plateau of a test without noise is longer."""
+_ON_CLOCK = 0.95
+"""Least share of a column's changes that keep to its own clock, where it is held between them."""
+_JITTER = 0.2
+"""What a change may be off its clock by, over the time for which values are held."""
+
+
+def held_apart(capture: Capture) -> tuple[Capture, list[Finding]]:
+    """The capture with what a slower clock brings in tables of its own, each value once.
+
+    A logger that writes rows faster than a bus brings values fills them with the last ones, which
+    are no samples. A coarse value repeats as well, but its changes keep to no clock.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+
+    Returns
+    -------
+    Capture
+        The same one where nothing is held.
+    list of Finding
+        A warning for each time that values are held for.
+
+    """
+    tables: list[pl.DataFrame] = []
+    streams: list[pl.DataFrame] = []
+    findings = []
+    for table in capture.tables:
+        held = _held_rows(table) if "t_s" in table.columns else {}
+        streams += _in_common_rows(table, {name: rows for name, (rows, _) in held.items()})
+        for count in sorted({count for _, count in held.values()}):
+            names = [name for name, (_, every) in held.items() if every == count]
+            words = f"{', '.join(names)}: new in every {count}th row, the last value in between"
+            remedy = "write a value where it is new; the repeats are left out"
+            findings.append(warning(capture, "held_values", words, remedy, (0, table.height - 1)))
+        rest = table.drop(list(held))
+        tables += [rest] if rest.columns != ["t_s"] else []
+    return (replace(capture, tables=(*tables, *streams)) if findings else capture), findings
+
+
+def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Rows, int]]:
+    """Rows in which columns that hold are new, and how many rows they hold, by name."""
+    held = {}
+    row_s = float(np.median(np.diff(table["t_s"].to_numpy()))) if table.height > 1 else 0.0
+    for name in table.columns:
+        if not name.endswith(_SAMPLED) or not table[name].dtype.is_float():
+            continue
+        changes = np.flatnonzero(np.diff(table[name].to_numpy()) != 0.0) + 1
+        steps = np.diff(changes)
+        count = int(np.median(steps)) if steps.size >= _LEAST_HELD else 1
+        if count == 1 or count * row_s > _MOST_HELD_S:
+            continue
+        ticks = np.rint(steps / count)
+        if np.mean(np.abs(steps - count * ticks) <= _JITTER * count) > _ON_CLOCK:
+            # a value that is by chance the last one again is a sample as well
+            passed = np.concatenate([[0], np.cumsum(np.maximum(ticks, 1))])
+            rows = np.interp(np.arange(passed[-1] + 1), passed, changes)
+            held[name] = np.rint(rows).astype(np.int64), count
+    return held
+
+
+def streams_split(capture: Capture, dense_share: float) -> Capture:
+    """The capture with every slow stream of a fast table in a further table, on its own clock.
+
+    A stream is slow where fewer than `dense_share` of the rows hold a value, most of them with
+    blank rows in between, and another column is there in more. Rows that need every column keep
+    to the fast clock then, on which the slow one is interpolated.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+    dense_share
+        Share of the rows [1].
+
+    """
+    tables: list[pl.DataFrame] = []
+    streams: list[pl.DataFrame] = []
+    for table in capture.tables:
+        slow = _slow_columns(table, dense_share) if "t_s" in table.columns else {}
+        streams += _in_common_rows(table, slow)
+        tables.append(table.drop(list(slow)))
+    return replace(capture, tables=(*tables, *streams)) if streams else capture
+
+
+def _slow_columns(table: pl.DataFrame, dense_share: float) -> dict[str, Rows]:
+    """Rows that hold a value of each slow column."""
+    places = {n: np.flatnonzero(np.isfinite(table[n].to_numpy())) for n in table.columns}
+    dense = [n for n, rows in places.items() if rows.size >= dense_share * table.height]
+    if not set(dense) - {"t_s"}:
+        return {}
+    blanks = {n: rows for n, rows in places.items() if n not in dense and rows.size > 1}
+    return {name: rows for name, rows in blanks.items() if np.median(np.diff(rows)) > 1.0}
+
+
+def _in_common_rows(table: pl.DataFrame, rows: Mapping[str, Rows]) -> Iterable[pl.DataFrame]:
+    """A table for all columns that hold values in the same rows: they are one stream."""
+    together: dict[bytes, list[str]] = {}
+    for name, places in rows.items():
+        together.setdefault(places.tobytes(), []).append(name)
+    for names in together.values():
+        yield table.select("t_s", *names)[rows[names[0]]]
