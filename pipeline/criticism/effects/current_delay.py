@@ -29,7 +29,15 @@ EFFECT = Effect(
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
     parameters=(
         Parameter(
-            "delay_s", "s", 0.5, 0.02, "period_s", low=-200.0, high=200.0, starts=(*_EARLY, *_LATE)
+            "delay_s",
+            "s",
+            0.5,
+            0.02,
+            "period_s",
+            low=-200.0,
+            high=200.0,
+            starts=(*_EARLY, *_LATE),
+            rare_below=0.0,
         ),
         choice(
             "of_phases",

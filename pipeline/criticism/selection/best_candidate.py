@@ -95,18 +95,18 @@ def _refit_best(
     wide: LinearSystem, passing: Sequence[Score], added: Sequence[Effect]
 ) -> LinearSystem | None:
     """Refits candidates that may be the best one by a refit, which may fall by 1/`close_share` of a
-    score, their penalty paid; the best one that passes. Where none does, the best of the others
-    may.
+    score, their penalty paid; the best one that passes. Where none does and something is over its
+    floor, the best of the others may.
     """
     usual, left = Baseline.of(wide, added), list(passing)
-    while left:
+    best: LinearSystem | None = None
+    while left and best is None:
         most = max(s.fall - s.penalty for s in left)
         share = wide.policy.selection.close_share
         close = [s for s in left if s.fall / share - s.penalty >= most]
-        if (best := _best_that_passes(usual, close)) is not None:
-            return best
-        left = [s for s in left if s not in close]
-    return None
+        best = _best_that_passes(usual, close)
+        left = [s for s in left if s not in close and usual.significant.any()]
+    return best
 
 
 def _best_that_passes(usual: Baseline, close: Sequence[Score]) -> LinearSystem | None:

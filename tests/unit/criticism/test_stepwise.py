@@ -203,10 +203,15 @@ def test_candidates_are_tried_by_what_they_are_worth(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("fall", "first_matters", "both"),
-    [(176.0, True, True), (165.0, True, False), (165.0, False, True)],
+    ("fall", "first_matters", "over_floor", "both"),
+    [
+        (176.0, True, True, True),
+        (165.0, True, True, False),
+        (165.0, False, True, True),
+        (165.0, False, False, False),
+    ],
 )
-def test_who_may_be_best_by_a_refit_is_refitted(monkeypatch, fall, first_matters, both):
+def test_who_may_be_best_by_a_refit_is_refitted(monkeypatch, fall, first_matters, over_floor, both):
     """Cogging of ten terms has the larger fall, and the friction of a coast less to pay. A coupling
     too small to matter kept an angle off by 18 noise floors from being tried.
     """
@@ -226,13 +231,16 @@ def test_who_may_be_best_by_a_refit_is_refitted(monkeypatch, fall, first_matters
     monkeypatch.setattr(best_candidate, "matters", matters)
     monkeypatch.setattr(best_candidate, "is_rare", lambda *_: False)
     monkeypatch.setattr(best_candidate.Baseline, "is_improved_by", lambda *_: True)
+    significant = "pipeline.criticism.selection.acceptance.significant_groups"
+    monkeypatch.setattr(significant, lambda _: np.array([over_floor]))
 
     def score(name, fall, penalty):
         of = wide.policy.selection
         return Score(Candidate(effects()[name], ()), fall, penalty, {}, {}, 1.0, 2.0, policy=of)
 
     passing = [score("cogging", 290.0, 73.0), score("stribeck", fall, 26.7)]
-    assert best_candidate._refit_best(wide, passing, ()) is lower
+    found = best_candidate._refit_best(wide, passing, ())
+    assert found is (lower if first_matters or both else None)
     assert tried == ["cogging", "stribeck"][: 1 + both]
 
 
