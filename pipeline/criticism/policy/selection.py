@@ -73,6 +73,11 @@ class Selection:
         0.7, "1", "share of the best fall of deviance that a candidate needs to be refitted too",
         why="a score is to first order; each refit costs a fit",
     )  # fmt: skip
+    shorter_steps: tuple[float, ...] = chosen(
+        (1.0, 0.5, 0.25, 0.125), "1", "parts of the step that a score predicts, from which a refit "
+        "begins until one is no worse than the score promised to be better",
+        why="from beyond the tangent's reach ten fits went to and fro for minutes",
+    )  # fmt: skip
     held_out_penalties: float = chosen(
         0.5, "BIC penalties", "fall of deviance that a candidate must show on captures held out",
         why="held out, fewer captures carry each constant",

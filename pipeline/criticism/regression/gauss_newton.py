@@ -58,7 +58,9 @@ def start_values(model: Model, machine: Machine) -> dict[str, float]:
     return values | {name: value for name, (value, _) in model.stated().items()}
 
 
-def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
+def gauss_newton(
+    fit: Fit, before: LinearSystem | None = None, most: float = np.inf
+) -> LinearSystem:
     """Fits a model's own parameters.
 
     Parameters
@@ -67,6 +69,8 @@ def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
         Where to begin, with the noise floors that the rows are weighed by.
     before
         A system around a near fit, whose columns may serve.
+    most
+        Deviance from which on it is not begun: the system around `fit` is returned as it is.
 
     Returns
     -------
@@ -86,7 +90,7 @@ def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
     """
     policy = fit.policy.fit
     system, fresh = linear_system(fit, before=before), True
-    for _ in range(policy.iterations):
+    for _ in range(policy.iterations if system.deviance < most else 0):
         fit = system.fit
         step = bounded_step(_damped(system), system.columns, fit.model, fit.values)
         if system.deviance - system.predicted_deviance(step) >= policy.converged:

@@ -86,15 +86,32 @@ def refitted(wide: LinearSystem, score: Score) -> LinearSystem:
         The score of the candidate.
 
     """
-    tried = gauss_newton(begin_from(wide.fit, score), before=wide)
+    tried = _along_the_step(wide, score)
     if wide.deviance - tried.deviance < wide.policy.selection.close_share * score.fall:
-        starts = (begin_from(wide.fit, other) for other in _with_other_choices(wide, score))
-        ends = [gauss_newton(start, before=wide) for start in starts]
+        ends = [_along_the_step(wide, other) for other in _with_other_choices(wide, score)]
         tried = min([tried, *ends], key=lambda end: end.deviance)
     if tried.deviance + score.penalty < wide.deviance:
         return tried
-    again = gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)
+    again = _along_the_step(wide, replace(score, moves={}))
     return min(tried, again, key=lambda end: end.deviance)
+
+
+def _along_the_step(wide: LinearSystem, score: Score) -> LinearSystem:
+    """The fit begun from the step that a score predicts; from a part of it where the whole makes
+    the captures worse by more than it promised, since the tangent does not reach that far.
+    """
+    most = wide.deviance + score.fall
+    for share in wide.policy.selection.shorter_steps:
+        moves = {name: share * move for name, move in score.moves.items()}
+        step = {
+            name: share * value + (1.0 - share) * score.candidate.values.get(name, 0.0)
+            for name, value in score.step.items()
+        }
+        begun = begin_from(wide.fit, replace(score, moves=moves, step=step))
+        tried = gauss_newton(begun, before=wide, most=most)
+        if tried.deviance < most:
+            break
+    return tried
 
 
 def _with_other_choices(wide: LinearSystem, score: Score) -> Iterator[Score]:
