@@ -40,6 +40,8 @@ CONVENTIONS: tuple[Convention, ...] = (
         "torque per DC ampere, six-step, against peak", *_BOTH),
     _convention(2.0 / math.sqrt(3.0), "1.1547",
         "Kt = Ke line-line peak, the DC form, against 1.5 p psi", "coupling"),
+    _convention(2.0 / math.sqrt(3.0), "1.1547",
+        "full modulation by space vectors, Vdc/√3, against a sine's, Vdc/2", "power"),
     _convention(math.sqrt(1.5), "1.2247",
         "power-invariant against amplitude-invariant frame", *_BOTH),
     _convention(math.sqrt(2.0), "1.4142", "peak against rms", *_BOTH),

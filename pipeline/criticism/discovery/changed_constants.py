@@ -12,16 +12,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
 from pipeline.criticism.machine.model import BASE, PHYSICAL
 from pipeline.criticism.operating import Array
+from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import NormalEquations, Prior, pseudo_inverse
 from pipeline.criticism.selection.improvement import clears
+from pipeline.numerics.identifiability import REACH
 from pipeline.physics.notation import number_text
 
 
@@ -96,7 +99,32 @@ def changed_constant(system: LinearSystem) -> Change | None:
 
     """
     tried = list(_changes(system))
-    return max(tried, key=lambda change: change.gain, default=None)
+    best = max(tried, key=lambda change: change.gain, default=None)
+    return None if best is None else _refitted(system, best)
+
+
+def _refitted(system: LinearSystem, change: Change) -> Change:
+    """The change by a fit of either part of the captures: a large one is not of first order, as the
+    residual of a free shaft goes with 1/J. As it was, where a part alone does not determine it.
+    """
+    fit, values, u = system.fit, [], []
+    for inside in (False, True):
+        part = [(segment.capture in change.captures) == inside for segment in fit.segments]
+        own = gauss_newton(
+            replace(
+                fit,
+                segments=tuple(compress(fit.segments, part)),
+                sigma=tuple(compress(fit.sigma, part)),
+                tolerance=tuple(compress(fit.tolerance, part)),
+            )
+        )
+        place = [own.columns[n].name for n in own.model_columns].index(change.name)
+        values.append(own.fit.values[change.name])
+        u.append(math.sqrt(own.covariance(own.model_columns)[place, place]))
+    difference, u_difference = values[1] - values[0], math.hypot(*u)
+    if difference * change.difference <= 0.0 or abs(difference) < REACH * u_difference:
+        return change
+    return replace(change, value=values[0], difference=difference, u=u_difference)
 
 
 def _changes(system: LinearSystem) -> Iterator[Change]:

@@ -7,9 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.criticism.diagnosis import base_fit
 from pipeline.criticism.discovery.changed_constants import by_words, changed_constant
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.simulator.bench import campaign
+from pipeline.simulator.design import Bench
+from tests.simulated import campaign_of, design
 from tests.unit.criticism.machines import BASE, log, machine
 
 P = 7
@@ -57,6 +63,27 @@ def test_the_constant_its_size_and_the_captures_are_told(name, share, changed):
     assert abs(found.difference - share * BASE[name]) < 4.0 * found.u
     assert ("only one capture" in found.words) == (len(changed) == 1)
     assert ("higher" if share > 0.0 else "lower") in found.words
+
+
+def test_a_large_change_is_that_of_a_fit_of_either_part():
+    """A disc that doubles the inertia was told as half of it: acceleration goes with 1/J."""
+    sound = replace(design("servo-ipm"), effects={})
+    heavy = replace(sound, j_rotor_kgm2=2.0 * sound.j_rotor_kgm2)
+    recordings = [
+        replace(one, stem=f"log_{n}")
+        for n, motor in enumerate((sound, sound, sound, heavy))
+        for one in campaign(motor, Bench(), n, (("drive", "drive", {"load": 0.0}),))
+    ]
+    whole = campaign_of(recordings)
+    free = [
+        replace(c, tables=tuple(t.drop("torque_shaft_nm", strict=False) for t in c.tables))
+        for c in whole.captures
+    ]
+    base = base_fit(replace(whole, captures=tuple(free)), ModelSpec(), Constants())
+    found = changed_constant(base.system)
+    assert (found.name, found.captures) == ("j_kgm2", ("log_3.mcap",))
+    assert found.difference == pytest.approx(sound.j_rotor_kgm2, rel=0.05)
+    assert abs(found.difference - sound.j_rotor_kgm2) < 3.0 * found.u
 
 
 def test_captures_that_agree_have_none():

@@ -352,8 +352,9 @@ def test_of_a_vector_no_part_is_at_its_bound(cosine, possible):
     """A spring on an arm was named an encoder 0.2 rad off its centre, at 4330 noise floors."""
     disc = effects()["angle_eccentricity"]
     model = Model(machine(), (disc,))
-    sizes = {"sine": 0.01, "cosine": cosine, "sine2": 0.0, "cosine2": 0.0}
-    values = {**BASE, **{f"angle_eccentricity.{name}_rad": size for name, size in sizes.items()}}
+    sizes = dict.fromkeys((p.name for p in disc.parameters_of(machine())), 0.0)
+    sizes |= {"sine_rad": 0.01, "cosine_rad": cosine}
+    values = {**BASE, **{f"angle_eccentricity.{name}": size for name, size in sizes.items()}}
     assert material(Fit((), model, values, (), values), disc) is possible
 
 

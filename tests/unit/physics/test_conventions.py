@@ -227,6 +227,13 @@ def test_a_ratio_on_a_magic_number_names_it(ratio: float, label: str) -> None:
     assert inverse.startswith(f"1/{label}: ")
 
 
+def test_a_power_of_voltages_by_the_wrong_full_modulation_names_it() -> None:
+    """A drive's duty of Vdc/√3 that was taken of Vdc/2, or the other way."""
+    named = convention_suspect(1.1532, 0.0057, "power", 4)
+    assert named is not None
+    assert named.startswith("1.1547: full modulation")
+
+
 @pytest.mark.parametrize("ratio", [1.0, 1.005, 1.08, 0.85, 2.5, 4.0, -1.1547, math.nan, 0.0])
 def test_other_ratios_name_nothing(ratio: float) -> None:
     assert convention_suspect(ratio, 0.002, "coupling", 7) is None
