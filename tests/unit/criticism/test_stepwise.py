@@ -17,7 +17,7 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.criticism.selection import best_candidate
+from pipeline.criticism.selection import best_candidate, refit
 from pipeline.criticism.selection.acceptance import _form_error_factors, _same_hook, is_determined
 from pipeline.criticism.selection.candidates import Candidate
 from pipeline.criticism.selection.refit import floored_anew
@@ -242,6 +242,24 @@ def test_who_may_be_best_by_a_refit_is_refitted(monkeypatch, fall, first_matters
     found = best_candidate._refit_best(wide, passing, ())
     assert found is (lower if first_matters or both else None)
     assert tried == ["cogging", "stribeck"][: 1 + both]
+
+
+def test_a_refit_begins_within_the_reach_of_the_tangent(monkeypatch):
+    """Ten thousand in deviance away, ten fits went to and fro for a hundred seconds."""
+    wide, begun = linear_system(fitted((log(noise=1.0),))), []
+
+    def fit_from(fit, before, most):
+        begun.append((fit.values["windage.drag_nm"], fit.values["psi_wb"] - BASE["psi_wb"]))
+        assert most == before.deviance + 50.0
+        return SimpleNamespace(deviance=most + (1.0 if len(begun) < 3 else -1.0), fit=fit)
+
+    monkeypatch.setattr(refit, "gauss_newton", fit_from)
+    at = wide.fit.values["psi_wb"] - BASE["psi_wb"]
+    step, moves = {"windage.drag_nm": 0.8}, {"psi_wb": 0.01}
+    of, windage = wide.policy.selection, Candidate(effects()["windage"], ())
+    refit._along_the_step(wide, Score(windage, 50.0, 15.0, step, moves, 1.0, 2.0, policy=of))
+    assert [drag for drag, _ in begun] == pytest.approx([0.8, 0.4, 0.2])
+    assert [psi - at for _, psi in begun] == pytest.approx([0.01, 0.005, 0.0025])
 
 
 def test_windage_is_found_with_its_size():
