@@ -87,14 +87,15 @@ def test_values_that_a_bus_holds_are_samples_once() -> None:
     "values",
     [
         np.round(np.sin(40.0 * CLOCK) + 0.01 * np.random.default_rng(1).normal(size=1000), 1),
-        np.repeat(np.arange(10.0), 100),
+        np.repeat(np.arange(80.0), 100),
         np.random.default_rng(2).normal(size=1000),
         np.zeros(1000),
     ],
     ids=["coarse", "plateaus", "new in every row", "constant"],
 )
 def test_coarse_values_and_plateaus_are_not_held(values: np.ndarray) -> None:
-    made = capture("drive", t_s=CLOCK, theta_mech_rad=held(CLOCK[::10]), iq_a=values)
+    clock = np.arange(values.size) * 1e-3
+    made = capture("drive", t_s=clock, theta_mech_rad=np.repeat(clock[::10], 10), iq_a=values)
     assert held_apart(made) == (made, [])
 
 

@@ -376,6 +376,15 @@ def test_of_a_vector_no_part_is_at_its_bound(cosine, possible):
     assert material(Fit((), model, values, (), values), disc) is possible
 
 
+def test_a_part_that_is_not_there_is_at_no_bound():
+    """Excess loss alone: no eddy currents stand at zero, which is their bound."""
+    iron = effects()["iron_eddy"]
+    model = Model(machine(), (iron,))
+    sizes = {"drag_nm": 0.0, "excess_nm": 0.05, "parallel": 1.0}
+    values = {**BASE, **{f"iron_eddy.{name}": size for name, size in sizes.items()}}
+    assert material(Fit((), model, values, (), values), iron)
+
+
 @pytest.mark.parametrize(("mean", "possible"), [(0.01, True), (-0.3, False)])
 def test_what_goes_with_an_effect_is_no_larger_than_there_can_be(mean, possible):
     """No current sensor reads a third too little: with that, its ripple stood for a dead time."""
