@@ -1,16 +1,21 @@
 """Constants of judgement as fields of frozen records: unit, meaning, origin, and how to override.
 
 A policy is a frozen dataclass whose fields are sections; a section is a frozen dataclass whose
-fields are numbers or rows of numbers, made by `derived`, `calibrated` or `chosen`.
+fields are numbers or rows of numbers, some made by `derived`, `calibrated` or `chosen`. What the
+others are stands under Attributes of their section: `name : unit`, the meaning, and on a new line
+the origin, such as `chosen: why it is that`.
 """
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import Field, dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
-from typing import Any, Literal, TypeVar
+from functools import cache
+from typing import Any, Literal, TypeVar, cast
 
 from pipeline.records.content import content_digest
 from pipeline.records.errors import UsageError
@@ -20,6 +25,8 @@ Overrides = tuple[tuple[str, Number], ...]
 """Full names of fields, such as `selection.tie`, with the values that replace the defaults."""
 Kind = Literal["derived", "calibrated", "chosen"]
 Made = TypeVar("Made")
+_NUMBER = re.compile(r"^(\w+) : (.+)\n((?: {4}.+\n?)+)", re.MULTILINE)
+_ORIGIN = re.compile(" (derived|calibrated|chosen): ")
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,18 +134,31 @@ def entries(policy: Any) -> Iterator[Entry]:
         Full name, value, unit, meaning and origin.
 
     """
-    for name, one, value in _numbers(policy):
-        about = one.metadata
-        yield Entry(name, value, about["unit"], about["meaning"], about["origin"])
+    for name, section, value in _numbers(policy):
+        yield Entry(name, value, *_about(section)[name.rpartition(".")[2]])
 
 
-def _numbers(policy: Any, before: str = "") -> Iterator[tuple[str, Field[Any], Any]]:
+@cache
+def _about(section: type) -> dict[str, tuple[str, str, Origin]]:
+    """Unit, meaning and origin of the numbers of a section, as its docstring has them."""
+    about = {}
+    for name, unit, text in _NUMBER.findall(inspect.getdoc(section) or ""):
+        meaning, kind, reason = _ORIGIN.split(" ".join(text.split()), maxsplit=1)
+        about[name] = unit, meaning, Origin(cast(Kind, kind), reason)
+    for one in fields(section):
+        if one.metadata:
+            about[one.name] = tuple(one.metadata.values())
+    return about
+
+
+def _numbers(policy: Any, before: str = "") -> Iterator[tuple[str, type, Number]]:
+    """Full name, section and value of every number."""
     for one in fields(policy):
         value, name = getattr(policy, one.name), f"{before}{one.name}"
         if is_dataclass(value):
             yield from _numbers(value, f"{name}.")
         else:
-            yield name, one, value
+            yield name, type(policy), value
 
 
 def overrides(policy: Any, given: Mapping[str, Any]) -> Overrides:
@@ -158,7 +178,7 @@ def overrides(policy: Any, given: Mapping[str, Any]) -> Overrides:
         default's kind; for one of the other sign, since no judgement changes its sense.
 
     """
-    known = {entry.name: entry.value for entry in entries(policy)}
+    known = {name: value for name, _, value in _numbers(policy)}
     changed = {}
     for name, value in _flat(given):
         if name not in known:
@@ -196,7 +216,7 @@ def policy_digest(policy: Any) -> str:
         A policy.
 
     """
-    return content_digest({entry.name: entry.value for entry in entries(policy)})
+    return content_digest({name: value for name, _, value in _numbers(policy)})
 
 
 def _flat(given: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
