@@ -1,9 +1,8 @@
 """Constants of judgement as fields of frozen records: unit, meaning, origin, and how to override.
 
 A policy is a frozen dataclass whose fields are sections; a section is a frozen dataclass whose
-fields are numbers or rows of numbers, some made by `derived`, `calibrated` or `chosen`. What the
-others are stands under Attributes of their section: `name : unit`, the meaning, and on a new line
-the origin, such as `chosen: why it is that`.
+fields are numbers or rows of numbers. What each of them is stands under Attributes of its section:
+`name : unit`, the meaning, and on a new line the origin, such as `chosen: why it is that`.
 """
 
 from __future__ import annotations
@@ -48,62 +47,6 @@ class Entry:
     origin: Origin
 
 
-def derived(value: Number, unit: str, meaning: str, *, source: str) -> Any:
-    """A field whose default follows from something else: a formula, a distribution, a standard.
-
-    Parameters
-    ----------
-    value
-        The default.
-    unit
-        Its unit.
-    meaning
-        What it is, in one sentence.
-    source
-        A formula, a distribution or a standard.
-
-    """
-    return _field(value, unit, meaning, Origin("derived", source))
-
-
-def calibrated(value: Number, unit: str, meaning: str, *, by: str, on: str) -> Any:
-    """A field whose default was set `by` a command `on` data.
-
-    Parameters
-    ----------
-    value
-        The default.
-    unit
-        Its unit.
-    meaning
-        What it is, in one sentence.
-    by
-        The command.
-    on
-        The data that it was run on.
-
-    """
-    return _field(value, unit, meaning, Origin("calibrated", f"`{by}` on {on}"))
-
-
-def chosen(value: Number, unit: str, meaning: str, *, why: str) -> Any:
-    """A field whose default is a judgement, and why it is that.
-
-    Parameters
-    ----------
-    value
-        The default.
-    unit
-        Its unit.
-    meaning
-        What it is, in one sentence.
-    why
-        Why it is that.
-
-    """
-    return _field(value, unit, meaning, Origin("chosen", why))
-
-
 def section(kind: type[Made]) -> Made:
     """A field that holds a section with its defaults.
 
@@ -114,10 +57,6 @@ def section(kind: type[Made]) -> Made:
 
     """
     return field(default_factory=kind)
-
-
-def _field(value: Number, unit: str, meaning: str, origin: Origin) -> Any:
-    return field(default=value, metadata={"unit": unit, "meaning": meaning, "origin": origin})
 
 
 def entries(policy: Any) -> Iterator[Entry]:
@@ -145,9 +84,6 @@ def _about(section: type) -> dict[str, tuple[str, str, Origin]]:
     for name, unit, text in _NUMBER.findall(inspect.getdoc(section) or ""):
         meaning, kind, reason = _ORIGIN.split(" ".join(text.split()), maxsplit=1)
         about[name] = unit, meaning, Origin(cast(Kind, kind), reason)
-    for one in fields(section):
-        if one.metadata:
-            about[one.name] = tuple(one.metadata.values())
     return about
 
 
