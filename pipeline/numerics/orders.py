@@ -1,7 +1,7 @@
 """Harmonics of a quantity against shaft angle: which orders a turn are there, with what confidence.
 
 Every turn of every pass is a replicate. What repeats from turn to turn is signal, what differs is
-noise (`turn_spectrum`). The test of each order is corrected for the number of orders tested, and an
+noise (`turns`). The test of each order is corrected for the number of orders tested, and an
 order is kept only if it also predicts turns it was not fitted to. Orders are taken off the data one
 by one, strongest first, so that none is leakage of a stronger one.
 """
@@ -15,14 +15,14 @@ import numpy as np
 
 from pipeline.numerics.harmonics import harmonic_design
 from pipeline.numerics.least_squares import linear_fit
-from pipeline.numerics.turn_spectrum import (
+from pipeline.numerics.turns import (
     ComplexArray,
     Spectrum,
+    Turn,
     held_out_gain,
     noise_power,
     spectrum,
 )
-from pipeline.numerics.turns import Turn
 
 MOST_LINES = 40
 """Most orders that are found."""

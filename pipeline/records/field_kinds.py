@@ -1,6 +1,6 @@
 """Kinds of fields: what a record's annotation adds to its type for the published JSON Schema.
 
-Python and `record_of` see the bare type. `contracts.schema_form` reads the limits.
+Python and `record_of` see the bare type. `contracts.json_schema` reads the limits.
 """
 
 from __future__ import annotations

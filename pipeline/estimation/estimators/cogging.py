@@ -23,8 +23,7 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, unstated_note
 from pipeline.numerics.order_waveform import half_peak_to_peak, waveform
 from pipeline.numerics.orders import OrderLine, detection_limit, find_orders, phase_modulated
-from pipeline.numerics.turn_spectrum import Spectrum, noise_power
-from pipeline.numerics.turns import Turn, largest_order
+from pipeline.numerics.turns import Spectrum, Turn, largest_order, noise_power
 from pipeline.physics.mechanics import cogging_order
 from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Campaign, Capture

@@ -24,8 +24,7 @@ from pipeline.numerics.harmonics import harmonic_design
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.order_waveform import half_peak_to_peak, waveform
 from pipeline.numerics.orders import OrderLine, detection_limit, find_orders
-from pipeline.numerics.turn_spectrum import Spectrum
-from pipeline.numerics.turns import Turn, even_positions, largest_order, whole_turns
+from pipeline.numerics.turns import Spectrum, Turn, even_positions, largest_order, whole_turns
 from pipeline.physics.glossary import Term
 from pipeline.physics.mechanics import cogging_order
 from pipeline.physics.units import TURN_RAD

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pipeline.estimation.electrical.inductance_at_speed import TESTS, inductance_at_speed
+from pipeline.estimation.electrical.flux_slope import TESTS, inductance_at_speed
 from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.records.capture import Campaign

@@ -10,8 +10,7 @@ import numpy as np
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.policy import policy
 from pipeline.numerics.orders import OrderLine, find_orders, phase_modulated
-from pipeline.numerics.turn_spectrum import spectrum
-from pipeline.numerics.turns import Turn, largest_order, whole_turns
+from pipeline.numerics.turns import Turn, largest_order, spectrum, whole_turns
 from pipeline.physics.mechanics import cogging_order
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants

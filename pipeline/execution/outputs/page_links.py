@@ -14,7 +14,7 @@ from urllib.parse import quote
 from pipeline.execution.caches.run_cache import note_files
 from pipeline.io.storage.publish import write_whole
 from pipeline.records.naming import file_stem
-from pipeline.report.pages.link_block import Link, with_links
+from pipeline.report.pages.page import Link, with_links
 
 INDEX, LOTS = "report/index.html", "regression/report.html"
 MOTOR, DIAGNOSIS = "report/{}.html", "diagnosis/{}.html"

@@ -139,7 +139,7 @@ def _rewritten(output: Path, sheet: Datasheet, current: CurrentStatus) -> dict[s
 
     The run cache is updated too, as the page still belongs to the same work.
     """
-    from pipeline.report.pages.link_block import with_links
+    from pipeline.report.pages.page import with_links
     from pipeline.report.pages.status_block import with_status
 
     name = f"report/{file_stem(sheet.motor_id)}.html"

@@ -19,7 +19,7 @@ from pipeline.numerics.thinning import cloud_points, line_points
 from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import quantity
 from pipeline.records.evidence import Evidence, Series
-from pipeline.report.charts.axis import Axis, axis_for, padded, symmetric_axis
+from pipeline.report.charts.axis import Axis, axis_for, padded, symmetric_axis, x_ticks, y_ticks
 from pipeline.report.charts.band import filled, outlined
 from pipeline.report.charts.residual import (
     ResidualScale,
@@ -28,7 +28,6 @@ from pipeline.report.charts.residual import (
     residual_scale,
 )
 from pipeline.report.charts.svg import text
-from pipeline.report.charts.ticks import x_ticks, y_ticks
 
 Array = NDArray[np.float64]
 WIDTH, TOP, LEFT, RIGHT, BOTTOM = 640.0, 24.0, 62.0, 14.0, 38.0

@@ -9,9 +9,8 @@ import numpy as np
 
 from pipeline.physics.notation import scale_for
 from pipeline.records.diagnosis import CurvePoint
-from pipeline.report.charts.axis import axis_for, padded
+from pipeline.report.charts.axis import axis_for, padded, x_ticks, y_ticks
 from pipeline.report.charts.svg import band, line, picture, text
-from pipeline.report.charts.ticks import x_ticks, y_ticks
 
 WIDTH, LEFT, RIGHT, TOP, HEIGHT, BOTTOM = 560.0, 62.0, 14.0, 20.0, 200.0, 38.0
 

@@ -10,10 +10,9 @@ import numpy as np
 
 from pipeline.physics.notation import quantity
 from pipeline.records.error_map import ErrorMap
-from pipeline.report.charts.axis import axis_for, symmetric_axis
+from pipeline.report.charts.axis import axis_for, symmetric_axis, x_ticks, y_ticks
 from pipeline.report.charts.chart import Panel
 from pipeline.report.charts.svg import picture, text
-from pipeline.report.charts.ticks import x_ticks, y_ticks
 from pipeline.views.names import quantity_words
 
 WIDTH, LEFT, TOP, HEIGHT, BOTTOM = 400.0, 52.0, 20.0, 180.0, 38.0

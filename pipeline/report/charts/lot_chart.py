@@ -11,9 +11,8 @@ import numpy as np
 from pipeline.physics.notation import quantity
 from pipeline.records.lot_constant import ConstantResult, LotMean, MotorValue
 from pipeline.records.lot_regression import CoggingBand, OrderLevel
-from pipeline.report.charts.axis import Axis, axis_for, padded
+from pipeline.report.charts.axis import Axis, axis_for, padded, x_ticks, y_ticks
 from pipeline.report.charts.svg import band, line, picture, text
-from pipeline.report.charts.ticks import x_ticks, y_ticks
 
 WIDTH, LEFT, RIGHT, TOP, HEIGHT, BOTTOM = 640.0, 66.0, 12.0, 14.0, 190.0, 40.0
 MOST_DOTS, MOST_NAMES = 60, 14

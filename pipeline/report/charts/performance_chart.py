@@ -9,9 +9,8 @@ import numpy as np
 
 from pipeline.physics.notation import quantity
 from pipeline.records.performance import Curve, MapCell
-from pipeline.report.charts.axis import Axis, axis_for
+from pipeline.report.charts.axis import Axis, axis_for, x_ticks, y_ticks
 from pipeline.report.charts.svg import band, line, picture, text
-from pipeline.report.charts.ticks import x_ticks, y_ticks
 
 WIDTH, LEFT, TOP, HEIGHT, BOTTOM, LEGEND = 560.0, 66.0, 22.0, 230.0, 40.0, 18.0
 RIGHT, BAR, STEPS = 14.0, 12.0, 10

@@ -9,9 +9,8 @@ from html import escape
 from statistics import median
 
 from pipeline.physics.notation import COVERAGE_FACTOR, reading
-from pipeline.report.charts.axis import Axis, axis_for, padded
+from pipeline.report.charts.axis import Axis, axis_for, padded, x_ticks
 from pipeline.report.charts.svg import text
-from pipeline.report.charts.ticks import x_ticks
 
 WIDTH, LEFT, RIGHT, ROW, TOP, BOTTOM = 340.0, 76.0, 14.0, 24.0, 6.0, 24.0
 LABEL_CHARS = 10

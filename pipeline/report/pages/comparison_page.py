@@ -13,8 +13,7 @@ from pipeline.records.comparison_history import Earlier
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.charts.chart import chart
 from pipeline.report.charts.heatmap import angle_bars, heatmap
-from pipeline.report.pages.link_block import Link, link_block
-from pipeline.report.pages.page import render
+from pipeline.report.pages.page import Link, link_block, render
 from pipeline.views.comparison import KINDS, comparison_view, ratio_of, signal_title
 from pipeline.views.constants import sentence
 from pipeline.views.ladder import CURRENT, SPEED, angle_of

@@ -11,8 +11,7 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.report.charts.strip import Dot, strip_plot
-from pipeline.report.pages.link_block import Link, link_block
-from pipeline.report.pages.page import render
+from pipeline.report.pages.page import Link, link_block, render
 from pipeline.views.fleet import Column, FleetView, MotorRow, fleet_view, floors_of, known_estimates
 
 NO_LOT = "no lot"

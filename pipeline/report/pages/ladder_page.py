@@ -21,8 +21,7 @@ from pipeline.report.charts.chart import chart
 from pipeline.report.charts.curve_chart import curve_chart
 from pipeline.report.charts.heatmap import angle_bars, heatmap
 from pipeline.report.charts.step_chart import step_chart
-from pipeline.report.pages.link_block import Link, link_block
-from pipeline.report.pages.page import render
+from pipeline.report.pages.page import Link, link_block, render
 from pipeline.views.ladder import (
     CURRENT,
     SPEED,

@@ -9,8 +9,7 @@ from pipeline.physics.notation import quantity, reading, scale_for
 from pipeline.records.lot_constant import Component, ConstantResult, Gauge
 from pipeline.records.lot_regression import EffectChange, LotRegression, OrderLevel
 from pipeline.report.charts.lot_chart import cogging_chart, lot_chart
-from pipeline.report.pages.link_block import Link, link_block
-from pipeline.report.pages.page import render
+from pipeline.report.pages.page import Link, link_block, render
 from pipeline.views.lots import NONE, TONES, ConstantRow, lot_view, p_text
 
 MOST_MOTORS = 200

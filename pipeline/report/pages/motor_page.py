@@ -17,8 +17,7 @@ from pipeline.records.naming import file_stem
 from pipeline.records.performance import Performance
 from pipeline.report.charts.chart import chart
 from pipeline.report.charts.performance_chart import band_chart, efficiency_chart
-from pipeline.report.pages.link_block import Link, link_block
-from pipeline.report.pages.page import render
+from pipeline.report.pages.page import Link, link_block, render
 from pipeline.report.pages.status_block import status_block
 from pipeline.views.constants import GROUPS, KEY_CONSTANTS, OTHER, grouped
 from pipeline.views.model_words import model_words

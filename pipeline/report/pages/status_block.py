@@ -8,8 +8,7 @@ from __future__ import annotations
 from pipeline.records.current_status import CurrentStatus
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.model_verdict import MODEL_REASON
-from pipeline.report.pages.link_block import replaced
-from pipeline.report.pages.page import render
+from pipeline.report.pages.page import render, replaced
 from pipeline.views.model_words import model_words
 from pipeline.views.status_text import status_lines, status_points, status_words
 

@@ -14,7 +14,7 @@ from pipeline.estimation.estimators.spin_down import ESTIMATOR as SPIN_DOWN
 from pipeline.estimation.estimators.torque_map import ESTIMATOR as TORQUE_MAP
 from pipeline.numerics.order_waveform import half_peak_to_peak
 from pipeline.numerics.orders import OrderLine
-from pipeline.numerics.turn_spectrum import Spectrum
+from pipeline.numerics.turns import Spectrum
 from pipeline.records.capture import Campaign
 from tests.simulated import design
 from tests.unit.estimation.mechanical import chain, fitted, number, recorded, without_some_angles

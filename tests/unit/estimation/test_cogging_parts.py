@@ -10,8 +10,7 @@ import pytest
 from pipeline.estimation.estimators import cogging, holding_current
 from pipeline.estimation.mechanical import slow_turns
 from pipeline.numerics.orders import OrderLine
-from pipeline.numerics.turn_spectrum import Spectrum, noise_power
-from pipeline.numerics.turns import Turn
+from pipeline.numerics.turns import Spectrum, Turn, noise_power
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from tests.unit.estimation.signals import capture, known_value

@@ -16,8 +16,17 @@ from pipeline.numerics.orders import (
     orders_present,
     phase_modulated,
 )
-from pipeline.numerics.turn_spectrum import Spectrum, held_out_gain, noise_power, spectrum
-from pipeline.numerics.turns import Turn, even_positions, largest_order, passes, whole_turns
+from pipeline.numerics.turns import (
+    Spectrum,
+    Turn,
+    even_positions,
+    held_out_gain,
+    largest_order,
+    noise_power,
+    passes,
+    spectrum,
+    whole_turns,
+)
 
 
 def turns(

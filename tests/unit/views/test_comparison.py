@@ -11,7 +11,7 @@ import pytest
 from pipeline.records.comparison import Comparison, ModelParameter, Move, SignalError, Trace
 from pipeline.records.comparison_history import Earlier, document_of, history_of, with_latest
 from pipeline.report.pages.comparison_page import render_comparison
-from pipeline.report.pages.link_block import Link
+from pipeline.report.pages.page import Link
 from pipeline.report.text.comparison_text import comparison_text
 from pipeline.views.comparison import comparison_view
 from tests.unit.ladders import make_map, make_turn
