@@ -1,14 +1,49 @@
 """Every effect of `contract/effects.md` with its parameters and a typical size for any motor.
 
 The first parameter, `size`, is the one that is zero where the effect is absent; the others shape
-it. Forms are deliberately not those of the usual textbook model, see `docs/simulator.md`.
+it. Forms are deliberately not those of the usual textbook model, see `docs/simulator.md`. By unit
+of the size and what it does:
+
+- copper_temperature [1/K]: R (1 + size (T_w - 25))
+- magnet_temperature [1/K]: psi (1 + size (T_m - 25))
+- skin_effect [1]: R (1 + size u²/(1 + (u/knee)²)), u the electrical speed over rated
+- phase_imbalance [1]: R_x = R (1 + size cos(120° x - angle_deg)), x = 0, 1, 2 for a, b, c
+- dead_time [V]: each phase loses size * i/sqrt(i² + knee_a²), of which a compensation gives back
+  its share `compensated`, in proportion to i up to ramp_a and in full beyond
+- voltage_scale [1]: recorded voltages times 1 + size
+- sample_delay [s]: dq voltages are logged in the frame of the rotor `size` earlier than they act
+- current_delay [s]: phase currents are sampled `size` late
+- torque_lag [s]: first-order lag of the transducer
+- current_scale [1]: all current sensors times 1 + size
+- current_gain [1]: the sensor of one phase times 1 + size
+- current_offset [A]: the sensor of one phase plus size
+- angle_offset [rad]: electrical angle plus size
+- angle_eccentricity [rad]: mechanical angle plus size * sin(order * theta + phase_rad)
+- saturation [1]: apparent Lq falls by size at rated q current (power law of flux), Ld by size_d
+  at rated d current along the magnet (root form; 0.4 of size if not given); form 1 is a sinh of
+  flux instead of the power
+- cross_saturation [1]: apparent Lq falls by size at rated d current along the magnet; reciprocal
+- bemf_harmonics [1]: 5th, 7th, 11th, 13th of the phase flux linkage
+- inductance_harmonics [1]: 1/Lq times 1 + size cos(6 eps + phase_rad), 1/Ld with size * ratio_d
+- iron_eddy [N·m·s/rad]: drag size * omega (psi/psi_pm)²/(1 + (omega/knee_rad_s)²)
+- iron_hysteresis [N·m]: drag size * (psi/psi_pm)^1.6 against the direction of rotation
+- coulomb_friction [N·m]: size against the direction
+- stribeck [N·m]: extra size/(1 + (omega/omega_s)²) against the direction
+- windage [N·m·(s/rad)²]: size * omega_rated² * |omega/omega_rated|^exponent against the direction
+- load_dependent_friction [1]: size * |electromagnetic torque| against the direction
+- presliding [rad]: Dahl bristle: friction builds up over size of travel after a reversal
+- cogging [N·m]: orders LCM(slots, 2p) and twice it, and by request `slots` and 2p
+- unbalance [N·m]: size * sin(theta + phase_rad)
+- compliance [rad/(N·m)]: two masses, shaft compliance size, load_fraction of J far
+- backlash [rad]: total gap of the coupling
+- torque_scale [1]: transducer times 1 + size
+- torque_offset [N·m]: transducer plus size
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 from pipeline.simulator.design import Motor, Size
 
@@ -20,15 +55,6 @@ NEVER_NEGATIVE = frozenset({
 })  # fmt: skip
 """Effects whose `size` is a loss, a time, a gap or an amplitude that has a phase of its own."""
 ALWAYS = ("copper_temperature", "magnet_temperature", "coulomb_friction")
-
-
-@dataclass(frozen=True, slots=True)
-class Form:
-    """One effect: the unit of its size, what it does in words, and its typical parameters."""
-
-    unit: str
-    words: str
-    typical: Defaults
 
 
 def cogging_order(motor: Motor) -> int:
@@ -76,144 +102,64 @@ def _compliance(motor: Motor) -> dict[str, float]:
     return {"size": 1.0 / stiffness, "load_fraction": fraction, "damping_ratio": 0.03}
 
 
-FORMS: dict[str, Form] = {
-    "copper_temperature": Form(
-        "1/K", "R (1 + size (T_w - 25))", lambda m: {"size": m.temp_coeff_copper_1_k}
-    ),
-    "magnet_temperature": Form(
-        "1/K", "psi (1 + size (T_m - 25))", lambda m: {"size": m.temp_coeff_magnet_1_k}
-    ),
-    "skin_effect": Form(
-        "1",
-        "R (1 + size u²/(1 + (u/knee)²)), u the electrical speed over rated",
-        lambda _: {"size": 0.08, "knee": 3.0},
-    ),
-    "phase_imbalance": Form(
-        "1",
-        "R_x = R (1 + size cos(120° x - angle_deg)), x = 0, 1, 2 for a, b, c",
-        lambda _: {"size": 0.04, "angle_deg": 20.0},
-    ),
-    "dead_time": Form(
-        "V",
-        "each phase loses size * i/sqrt(i² + knee_a²), of which a compensation gives back its "
-        "share `compensated`, in proportion to i up to ramp_a and in full beyond",
-        lambda m: {
-            "size": 0.005 * m.vdc_v,
-            "knee_a": 0.01 * m.current_rated_a,
-            "compensated": 0.0,
-            "ramp_a": 0.1 * m.current_rated_a,
-        },
-    ),
-    "voltage_scale": Form("1", "recorded voltages times 1 + size", lambda _: {"size": 0.02}),
-    "sample_delay": Form(
-        "s",
-        "dq voltages are logged in the frame of the rotor `size` earlier than they act",
-        lambda m: {"size": 0.03 / speed_elec_rad_s(m)},
-    ),
-    "current_delay": Form(
-        "s",
-        "phase currents are sampled `size` late",
-        lambda m: {"size": 0.03 / speed_elec_rad_s(m)},
-    ),
-    "torque_lag": Form("s", "first-order lag of the transducer", lambda _: {"size": 2e-3}),
-    "current_scale": Form("1", "all current sensors times 1 + size", lambda _: {"size": 0.02}),
-    "current_gain": Form(
-        "1", "the sensor of one phase times 1 + size", lambda _: {"size": 0.02, "phase": 0.0}
-    ),
-    "current_offset": Form(
-        "A",
-        "the sensor of one phase plus size",
-        lambda m: {"size": 0.008 * m.current_rated_a, "phase": 1.0},
-    ),
-    "angle_offset": Form("rad", "electrical angle plus size", lambda _: {"size": 0.03}),
-    "angle_eccentricity": Form(
-        "rad",
-        "mechanical angle plus size * sin(order * theta + phase_rad)",
-        lambda m: {"size": 0.04 / m.pole_pairs, "phase_rad": 0.6, "order": 1.0},
-    ),
-    "saturation": Form(
-        "1",
-        "apparent Lq falls by size at rated q current (power law of flux), Ld by size_d at rated "
-        "d current along the magnet (root form; 0.4 of size if not given); form 1 is a sinh of "
-        "flux instead of the power",
-        lambda _: {"size": 0.18, "size_d": math.nan, "exponent": 3.0, "form": 0.0},
-    ),
-    "cross_saturation": Form(
-        "1",
-        "apparent Lq falls by size at rated d current along the magnet; reciprocal",
-        lambda _: {"size": 0.08},
-    ),
-    "bemf_harmonics": Form("1", "5th, 7th, 11th, 13th of the phase flux linkage", _harmonics),
-    "inductance_harmonics": Form(
-        "1",
-        "1/Lq times 1 + size cos(6 eps + phase_rad), 1/Ld with size * ratio_d",
-        lambda _: {"size": 0.05, "ratio_d": 0.4, "phase_rad": 0.3},
-    ),
-    "iron_eddy": Form(
-        "N·m·s/rad",
-        "drag size * omega (psi/psi_pm)²/(1 + (omega/knee_rad_s)²)",
-        lambda m: {
-            "size": 0.012 * m.torque_rated_nm / m.speed_rated_rad_s,
-            "knee_rad_s": 5.0 * m.speed_rated_rad_s,
-        },
-    ),
-    "iron_hysteresis": Form(
-        "N·m",
-        "drag size * (psi/psi_pm)^1.6 against the direction of rotation",
-        lambda m: {"size": 0.008 * m.torque_rated_nm},
-    ),
-    "coulomb_friction": Form(
-        "N·m", "size against the direction", lambda m: {"size": m.torque_coulomb_nm}
-    ),
-    "stribeck": Form(
-        "N·m",
-        "extra size/(1 + (omega/omega_s)²) against the direction",
-        lambda m: {
-            "size": 0.008 * m.torque_rated_nm,
-            "omega_s_rad_s": 0.03 * m.speed_rated_rad_s,
-        },
-    ),
-    "windage": Form(
-        "N·m·(s/rad)²",
-        "size * omega_rated² * |omega/omega_rated|^exponent against the direction",
-        lambda m: {
-            "size": 0.012 * m.torque_rated_nm / m.speed_rated_rad_s**2,
-            "exponent": 2.0,
-        },
-    ),
-    "load_dependent_friction": Form(
-        "1", "size * |electromagnetic torque| against the direction", lambda _: {"size": 0.02}
-    ),
-    "presliding": Form(
-        "rad",
-        "Dahl bristle: friction builds up over size of travel after a reversal",
-        lambda m: {"size": 0.05 * 2.0 * math.pi / cogging_order(m)},
-    ),
-    "cogging": Form(
-        "N·m",
-        "orders LCM(slots, 2p) and twice it, and by request `slots` and 2p",
-        lambda m: {
-            "size": 0.015 * m.torque_rated_nm,
-            "second": 0.15,
-            "order_slots": 0.0,
-            "order_poles": 0.0,
-            "phase_rad": 0.7,
-        },
-    ),
-    "unbalance": Form(
-        "N·m",
-        "size * sin(theta + phase_rad)",
-        lambda m: {"size": 0.01 * m.torque_rated_nm, "phase_rad": 1.1},
-    ),
-    "compliance": Form(
-        "rad/(N·m)", "two masses, shaft compliance size, load_fraction of J far", _compliance
-    ),
-    "backlash": Form("rad", "total gap of the coupling", lambda m: {"size": 0.05 / m.pole_pairs}),
-    "torque_scale": Form("1", "transducer times 1 + size", lambda _: {"size": 0.02}),
-    "torque_offset": Form(
-        "N·m", "transducer plus size", lambda m: {"size": 0.006 * m.torque_rated_nm}
-    ),
+FORMS: dict[str, Defaults] = {
+    "copper_temperature": lambda m: {"size": m.temp_coeff_copper_1_k},
+    "magnet_temperature": lambda m: {"size": m.temp_coeff_magnet_1_k},
+    "skin_effect": lambda _: {"size": 0.08, "knee": 3.0},
+    "phase_imbalance": lambda _: {"size": 0.04, "angle_deg": 20.0},
+    "dead_time": lambda m: {
+        "size": 0.005 * m.vdc_v,
+        "knee_a": 0.01 * m.current_rated_a,
+        "compensated": 0.0,
+        "ramp_a": 0.1 * m.current_rated_a,
+    },
+    "voltage_scale": lambda _: {"size": 0.02},
+    "sample_delay": lambda m: {"size": 0.03 / speed_elec_rad_s(m)},
+    "current_delay": lambda m: {"size": 0.03 / speed_elec_rad_s(m)},
+    "torque_lag": lambda _: {"size": 2e-3},
+    "current_scale": lambda _: {"size": 0.02},
+    "current_gain": lambda _: {"size": 0.02, "phase": 0.0},
+    "current_offset": lambda m: {"size": 0.008 * m.current_rated_a, "phase": 1.0},
+    "angle_offset": lambda _: {"size": 0.03},
+    "angle_eccentricity": lambda m: {
+        "size": 0.04 / m.pole_pairs,
+        "phase_rad": 0.6,
+        "order": 1.0,
+    },
+    "saturation": lambda _: {"size": 0.18, "size_d": math.nan, "exponent": 3.0, "form": 0.0},
+    "cross_saturation": lambda _: {"size": 0.08},
+    "bemf_harmonics": _harmonics,
+    "inductance_harmonics": lambda _: {"size": 0.05, "ratio_d": 0.4, "phase_rad": 0.3},
+    "iron_eddy": lambda m: {
+        "size": 0.012 * m.torque_rated_nm / m.speed_rated_rad_s,
+        "knee_rad_s": 5.0 * m.speed_rated_rad_s,
+    },
+    "iron_hysteresis": lambda m: {"size": 0.008 * m.torque_rated_nm},
+    "coulomb_friction": lambda m: {"size": m.torque_coulomb_nm},
+    "stribeck": lambda m: {
+        "size": 0.008 * m.torque_rated_nm,
+        "omega_s_rad_s": 0.03 * m.speed_rated_rad_s,
+    },
+    "windage": lambda m: {
+        "size": 0.012 * m.torque_rated_nm / m.speed_rated_rad_s**2,
+        "exponent": 2.0,
+    },
+    "load_dependent_friction": lambda _: {"size": 0.02},
+    "presliding": lambda m: {"size": 0.05 * 2.0 * math.pi / cogging_order(m)},
+    "cogging": lambda m: {
+        "size": 0.015 * m.torque_rated_nm,
+        "second": 0.15,
+        "order_slots": 0.0,
+        "order_poles": 0.0,
+        "phase_rad": 0.7,
+    },
+    "unbalance": lambda m: {"size": 0.01 * m.torque_rated_nm, "phase_rad": 1.1},
+    "compliance": _compliance,
+    "backlash": lambda m: {"size": 0.05 / m.pole_pairs},
+    "torque_scale": lambda _: {"size": 0.02},
+    "torque_offset": lambda m: {"size": 0.006 * m.torque_rated_nm},
 }
+"""Parameters of each effect at a typical size, by the motor."""
 
 
 def parameters(name: str, motor: Motor, size: Size | None = None) -> dict[str, float]:
@@ -231,7 +177,7 @@ def parameters(name: str, motor: Motor, size: Size | None = None) -> dict[str, f
     Returns
     -------
     dict
-        By name, in the units of `FORMS`.
+        By name, in the units of their suffixes; `size` in that of the effect.
 
     Raises
     ------
@@ -239,10 +185,9 @@ def parameters(name: str, motor: Motor, size: Size | None = None) -> dict[str, f
         There is no such effect, or no such parameter of it.
 
     """
-    form = FORMS.get(name)
-    if form is None:
+    if name not in FORMS:
         raise ValueError(f"no effect {name}; there are {', '.join(sorted(FORMS))}")
-    full = form.typical(motor)
+    full = FORMS[name](motor)
     sizes: Mapping[str, float] = {}
     if size is not None:
         sizes = size if isinstance(size, Mapping) else {"size": float(size)}
