@@ -88,7 +88,7 @@ def _run(command: Command, flags: Flags, words: Sequence[str]) -> Outcome:
     if flags.info:
         return Outcome(text=origin_text(command, settings))
     with waiting("" if command.shows_progress else command.name):
-        stage = importlib.import_module(f"pipeline.stages.{command.stage}")
+        stage = importlib.import_module(f"pipeline.stages.{command.stage or command.name}")
         outcome: Outcome = stage.main(settings)
     if not settings.timings:
         outcome = replace(outcome, timings=())

@@ -71,15 +71,8 @@ class Datasheets(ByMotor[Datasheet]):
     def summary(self) -> pl.DataFrame:
         """One row a motor: status with its reasons, and version."""
         rows = [
-            {
-                "motor_id": name,
-                "motor_type": one.motor_type,
-                "lot": one.lot,
-                "status": one.status,
-                "why": list(one.why),
-                "version": one.version,
-                "code_version": one.code_version,
-            }
+            {key: getattr(one, key) for key in DATASHEET_SCHEMA}
+            | {"motor_id": name, "why": list(one.why)}
             for name, one in self.motors.items()
         ]
         return frames.frame(rows, DATASHEET_SCHEMA)

@@ -48,7 +48,8 @@ def frame(rows: Iterable[Mapping[str, Any]], schema: Mapping[str, Any]) -> pl.Da
         One row each, columns as in `schema`.
 
     """
-    return pl.DataFrame(list(rows), schema=dict(schema), orient="row")
+    chosen = [{name: row[name] for name in schema} for row in rows]
+    return pl.DataFrame(chosen, schema=dict(schema), orient="row")
 
 
 def capture_rows(campaign: Campaign) -> list[dict[str, Any]]:
@@ -105,19 +106,7 @@ def check_rows(motor_id: str, checks: Sequence[Check]) -> list[dict[str, Any]]:
         evaluated.
 
     """
-    return [
-        {
-            "motor_id": motor_id,
-            "check": one.name,
-            "status": one.status,
-            "value": one.value,
-            "limit": one.limit,
-            "unit": one.unit,
-            "meaning": one.meaning,
-            "suspect": one.suspect,
-        }
-        for one in checks
-    ]
+    return [{"motor_id": motor_id, "check": one.name, **one.document()} for one in checks]
 
 
 def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
@@ -135,15 +124,8 @@ def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
         rows.
 
     """
-    return [
-        {
-            "file": one.file,
-            "severity": one.severity,
-            "code": one.code,
-            "first_row": None if one.rows is None else one.rows[0],
-            "last_row": None if one.rows is None else one.rows[1],
-            "message": one.message,
-            "remedy": one.remedy,
-        }
-        for one in findings
-    ]
+    rows = []
+    for one in findings:
+        first, last = one.rows or (None, None)
+        rows.append({**one.document(), "first_row": first, "last_row": last})
+    return rows

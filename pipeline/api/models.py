@@ -75,13 +75,13 @@ class Comparisons(ByMotor[Comparison]):
             for name, model in self.motors.items()
             for one in model.errors
         ]
-        return frames.frame([_only(row, ERROR_SCHEMA) for row in rows], ERROR_SCHEMA)
+        return frames.frame(rows, ERROR_SCHEMA)
 
     @property
     def parameters(self) -> pl.DataFrame:
         """One row a fitted parameter; a parameter that the data do not determine has no value."""
         rows = [
-            _only({"motor_id": name, "parameter": key, **one.document()}, PARAMETER_SCHEMA)
+            {"motor_id": name, "parameter": key, **one.document()}
             for name, model in self.motors.items()
             for key, one in model.parameters.items()
         ]
@@ -184,10 +184,7 @@ class Diagnoses(ByMotor[Diagnosis]):
     def ranking(self) -> pl.DataFrame:
         """One row an effect: its evidence, and the effects it could be confused with."""
         rows = [
-            _only(
-                {"motor_id": name, "missing": one.effect in model.missing, **one.document()},
-                RANKING_SCHEMA,
-            )
+            {"motor_id": name, "missing": one.effect in model.missing, **one.document()}
             for name, model in self.motors.items()
             for one in model.ranking
         ]
@@ -412,7 +409,3 @@ def model_spec(
     names = names_of(effects)
     known_effects(names, effects_path)
     return ModelSpec(name, tuple(names), effects_path, policy_changes(policy or {}))
-
-
-def _only(row: Mapping[str, Any], schema: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: row[name] for name in schema}

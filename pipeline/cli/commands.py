@@ -19,16 +19,16 @@ INDENT = " " * 6
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """`stage` is a module of `stages/` with `main(settings)`; `words` its one-line description.
+    """A module of `stages/` with `main(settings)`, and `words`, its one-line description.
 
     `positional` are keys that may be given without their name, in this order; `free` is the key
     that collects, as text, every name=value that is no key of the command. `common` are the keys
     that `--help` lists first, `examples` what may stand after the program's name.
-    `shows_progress` is True of a command that shows on a terminal by itself how far it is.
+    `shows_progress` is True of a command that shows on a terminal by itself how far it is. `stage`
+    is the module's name where that is not the command's.
     """
 
     name: str
-    stage: str
     settings: type[s.Settings]
     words: str
     positional: tuple[str, ...] = ()
@@ -36,6 +36,7 @@ class Command:
     common: tuple[str, ...] = ()
     examples: tuple[str, ...] = ()
     shows_progress: bool = False
+    stage: str = ""
 
 
 def program() -> str:
@@ -51,7 +52,6 @@ def _index(*commands: Command) -> dict[str, Command]:
 COMMANDS = _index(
     Command(
         "run",
-        "run",
         s.RunSettings,
         "captures in; datasheets, checks, report, recordings out",
         common=("input", "output", "source", "model", "limits", "release"),
@@ -63,7 +63,6 @@ COMMANDS = _index(
         shows_progress=True,
     ),
     Command(
-        "compare",
         "compare",
         s.CompareSettings,
         "model against held-out measurements, signal by signal: where it is off",
@@ -77,7 +76,6 @@ COMMANDS = _index(
     ),
     Command(
         "diagnose",
-        "diagnose",
         s.DiagnoseSettings,
         "which physical effect the model lacks, how sure that is, what else it could be",
         common=("input", "output", "motor", "model"),
@@ -89,7 +87,6 @@ COMMANDS = _index(
     ),
     Command(
         "inspect",
-        "inspect_file",
         s.InspectSettings,
         "what a file or folder holds, which columns it knows, a source map that reads it",
         positional=("file",),
@@ -99,9 +96,9 @@ COMMANDS = _index(
             "inspect captures map=bench.yaml check=true pole_pairs=7 unit.Moment=mNm",
         ),
         free="answers",
+        stage="inspect_file",
     ),
     Command(
-        "plan",
         "plan",
         s.PlanSettings,
         "which test to record next, for which constant or doubt",
@@ -110,7 +107,6 @@ COMMANDS = _index(
         examples=("plan G52-0601 output=reports/demo", "plan input=captures"),
     ),
     Command(
-        "regress",
         "regress",
         s.RegressSettings,
         "lot against lots, or code against code: the same, or what changed",
@@ -121,7 +117,6 @@ COMMANDS = _index(
         ),
     ),
     Command(
-        "export",
         "export",
         s.ExportSettings,
         "a released datasheet for a controller or simulator, conventions converted",
@@ -134,7 +129,6 @@ COMMANDS = _index(
         ),
     ),
     Command(
-        "registry",
         "registry",
         s.RegistrySettings,
         "every datasheet version: list, show, diff, at, verify, approve, revoke, tag",
@@ -149,14 +143,12 @@ COMMANDS = _index(
     ),
     Command(
         "review",
-        "review",
         s.ReviewSettings,
         "recordings in the Rerun viewer: fleet, motor, ladder, lot against lot",
         common=("output", "motor", "lot", "web"),
         examples=("review output=reports/demo", "review motor=G52-0601 web=true"),
     ),
     Command(
-        "simulate",
         "simulate",
         s.SimulateSettings,
         "captures of a simulated motor, and truth",
@@ -168,13 +160,11 @@ COMMANDS = _index(
     ),
     Command(
         "schemas",
-        "schemas",
         s.Settings,
         "JSON Schemas and glossary, built into the checkout",
         examples=("schemas",),
     ),
     Command(
-        "calc",
         "calc",
         s.CalcSettings,
         "a conversion between conventions, with its formula",

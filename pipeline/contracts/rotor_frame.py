@@ -116,24 +116,22 @@ def _by_back_emf(
 ) -> Frame:
     """Pole pairs times the shaft's angle, with the zero that the back-EMF shows in some `rows`."""
     speed = speed_of(t_s, theta_rad[rows])
-    turns = turning_voltage(vectors[0], theta_rad[rows], speed)
-    if turns.pairs is None:
+    pairs = turning_voltage(vectors[0], theta_rad[rows], speed)
+    if pairs is None:
         return Frame(None, f"no count of turns of the voltage a turn of {SHAFT} stands out")
-    if turns.pairs < 0 or (pole_pairs is not None and turns.pairs != pole_pairs):
-        against = "against it; exchange two phases, or the angle's sign" if turns.pairs < 0 else ""
+    if pairs < 0 or (pole_pairs is not None and pairs != pole_pairs):
+        against = "against it; exchange two phases, or the angle's sign" if pairs < 0 else ""
         stated = against or f"where pole_pairs states {pole_pairs}"
-        return Frame(
-            None, f"the voltages turn {abs(turns.pairs)} times a turn of {SHAFT}, {stated}"
-        )
-    zero = magnet_angle(*vectors, theta_rad[rows], speed, turns.pairs)
+        return Frame(None, f"the voltages turn {abs(pairs)} times a turn of {SHAFT}, {stated}")
+    zero = magnet_angle(*vectors, theta_rad[rows], speed, pairs)
     if not zero.u_rad <= MOST_U_RAD:
         words = (
             f"the back-EMF shows the angle's zero to {zero.u_rad:.2g} rad alone, where "
             f"{MOST_U_RAD:g} are needed: turn in both senses, at changing speed"
         )
         return Frame(None, words)
-    angle = turns.pairs * theta_rad + zero.offset_rad
-    basis = f"{turns.pairs} {SHAFT} {zero.offset_rad:+.4f} ± {zero.u_rad:.1g} rad"
+    angle = pairs * theta_rad + zero.offset_rad
+    basis = f"{pairs} {SHAFT} {zero.offset_rad:+.4f} ± {zero.u_rad:.1g} rad"
     return Frame(angle, f"{basis}, by the back-EMF in their voltages")
 
 

@@ -34,16 +34,6 @@ SPEED_WINDOW_S = 0.005
 """Over which an angle's slope is taken: short against a motion, long against an encoder's steps."""
 
 
-class TurningVoltage(NamedTuple):
-    """Turns of the voltage for a turn of the shaft (below zero: against it), None where no count
-    is clear; and how much stronger it is than the next one.
-    """
-
-    pairs: int | None
-    strongest: int
-    lead: float
-
-
 class MagnetAngle(NamedTuple):
     """Electrical angle of the magnet at the shaft's zero and its standard uncertainty [rad]."""
 
@@ -57,7 +47,7 @@ def speed_of(t_s: Array, theta_mech_rad: Array) -> Array:
     return smooth_speed(t_s, theta_mech_rad, max(SPEED_WINDOW_S, 10.0 * period))
 
 
-def turning_voltage(volts: Complex, theta_mech_rad: Array, omega_rad_s: Array) -> TurningVoltage:
+def turning_voltage(volts: Complex, theta_mech_rad: Array, omega_rad_s: Array) -> int | None:
     """The count at which a voltage turns with the shaft.
 
     Parameters
@@ -66,6 +56,12 @@ def turning_voltage(volts: Complex, theta_mech_rad: Array, omega_rad_s: Array) -
         Space vector in the stator's frame.
     theta_mech_rad, omega_rad_s : array [n]
         Angle and speed of the shaft.
+
+    Returns
+    -------
+    int or None
+        Turns of the voltage for a turn of the shaft, below zero against it; None where no count is
+        clear.
 
     Notes
     -----
@@ -85,7 +81,7 @@ def turning_voltage(volts: Complex, theta_mech_rad: Array, omega_rad_s: Array) -
     first, second = sorted(sizes, key=lambda k: -sizes[k])[:2]
     lead = sizes[first] / sizes[second] if sizes[second] > 0.0 else math.inf
     known = sizes[first] > 0.0 and lead >= CLEAR
-    return TurningVoltage(first if known else None, first, lead)
+    return first if known else None
 
 
 def magnet_angle(

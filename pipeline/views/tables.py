@@ -70,27 +70,15 @@ def constant_rows(
     rows = []
     for one in estimates:
         low, high = one.interval() if one.known else (None, None)
-        document = one.document()
-        rows.append(
-            {
-                "motor_id": motor_id,
-                "motor_type": motor_type,
-                "lot": lot,
-                "constant": one.name,
-                "value": None if one.value is None else one.number,
-                "unit": one.unit,
-                "u": document["u"],
-                "u_a": document["u_a"],
-                "u_b": document["u_b"],
-                "dof": document["dof"],
-                "low_95": low,
-                "high_95": high,
-                "status": one.status,
-                "method": one.method,
-                "captures": list(one.captures),
-                "note": one.note,
-            }
-        )
+        own: dict[str, Any] = {
+            "motor_id": motor_id,
+            "motor_type": motor_type,
+            "lot": lot,
+            "constant": one.name,
+        }
+        value = None if one.value is None else one.number
+        own |= {**one.document(), "value": value, "low_95": low, "high_95": high}
+        rows.append({key: own[key] for key in CONSTANT_SCHEMA})
     return rows
 
 

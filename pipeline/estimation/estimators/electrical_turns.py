@@ -101,7 +101,7 @@ def turns_of(capture: Capture) -> Turns | None:
     slope, u_slope, apart = _slope(data) if ANGLE in data else (None, math.inf, math.inf)
     volts, voltage = _stator_voltage(data), None
     if volts is not None:
-        voltage = turning_voltage(volts, theta, speed_of(data["t_s"], theta)).pairs
+        voltage = turning_voltage(volts, theta, speed_of(data["t_s"], theta))
     return Turns(capture, slope, u_slope, apart, voltage)
 
 

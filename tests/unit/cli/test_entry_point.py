@@ -268,7 +268,7 @@ def test_interpolation_in_other_keys_is_refused() -> None:
 
 
 def test_positional_words_take_their_names() -> None:
-    command = Command("run", "run", RunSettings, "", positional=("input", "output"))
+    command = Command("run", RunSettings, "", positional=("input", "output"))
     settings = load_settings(command, ["some dir", "report=false", "there"])
     assert isinstance(settings, RunSettings)
     assert (settings.input, settings.output, settings.report) == ("some dir", "there", False)
