@@ -21,15 +21,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.records.agreement import Disagreement, Group, Reading
+from pipeline.records.capture import Array
 from pipeline.records.datasheet import Check
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted
 from pipeline.records.uncertainty import propagate
 
-Array = NDArray[np.float64]
 CODE = "captures_disagree"
 REMEDY = "look at the serial numbers: give each motor its own motor_id, or take the odd files out"
 MOST_NAMED = 6

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records.capture import Array
 from pipeline.records.effect_table import EffectTable
 
-Array = NDArray[np.float64]
 OF_PEAK = 0.02
 """Share of a table's peak by which a simulator's own form may miss it and still hold it."""
 

@@ -6,15 +6,14 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.lots.sample import Member
 from pipeline.lots.traits import NO_COGGING, SPECTRUM
+from pipeline.records.capture import Array
 from pipeline.records.estimate import Order
 from pipeline.records.lot_constant import Side
 from pipeline.records.lot_regression import CoggingBand, OrderLevel
 
-Array = NDArray[np.float64]
 POINTS_A_PERIOD = 24
 MOST_POINTS = 2049
 MOST_ORDERS = 12

@@ -10,12 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from pipeline.records.capture import Array
 from pipeline.records.lot_constant import Gauge
 
-Array = NDArray[np.float64]
 POOL_FROM = 0.25
 GOOD, ACCEPTABLE = 0.10, 0.30
 DRAWS = 20_000

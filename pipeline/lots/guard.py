@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from pipeline.records.capture import Array
 from pipeline.records.lot_constant import Decision
 
-Array = NDArray[np.float64]
 NODES = 400
 REACH_SD = 9.0
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pipeline.records.capture import Array
 
 _BLOCK = 25
 """Rows whose mean is looked at: what persists for longer is no noise."""

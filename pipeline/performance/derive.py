@@ -17,7 +17,7 @@ from pipeline.performance.draws import interval, uniform_draws
 from pipeline.performance.efficiency import efficiency_map
 from pipeline.performance.envelope import Point, most_torque, regime_of, shaft_torque_nm
 from pipeline.performance.heat import Heat, continuous_current_a, time_to_limit_s
-from pipeline.performance.machine import Array, Machine, drag_nm, voltage_v
+from pipeline.performance.machine import Machine, drag_nm, voltage_v
 from pipeline.performance.sources import (
     COPPER,
     ELECTRICAL,
@@ -29,6 +29,7 @@ from pipeline.performance.sources import (
     sources_of,
 )
 from pipeline.physics.units import REFERENCE_DEGC
+from pipeline.records.capture import Array
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import ModelVerdict

@@ -10,11 +10,10 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records.capture import Array
 from pipeline.records.estimate import Estimate
 
-Array = NDArray[np.float64]
 HALF = 200
 """Pairs of draws; the percentiles of 400 are known to some 8 % of the interval's half width."""
 SEED = 60034

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.performance.envelope import current_for
-from pipeline.performance.machine import Array, Machine, copper_w, drag_nm, inverter_w, torque_nm
+from pipeline.performance.machine import Machine, copper_w, drag_nm, inverter_w, torque_nm
+from pipeline.records.capture import Array
 from pipeline.records.performance import MapCell, Operation
 
 MAP_SPEEDS, MAP_TORQUES = 16, 12

@@ -11,14 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.performance.machine import (
-    Array,
-    Machine,
-    drag_nm,
-    inductances_h,
-    torque_nm,
-    voltage_v,
-)
+from pipeline.performance.machine import Machine, drag_nm, inductances_h, torque_nm, voltage_v
+from pipeline.records.capture import Array
 
 COARSE_DEG, FINER, ROUNDS = 3.0, ((3.0, 41), (0.15, 13)), 8
 LEAST_DEG, MOST_DEG = -45.0, 90.0

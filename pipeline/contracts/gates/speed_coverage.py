@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.rotation import turned_rad
 from pipeline.physics.units import TURN_RAD
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 from pipeline.records.errors import CaptureError
 
 CODE = "speed_coverage"
@@ -55,7 +54,7 @@ def _coast(capture: Capture, options: Mapping[str, float]) -> Passed:
     )
 
 
-def _speeds_of_parts(capture: Capture) -> NDArray[np.float64]:
+def _speeds_of_parts(capture: Capture) -> Array:
     """Speed [100 or fewer, rad/s] of each hundredth of a record: its median, or the angle's travel.
 
     Fewer than a hundred rows are a part each.

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.contracts.protocol import Gate, Passed, span_of
 from pipeline.physics.glossary import TESTS
 from pipeline.physics.units import TURN_RAD
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Array, Capture
 from pipeline.records.errors import CaptureError
 from pipeline.records.naming import counted
 
@@ -50,11 +49,11 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     return Passed()
 
 
-def _steps(capture: Capture, name: str) -> NDArray[np.float64]:
+def _steps(capture: Capture, name: str) -> Array:
     """Steps [n-1, rad] between neighbouring rows; 0 over a gap in time or a missing value."""
     names = (name, "t_s") if capture.has("t_s") else (name,)
     columns = capture.arrays(*names, masked=False)
-    steps: NDArray[np.float64] = np.diff(columns[name])
+    steps: Array = np.diff(columns[name])
     usable = np.isfinite(steps)
     if "t_s" in columns and steps.size:
         taken_s = np.diff(columns["t_s"])

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from pipeline.estimation.mechanical.slow_turns import (
@@ -26,7 +25,7 @@ from pipeline.numerics.orders import OrderLine, detection_limit, find_orders, ph
 from pipeline.numerics.turns import Spectrum, Turn, largest_order, noise_power
 from pipeline.physics.mechanics import cogging_order
 from pipeline.physics.units import TURN_RAD
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, Order
 from pipeline.records.evidence import Evidence, Series
@@ -239,9 +238,7 @@ def _viscous_share(speed_rad_s: float | None, known: Constants) -> tuple[float, 
     return slope / (coulomb.number + slope), ", the viscous part taken off by the coast-down"
 
 
-def _variance_of_mean(
-    spec: Spectrum, forward: NDArray[np.float64], backward: NDArray[np.float64]
-) -> tuple[float, float]:
+def _variance_of_mean(spec: Spectrum, forward: Array, backward: Array) -> tuple[float, float]:
     """Variance of one turn's mean and its dof: the noise at the lowest orders, or the means' own.
 
     A mean is the coefficient of order 0, whose noise is a quarter of E|c|² next to it.

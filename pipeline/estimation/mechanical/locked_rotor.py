@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.operating_points import Point
 from pipeline.estimation.policy import policy
+from pipeline.records.capture import Array
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import Contribution
 
-Array = NDArray[np.float64]
 SOURCE = "assumed:locked_angle"
 # Pairs of back-EMF harmonics that make torque ripple of the same order, 6 or 12 a cycle. A winding
 # that is sold as sinusoidal keeps the lower ones to a few per cent of the fundamental.

@@ -8,7 +8,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.mechanical.drag_fit import DragFit
 from pipeline.estimation.mechanical.shaft_rows import DRIVE, ShaftRows
@@ -20,8 +19,7 @@ from pipeline.estimation.uncertainty.regimes import (
     halves,
     signs,
 )
-
-Array = NDArray[np.float64]
+from pipeline.records.capture import Array
 
 
 def shaft_partitions(rows: ShaftRows, information: Array) -> list[Partition]:

@@ -19,10 +19,11 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from pipeline.export.curves import Array, Bump, Wave, bump_of, drag_polynomial, waves
+from pipeline.export.curves import Bump, Wave, bump_of, drag_polynomial, waves
 from pipeline.export.protocol import Exporter, Options, Source, Values, number_option
 from pipeline.physics.notation import quantity
 from pipeline.physics.units import REFERENCE_DEGC
+from pipeline.records.capture import Array
 
 PEAK_POWER = 1.5
 """Power of three phases over the product of peak voltage and current."""

@@ -6,14 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import MINUS, Scale, scale_for
+from pipeline.records.capture import Array
 from pipeline.report.charts.svg import text
 from pipeline.views.names import quantity_words
 
-Array = NDArray[np.float64]
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 _ANGLE_STEPS = (5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0, 360.0)
 

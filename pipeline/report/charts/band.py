@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records.capture import Array
 from pipeline.report.charts.svg import band, line
 
-Array = NDArray[np.float64]
 COLUMN_PX, FEWEST_A_COLUMN, LEAST_HEIGHT_PX = 1.5, 4.0, 8.0
 """Width of a column; samples in one on average and median height, from which on it is dense."""
 GAP_COLUMNS = 3.0

@@ -13,11 +13,11 @@ from itertools import takewhile
 from pathlib import PurePosixPath
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.numerics.thinning import cloud_points, line_points
 from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import quantity
+from pipeline.records.capture import Array
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.charts.axis import Axis, axis_for, padded, symmetric_axis, x_ticks, y_ticks
 from pipeline.report.charts.band import filled, outlined
@@ -29,7 +29,6 @@ from pipeline.report.charts.residual import (
 )
 from pipeline.report.charts.svg import text
 
-Array = NDArray[np.float64]
 WIDTH, TOP, LEFT, RIGHT, BOTTOM = 640.0, 24.0, 62.0, 14.0, 38.0
 MAIN, GAP, RESIDUAL, LABELS = 210.0, 34.0, 70.0, 124.0
 MOST_LABELS, LABEL_PITCH, LABEL_CHARS = 8, 16.0, 13

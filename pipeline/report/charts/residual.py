@@ -7,11 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.records.capture import Array
 from pipeline.records.evidence import Series
 
-Array = NDArray[np.float64]
 FEWEST = 5
 
 
