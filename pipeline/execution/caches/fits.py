@@ -9,10 +9,8 @@ source map, a sidecar, a gate's limit) changes the captures, and so the fits.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -26,10 +24,9 @@ from pipeline.execution.caches.keys import FitParts, key_of
 from pipeline.execution.caches.run_cache import FOLDER
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.tasks.work import Stamp
+from pipeline.io.storage.checksummed import keep_body, read_body
 from pipeline.io.storage.code_version import closure_digest, libraries_version
-from pipeline.io.storage.publish import write_whole
 from pipeline.records.constants import Constants
-from pipeline.records.errors import PipelineError
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.naming import file_stem
@@ -72,31 +69,23 @@ class FitMemory:
 
     def save(self) -> None:
         """Stores the fits of this campaign; a place that cannot be written is no failure."""
-        if self._used == self._kept:
-            return
-        with suppress(PipelineError):
-            write_whole(self._path, _checksummed(self._used))
+        if self._used != self._kept:
+            keep_body(self._path, _body(self._used))
 
 
-def _checksummed(fits: Mapping[str, tuple[str, bytes, bytes]]) -> bytes:
+def _body(fits: Mapping[str, tuple[str, bytes, bytes]]) -> bytes:
     head = [
         [name, key, len(text), len(arrays)] for name, (key, text, arrays) in sorted(fits.items())
     ]
     parts = [json.dumps(head).encode() + b"\n"]
     for _, (_, text, arrays) in sorted(fits.items()):
         parts += [text, arrays]
-    body = b"".join(parts)
-    return hashlib.sha256(body).hexdigest().encode() + b"\n" + body
+    return b"".join(parts)
 
 
 def _load(path: Path) -> dict[str, tuple[str, bytes, bytes]]:
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            return {}
-        digest, _, body = path.read_bytes().partition(b"\n")
-    except OSError:
-        return {}
-    if hashlib.sha256(body).hexdigest().encode() != digest:
+    body = read_body(path, _MAX_BYTES)
+    if body is None:
         return {}
     head, _, rest = body.partition(b"\n")
     fits, at = {}, 0

@@ -7,7 +7,7 @@ brings the links of its motor's other pages up to date.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 from urllib.parse import quote
 
@@ -101,8 +101,7 @@ def relink(output: Path, motor_id: str, but: Collection[str] = ()) -> dict[str, 
     changed: dict[str, str] = {}
     for page in _OF_PAGE:
         if "{}" in page and page not in but:
-            name = page.format(file_stem(motor_id))
-            changed |= _relinked(output, name, links_of(output, page, motor_id))
+            changed |= _relinked(output, page, motor_id)
     if changed:
         note_files(output, motor_id, tuple(changed.items()))
     return changed
@@ -117,15 +116,33 @@ def relink_index(output: Path) -> None:
         The output folder of a run.
 
     """
-    _relinked(output, INDEX, links_of(output, INDEX))
+    _relinked(output, INDEX)
 
 
-def _relinked(output: Path, name: str, links: tuple[Link, ...]) -> dict[str, str]:
+def _relinked(output: Path, page: str, motor_id: str = "") -> dict[str, str]:
+    name = page.format(file_stem(motor_id) if motor_id else "")
+    links = links_of(output, page, motor_id)
+    return rewritten(output, name, lambda before: with_links(before, links))
+
+
+def rewritten(output: Path, name: str, change: Callable[[str], str]) -> dict[str, str]:
+    """Name and digest of a page that was there and that the change made another; else empty.
+
+    Parameters
+    ----------
+    output
+        The output folder of a run.
+    name
+        Name of the page in it.
+    change
+        The page as it should be, of the page as it is.
+
+    """
     path = output / name
     if not path.is_file():
         return {}
     before = path.read_bytes()
-    after = with_links(before.decode(), links).encode()
+    after = change(before.decode()).encode()
     if after == before:
         return {}
     write_whole(path, after)

@@ -13,8 +13,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.execution.caches.run_cache import note_files
-from pipeline.execution.jobs import Files, MotorResult
-from pipeline.execution.outputs.page_links import DIAGNOSIS, INDEX, MOTOR, links_of, relink
+from pipeline.execution.jobs import MotorResult
+from pipeline.execution.outputs.page_links import (
+    DIAGNOSIS,
+    INDEX,
+    MOTOR,
+    links_of,
+    relink,
+    rewritten,
+)
 from pipeline.execution.outputs.sheet_memory import SheetMemory
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.datasheets import read_datasheet
@@ -142,19 +149,15 @@ def _rewritten(output: Path, sheet: Datasheet, current: CurrentStatus) -> dict[s
     from pipeline.report.pages.page import with_links
     from pipeline.report.pages.status_block import with_status
 
-    name = f"report/{file_stem(sheet.motor_id)}.html"
-    path = output / name
-    if not path.is_file():
-        return {}
-    before = path.read_bytes()
-    page = with_status(before.decode(), sheet, current)
-    after = with_links(page, links_of(output, MOTOR, sheet.motor_id)).encode()
-    if after == before:
-        return {}
-    write_whole(path, after)
-    files: Files = ((name, hashlib.sha256(after).hexdigest()),)
-    note_files(output, sheet.motor_id, files)
-    return dict(files)
+    links = links_of(output, MOTOR, sheet.motor_id)
+    changed = rewritten(
+        output,
+        MOTOR.format(file_stem(sheet.motor_id)),
+        lambda before: with_links(with_status(before, sheet, current), links),
+    )
+    if changed:
+        note_files(output, sheet.motor_id, tuple(changed.items()))
+    return changed
 
 
 def show_decision(registry: Registry, motor_id: str) -> tuple[str, ...]:
