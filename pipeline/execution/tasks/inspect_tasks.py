@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from pipeline.execution.jobs import OfFile
-from pipeline.execution.workers.pools import Cluster, core_count, open_pool
-from pipeline.execution.workers.worker_pool import WorkerPool
+from pipeline.execution.workers.pools import core_count
+from pipeline.execution.workers.worker_pool import local_workers
 from pipeline.io.ingest.files import size_bytes
 from pipeline.io.ingest.guard import died, reading
-from pipeline.records.errors import CaptureError, MachineError
+from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
 
 if TYPE_CHECKING:
@@ -53,17 +52,8 @@ def in_workers(work: Callable[[Any], Any], tasks: Sequence[Any]) -> list[Any]:
         One cannot be.
 
     """
-    pool = open_pool("local", Cluster())
-    count = min(core_count(), len(tasks)) or 1
-    with (
-        TemporaryDirectory() as progress,
-        WorkerPool(pool, count, Path(progress) / "work") as workers,
-    ):
-        reports = list(workers.map_tasks(work, tasks))
-    for report in reports:
-        if isinstance(report, MachineError):
-            raise report
-    return reports
+    with local_workers(min(core_count(), len(tasks)) or 1) as workers:
+        return workers.all_of(work, tasks)
 
 
 def look_into(task: InspectTask) -> Looked:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from pipeline.execution.jobs import OfFiles
@@ -12,7 +13,7 @@ from pipeline.io.ingest.files import size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading
 from pipeline.io.ingest.identification import Answer, Question, identify
 from pipeline.io.maps.source_map import SourceMap
-from pipeline.records.errors import CaptureError, MachineError
+from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
 
 LARGEST_BATCH = 64
@@ -96,9 +97,4 @@ def survey_with(
         SurveyTask(str(folder), tuple(questions[at : at + size]), sources, recover, limits)
         for at in range(0, len(questions), size)
     ]
-    answers: list[Answer] = []
-    for surveyed in workers.map_tasks(survey_files, tasks):
-        if isinstance(surveyed, MachineError):
-            raise surveyed
-        answers += surveyed
-    return answers
+    return list(chain.from_iterable(workers.all_of(survey_files, tasks)))

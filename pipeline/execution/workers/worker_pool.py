@@ -15,10 +15,11 @@ from concurrent.futures import as_completed
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple, Protocol, Self
 
 from pipeline.execution.workers.gate import Gate
-from pipeline.execution.workers.pools import OpenPool, Pool
+from pipeline.execution.workers.pools import Cluster, OpenPool, Pool, open_pool
 from pipeline.execution.workers.task import LOGGER, Report, perform
 from pipeline.io.ingest.guard import CrashReport, crash_report
 from pipeline.records.errors import MachineError, PipelineError
@@ -133,6 +134,28 @@ class WorkerPool:
             pending = not_begun
         for index, crash in sorted(retries, key=lambda retry: retry[0]):
             finish(index, self._retry_isolated(function, tasks[index], crash, index))
+        return answers
+
+    def all_of(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> list[Any]:
+        """`function` of each task, in the order of the tasks.
+
+        Parameters
+        ----------
+        function
+            What is done with a task; importable in a worker.
+        tasks
+            The tasks.
+
+        Raises
+        ------
+        MachineError
+            A task failed.
+
+        """
+        answers = self.map_tasks(function, tasks)
+        for answer in answers:
+            if isinstance(answer, MachineError):
+                raise answer
         return answers
 
     def begin_tasks(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> None:
@@ -286,3 +309,20 @@ def _failed(task: Any, reason: str) -> MachineError:
         f"{task.name} could not be finished: {reason}",
         "report it with this line; the others are done",
     )
+
+
+@contextmanager
+def local_workers(count: int) -> Iterator[WorkerPool]:
+    """Processes of this machine whose progress files are kept nowhere.
+
+    Parameters
+    ----------
+    count
+        How many.
+
+    """
+    with (
+        TemporaryDirectory() as progress,
+        WorkerPool(open_pool("local", Cluster()), count, Path(progress) / "work") as workers,
+    ):
+        yield workers

@@ -8,19 +8,18 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from pipeline.execution.tasks.captures import ReadTask, usable_captures
 from pipeline.execution.tasks.survey_tasks import survey_with
-from pipeline.execution.workers.pools import Cluster, core_count, open_pool
-from pipeline.execution.workers.worker_pool import WorkerPool
+from pipeline.execution.workers.pools import core_count
+from pipeline.execution.workers.worker_pool import local_workers
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Survey, survey
 from pipeline.io.maps.places import source_maps
 from pipeline.records.capture import Campaign
-from pipeline.records.errors import MachineError, UsageError, meant
+from pipeline.records.errors import UsageError, meant
 from pipeline.records.finding import Finding, lines_of
 from pipeline.records.outcome import Outcome, faults_of, first_that_applies
 from pipeline.report.text.console import nothing_usable
@@ -68,19 +67,14 @@ def campaigns(
     input_folder(folder)
     sources = source_maps(source, config_dir)
     bounds = limits or ReadLimits()
-    with TemporaryDirectory() as progress:
-        pool = open_pool("local", Cluster())
-        with WorkerPool(pool, core_count(), Path(progress) / "work") as workers:
-            ask = partial(survey_with, workers, Path(folder), sources, bounds, recover=False)
-            of_files = _of_files(survey(Path(folder), sources, ask), only)
-            tasks = _tasks(folder, of_files, motor, bounds)
-            read = workers.map_tasks(usable_captures, tasks)
+    with local_workers(core_count()) as workers:
+        ask = partial(survey_with, workers, Path(folder), sources, bounds, recover=False)
+        of_files = _of_files(survey(Path(folder), sources, ask), only)
+        tasks = _tasks(folder, of_files, motor, bounds)
+        read = workers.all_of(usable_captures, tasks)
     findings = list(of_files.findings)
     motors = []
-    for task, end in zip(tasks, read, strict=True):
-        if isinstance(end, MachineError):
-            raise end
-        captures, doubts = end
+    for task, (captures, doubts) in zip(tasks, read, strict=True):
         findings += doubts
         if captures:
             motors.append(Campaign(task.motor_id, captures))
