@@ -58,7 +58,7 @@ class Assessment:
         Baseline lots of stations that nothing links to those of the candidate.
     confounded
         Why nothing can be compared; empty where it can.
-    within_sd, within_dof
+    within_sd
         Standard deviation between motors of one lot [unit].
     lots_sd
         Standard deviation between means of baseline lots [unit].
@@ -75,7 +75,6 @@ class Assessment:
     unlinked: tuple[str, ...]
     confounded: str
     within_sd: float | None
-    within_dof: int
     lots_sd: float | None
     contrast: Contrast | None
 
@@ -160,7 +159,6 @@ def assess(values: Sequence[Value], golden: Sequence[Value], lots: Sequence[str]
         tuple(sorted(unlinked)),
         confounded,
         within,
-        spread.dof_within,
         lots_sd,
         contrast,
     )

@@ -122,14 +122,13 @@ def result(
 
 
 def _test(assessment: Assessment, family: Family, limits: Limits) -> LotTest:
-    lots, needed = len(assessment.base), limits.min_lots
+    lots, needed, contrast = len(assessment.base), limits.min_lots, assessment.contrast
     if assessment.confounded:
         return LotTest("CONFOUNDED", lots, needed, None, None, None, None, False)
-    if assessment.contrast is None:
+    if contrast is None:
         return LotTest("not_evaluated", lots, needed, None, None, None, None, False)
     if lots < needed or family.lot_p_holm is None:
         return LotTest("INSUFFICIENT_HISTORY", lots, needed, None, None, None, None, False)
-    contrast = assessment.contrast
     t = contrast.lot_t
     return LotTest(
         "evaluated",

@@ -6,7 +6,8 @@ Rotating Electrical Machines, 2nd ed. 2014, ch. 7. Every field may hold many dra
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -62,20 +63,9 @@ class Machine:
 
         """
         at = slice(draw, draw + 1)
-        return Machine(
-            self.pole_pairs,
-            self.r_ohm[at],
-            self.psi_wb[at],
-            self.ld_h[at],
-            self.lq_h[at],
-            self.ld_slope_h_a[at],
-            self.lq_slope_h_a2[at],
-            self.within_d_a,
-            self.within_q_a,
-            self.beyond[at],
-            self.coulomb_nm[at],
-            self.viscous_nm_s_rad[at],
-        )
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        drawn: dict[str, Any] = {n: v[at] for n, v in values.items() if isinstance(v, np.ndarray)}
+        return replace(self, **drawn)
 
 
 def inductances_h(machine: Machine, id_a: Array, iq_a: Array) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from pipeline.records.plain_form import PlainRecord, plain_of
+from pipeline.records.plain_form import PlainRecord, plain_fields
 
 Numbers = tuple[float, ...]
 
@@ -188,15 +188,6 @@ class Performance:
 
     def document(self) -> dict[str, Any]:
         """The JSON form, schema motor-performance/1."""
-        return {
-            "schema": "motor-performance/1",
-            "motor_id": self.motor_id,
-            "datasheet_version": self.version,
-            "operation": plain_of(self.operation),
-            "numbers": plain_of(self.numbers),
-            "curves": plain_of(self.curves),
-            "efficiency_map": plain_of(self.cells),
-            "regimes": list(self.regimes),
-            "blanks": plain_of(self.blanks),
-            "notes": list(self.notes),
-        }
+        names = {"version": "datasheet_version", "cells": "efficiency_map"}
+        written = {names.get(name, name): one for name, one in plain_fields(self).items()}
+        return {"schema": "motor-performance/1"} | written
