@@ -21,6 +21,8 @@ from pipeline.records.errors import CaptureError, merged
 from pipeline.records.finding import Finding
 
 TORQUE = "torque_shaft_nm"
+_ELECTRICAL, _MOTION = "theta_elec_rad", ("theta_mech_rad", "omega_mech_rad_s")
+_DRIVEN = ("drive", "torque_map")
 BROKEN = (ValueError, ArithmeticError, LookupError, TypeError, np.linalg.LinAlgError)
 
 
@@ -87,8 +89,27 @@ def validate(
     if refusals or broken:
         raise merged(_causes_first(refusals) or broken)
     settings = {**missing_values.GATE.settings(), **options.get(missing_values.NAME, {})}
+    capture, shaft = _with_shaft_angle(capture)
     split = streams_split(capture, settings["dense_share"])
-    return split.with_masks(*masks), tuple(findings)
+    return split.with_masks(*masks), (*findings, *shaft)
+
+
+def _with_shaft_angle(capture: Capture) -> tuple[Capture, list[Finding]]:
+    """The capture with the angle of the shaft in place of the electrical one, where that is all
+    there is of its motion and the pole pairs are stated: beside each other they would count these.
+    """
+    pairs = capture.meta.pole_pairs
+    other = any(capture.has(name) for name in _MOTION)
+    if capture.meta.test not in _DRIVEN or other or not capture.has(_ELECTRICAL) or not pairs:
+        return capture, []
+    angle = (pl.col(_ELECTRICAL) / pairs).alias("theta_mech_rad")
+    tables = tuple(
+        t.with_columns(angle).drop(_ELECTRICAL) if _ELECTRICAL in t.columns else t
+        for t in capture.tables
+    )
+    words = f"the shaft's angle is {_ELECTRICAL} over the {pairs} pole pairs that are stated"
+    remedy = "log theta_mech_rad or omega_mech_rad_s of a sensor, which count them"
+    return replace(capture, tables=tables), [warning(capture, "stated_pole_pairs", words, remedy)]
 
 
 def _causes_first(refusals: Mapping[str, CaptureError]) -> list[CaptureError]:

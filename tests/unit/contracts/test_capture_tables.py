@@ -10,7 +10,12 @@ import pytest
 
 from pipeline.contracts.clocks import _slow_columns, held_apart, streams_split
 from pipeline.contracts.schemas import check_columns, check_tables
-from pipeline.contracts.validate import _filled_rows, _rows_once, _without_blanks
+from pipeline.contracts.validate import (
+    _filled_rows,
+    _rows_once,
+    _with_shaft_angle,
+    _without_blanks,
+)
 from pipeline.records.errors import CaptureError
 from tests.unit.contracts.signals import OPTIONS
 from tests.unit.contracts.test_gate_limits import GATES, capture
@@ -97,6 +102,23 @@ def test_coarse_values_and_plateaus_are_not_held(values: np.ndarray) -> None:
     clock = np.arange(values.size) * 1e-3
     made = capture("drive", t_s=clock, theta_mech_rad=np.repeat(clock[::10], 10), iq_a=values)
     assert held_apart(made) == (made, [])
+
+
+def test_an_electrical_angle_alone_is_that_of_the_shaft_by_the_stated_pole_pairs() -> None:
+    """Such a drive's sheet was empty, and the motor `unknown` at 28 noise floors."""
+    columns = {"t_s": CLOCK, "iq_a": CLOCK, "theta_elec_rad": 7.0 * CLOCK}
+    made = capture("drive", meta={"pole_pairs": 7}, **columns)
+    turned, findings = _with_shaft_angle(made)
+    assert turned.tables[0]["theta_mech_rad"].to_numpy() == pytest.approx(CLOCK)
+    assert not turned.has("theta_elec_rad")
+    assert [f.code for f in findings] == ["stated_pole_pairs"]
+    for other in (
+        capture("drive", **columns),
+        capture("open_circuit", meta={"pole_pairs": 7}, **columns),
+        capture("drive", meta={"pole_pairs": 7}, omega_mech_rad_s=CLOCK, **columns),
+        capture("drive", meta={"pole_pairs": 7}, t_s=CLOCK, iq_a=CLOCK, theta_mech_rad=CLOCK),
+    ):
+        assert _with_shaft_angle(other) == (other, [])
 
 
 def test_columns_without_a_value_are_not_there() -> None:
