@@ -92,7 +92,7 @@ def refitted(wide: LinearSystem, score: Score) -> LinearSystem:
         tried = min([tried, *ends], key=lambda end: end.deviance)
     if tried.deviance + score.penalty < wide.deviance:
         return tried
-    again = _along_the_step(wide, replace(score, moves={}))
+    again = gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)
     return min(tried, again, key=lambda end: end.deviance)
 
 
