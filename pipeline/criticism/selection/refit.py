@@ -92,8 +92,13 @@ def refitted(wide: LinearSystem, score: Score) -> LinearSystem:
         tried = min([tried, *ends], key=lambda end: end.deviance)
     if tried.deviance + score.penalty < wide.deviance:
         return tried
-    again = gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)
-    return min(tried, again, key=lambda end: end.deviance)
+    # where one scale is free, all that is begun elsewhere is far away, and may yet come back
+    for moves in ({}, score.moves):
+        again = gauss_newton(begin_from(wide.fit, replace(score, moves=moves)), before=wide)
+        tried = min(tried, again, key=lambda end: end.deviance)
+        if tried.deviance < wide.deviance + score.fall:
+            break
+    return tried
 
 
 def _along_the_step(wide: LinearSystem, score: Score) -> LinearSystem:
