@@ -63,7 +63,11 @@ def held_apart(capture: Capture) -> tuple[Capture, list[Finding]]:
 
 
 def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Rows, int]]:
-    """Rows in which columns that hold are new, and how many rows they hold, by name."""
+    """Rows in which columns that hold are new, and how many rows they hold, by name.
+
+    An inverter holds its voltage as well, such as a square wave, and the current follows it in
+    every row. So a voltage is held by a bus only where currents are, or none is there.
+    """
     held = {}
     row_s = float(np.median(np.diff(table["t_s"].to_numpy()))) if table.height > 1 else 0.0
     for name in table.columns:
@@ -80,7 +84,8 @@ def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Rows, int]]:
             passed = np.concatenate([[0], np.cumsum(np.maximum(ticks, 1))])
             rows = np.interp(np.arange(passed[-1] + 1), passed, changes)
             held[name] = np.rint(rows).astype(np.int64), count
-    return held
+    follows = any(name.endswith("_a") and name not in held for name in table.columns)
+    return {n: one for n, one in held.items() if not (follows and n.endswith("_v"))}
 
 
 def streams_split(capture: Capture, dense_share: float) -> Capture:

@@ -104,6 +104,17 @@ def test_coarse_values_and_plateaus_are_not_held(values: np.ndarray) -> None:
     assert held_apart(made) == (made, [])
 
 
+def test_a_voltage_that_an_inverter_holds_is_whole() -> None:
+    """A current that is new in every row follows each step of the voltage."""
+    steps = held(np.random.default_rng(5).normal(size=101))
+    current = np.cumsum(steps) * 1e-2
+    made = capture("drive", t_s=CLOCK, vq_v=steps, iq_a=current)
+    assert held_apart(made) == (made, [])
+    alone, findings = held_apart(capture("drive", t_s=CLOCK, theta_mech_rad=CLOCK, vq_v=steps))
+    assert [t.columns for t in alone.tables] == [["t_s", "theta_mech_rad"], ["t_s", "vq_v"]]
+    assert len(findings) == 1
+
+
 def test_an_electrical_angle_alone_is_that_of_the_shaft_by_the_stated_pole_pairs() -> None:
     """Such a drive's sheet was empty, and the motor `unknown` at 28 noise floors."""
     columns = {"t_s": CLOCK, "iq_a": CLOCK, "theta_elec_rad": 7.0 * CLOCK}
