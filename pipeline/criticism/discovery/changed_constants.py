@@ -122,7 +122,9 @@ def _refitted(system: LinearSystem, change: Change) -> Change:
         values.append(own.fit.values[change.name])
         u.append(math.sqrt(own.covariance(own.model_columns)[place, place]))
     difference, u_difference = values[1] - values[0], math.hypot(*u)
-    if difference * change.difference <= 0.0 or abs(difference) < REACH * u_difference:
+    # what a part does not observe has no u there
+    known = min(u) > 0.0 and abs(difference) >= REACH * u_difference
+    if not known or difference * change.difference <= 0.0:
         return change
     return replace(change, value=values[0], difference=difference, u=u_difference)
 
