@@ -71,8 +71,15 @@ class Datasheets(ByMotor[Datasheet]):
     def summary(self) -> pl.DataFrame:
         """One row a motor: status with its reasons, and version."""
         rows = [
-            {key: getattr(one, key) for key in DATASHEET_SCHEMA}
-            | {"motor_id": name, "why": list(one.why)}
+            {
+                "motor_id": name,
+                "motor_type": one.motor_type,
+                "lot": one.lot,
+                "status": one.status,
+                "why": list(one.why),
+                "version": one.version,
+                "code_version": one.code_version,
+            }
             for name, one in self.motors.items()
         ]
         return frames.frame(rows, DATASHEET_SCHEMA)

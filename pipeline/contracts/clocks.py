@@ -66,17 +66,19 @@ def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Rows, int]]:
     """Rows in which columns that hold are new, and how many rows they hold, by name.
 
     An inverter holds its voltage as well, such as a square wave, and the current follows it in
-    every row. So a voltage is held by a bus only where currents are, or none is there.
+    every row. So a voltage is held by a bus only where no current changes faster.
     """
-    held = {}
+    held, faster = {}, set()
     row_s = float(np.median(np.diff(table["t_s"].to_numpy()))) if table.height > 1 else 0.0
     for name in table.columns:
         if not name.endswith(_SAMPLED) or not table[name].dtype.is_float():
             continue
         changes = np.flatnonzero(np.diff(table[name].to_numpy()) != 0.0) + 1
         steps = np.diff(changes)
-        count = int(np.median(steps)) if steps.size >= _LEAST_HELD else 1
-        if count == 1 or count * row_s > _MOST_HELD_S:
+        count = int(np.median(steps)) if steps.size >= _LEAST_HELD else 0
+        if count == 1:
+            faster.add(name)
+        if count <= 1 or count * row_s > _MOST_HELD_S:
             continue
         ticks = np.rint(steps / count)
         if np.mean(np.abs(steps - count * ticks) <= _JITTER * count) > _ON_CLOCK:
@@ -84,7 +86,7 @@ def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Rows, int]]:
             passed = np.concatenate([[0], np.cumsum(np.maximum(ticks, 1))])
             rows = np.interp(np.arange(passed[-1] + 1), passed, changes)
             held[name] = np.rint(rows).astype(np.int64), count
-    follows = any(name.endswith("_a") and name not in held for name in table.columns)
+    follows = any(name.endswith("_a") for name in faster)
     return {n: one for n, one in held.items() if not (follows and n.endswith("_v"))}
 
 

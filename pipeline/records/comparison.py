@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 from pipeline.records.error_map import Array, ErrorMap
 from pipeline.records.field_kinds import Count, Extension, Name, Share, Spread
-from pipeline.records.plain_form import PlainRecord, plain_fields, plain_of
+from pipeline.records.plain_form import PlainRecord, plain_of
 from pipeline.records.policy import Overrides
 
 Signal = Literal[
@@ -82,9 +82,13 @@ class ModelParameter(PlainRecord):
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
-        written = plain_fields(self) | {"status": self.status}
-        del written["stated"]
-        return written
+        return {
+            "value": self.value,
+            "u": self.u,
+            "unit": self.unit,
+            "at_bound": self.at_bound,
+            "status": self.status,
+        }
 
 
 @dataclass(frozen=True, slots=True)

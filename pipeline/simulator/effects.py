@@ -1,43 +1,7 @@
 """Every effect of `contract/effects.md` with its parameters and a typical size for any motor.
 
 The first parameter, `size`, is the one that is zero where the effect is absent; the others shape
-it. Forms are deliberately not those of the usual textbook model, see `docs/simulator.md`. By unit
-of the size and what it does:
-
-- copper_temperature [1/K]: R (1 + size (T_w - 25))
-- magnet_temperature [1/K]: psi (1 + size (T_m - 25))
-- skin_effect [1]: R (1 + size u²/(1 + (u/knee)²)), u the electrical speed over rated
-- phase_imbalance [1]: R_x = R (1 + size cos(120° x - angle_deg)), x = 0, 1, 2 for a, b, c
-- dead_time [V]: each phase loses size * i/sqrt(i² + knee_a²), of which a compensation gives back
-  its share `compensated`, in proportion to i up to ramp_a and in full beyond
-- voltage_scale [1]: recorded voltages times 1 + size
-- sample_delay [s]: dq voltages are logged in the frame of the rotor `size` earlier than they act
-- current_delay [s]: phase currents are sampled `size` late
-- torque_lag [s]: first-order lag of the transducer
-- current_scale [1]: all current sensors times 1 + size
-- current_gain [1]: the sensor of one phase times 1 + size
-- current_offset [A]: the sensor of one phase plus size
-- angle_offset [rad]: electrical angle plus size
-- angle_eccentricity [rad]: mechanical angle plus size * sin(order * theta + phase_rad)
-- saturation [1]: apparent Lq falls by size at rated q current (power law of flux), Ld by size_d
-  at rated d current along the magnet (root form; 0.4 of size if not given); form 1 is a sinh of
-  flux instead of the power
-- cross_saturation [1]: apparent Lq falls by size at rated d current along the magnet; reciprocal
-- bemf_harmonics [1]: 5th, 7th, 11th, 13th of the phase flux linkage
-- inductance_harmonics [1]: 1/Lq times 1 + size cos(6 eps + phase_rad), 1/Ld with size * ratio_d
-- iron_eddy [N·m·s/rad]: drag size * omega (psi/psi_pm)²/(1 + (omega/knee_rad_s)²)
-- iron_hysteresis [N·m]: drag size * (psi/psi_pm)^1.6 against the direction of rotation
-- coulomb_friction [N·m]: size against the direction
-- stribeck [N·m]: extra size/(1 + (omega/omega_s)²) against the direction
-- windage [N·m·(s/rad)²]: size * omega_rated² * |omega/omega_rated|^exponent against the direction
-- load_dependent_friction [1]: size * |electromagnetic torque| against the direction
-- presliding [rad]: Dahl bristle: friction builds up over size of travel after a reversal
-- cogging [N·m]: orders LCM(slots, 2p) and twice it, and by request `slots` and 2p
-- unbalance [N·m]: size * sin(theta + phase_rad)
-- compliance [rad/(N·m)]: two masses, shaft compliance size, load_fraction of J far
-- backlash [rad]: total gap of the coupling
-- torque_scale [1]: transducer times 1 + size
-- torque_offset [N·m]: transducer plus size
+it. Forms are deliberately not those of the usual textbook model, see `docs/simulator.md`.
 """
 
 from __future__ import annotations
@@ -103,49 +67,78 @@ def _compliance(motor: Motor) -> dict[str, float]:
 
 
 FORMS: dict[str, Defaults] = {
+    # [1/K] R (1 + size (T_w - 25))
     "copper_temperature": lambda m: {"size": m.temp_coeff_copper_1_k},
+    # [1/K] psi (1 + size (T_m - 25))
     "magnet_temperature": lambda m: {"size": m.temp_coeff_magnet_1_k},
+    # [1] R (1 + size u²/(1 + (u/knee)²)), u the electrical speed over rated
     "skin_effect": lambda _: {"size": 0.08, "knee": 3.0},
+    # [1] R_x = R (1 + size cos(120° x - angle_deg)), x = 0, 1, 2 for a, b, c
     "phase_imbalance": lambda _: {"size": 0.04, "angle_deg": 20.0},
+    # [V] each phase loses size * i/sqrt(i² + knee_a²), of which a compensation gives back its
+    # share `compensated`, in proportion to i up to ramp_a and in full beyond
     "dead_time": lambda m: {
         "size": 0.005 * m.vdc_v,
         "knee_a": 0.01 * m.current_rated_a,
         "compensated": 0.0,
         "ramp_a": 0.1 * m.current_rated_a,
     },
+    # [1] recorded voltages times 1 + size
     "voltage_scale": lambda _: {"size": 0.02},
+    # [s] dq voltages are logged in the frame of the rotor `size` earlier than they act
     "sample_delay": lambda m: {"size": 0.03 / speed_elec_rad_s(m)},
+    # [s] phase currents are sampled `size` late
     "current_delay": lambda m: {"size": 0.03 / speed_elec_rad_s(m)},
+    # [s] first-order lag of the transducer
     "torque_lag": lambda _: {"size": 2e-3},
+    # [1] all current sensors times 1 + size
     "current_scale": lambda _: {"size": 0.02},
+    # [1] the sensor of one phase times 1 + size
     "current_gain": lambda _: {"size": 0.02, "phase": 0.0},
+    # [A] the sensor of one phase plus size
     "current_offset": lambda m: {"size": 0.008 * m.current_rated_a, "phase": 1.0},
+    # [rad] electrical angle plus size
     "angle_offset": lambda _: {"size": 0.03},
+    # [rad] mechanical angle plus size * sin(order * theta + phase_rad)
     "angle_eccentricity": lambda m: {
         "size": 0.04 / m.pole_pairs,
         "phase_rad": 0.6,
         "order": 1.0,
     },
+    # [1] apparent Lq falls by size at rated q current (power law of flux), Ld by size_d at
+    # rated d current along the magnet (root form; 0.4 of size if not given); form 1 is a sinh
+    # of flux instead of the power
     "saturation": lambda _: {"size": 0.18, "size_d": math.nan, "exponent": 3.0, "form": 0.0},
+    # [1] apparent Lq falls by size at rated d current along the magnet; reciprocal
     "cross_saturation": lambda _: {"size": 0.08},
+    # [1] 5th, 7th, 11th, 13th of the phase flux linkage
     "bemf_harmonics": _harmonics,
+    # [1] 1/Lq times 1 + size cos(6 eps + phase_rad), 1/Ld with size * ratio_d
     "inductance_harmonics": lambda _: {"size": 0.05, "ratio_d": 0.4, "phase_rad": 0.3},
+    # [N·m·s/rad] drag size * omega (psi/psi_pm)²/(1 + (omega/knee_rad_s)²)
     "iron_eddy": lambda m: {
         "size": 0.012 * m.torque_rated_nm / m.speed_rated_rad_s,
         "knee_rad_s": 5.0 * m.speed_rated_rad_s,
     },
+    # [N·m] drag size * (psi/psi_pm)^1.6 against the direction of rotation
     "iron_hysteresis": lambda m: {"size": 0.008 * m.torque_rated_nm},
+    # [N·m] size against the direction
     "coulomb_friction": lambda m: {"size": m.torque_coulomb_nm},
+    # [N·m] extra size/(1 + (omega/omega_s)²) against the direction
     "stribeck": lambda m: {
         "size": 0.008 * m.torque_rated_nm,
         "omega_s_rad_s": 0.03 * m.speed_rated_rad_s,
     },
+    # [N·m·(s/rad)²] size * omega_rated² * |omega/omega_rated|^exponent against the direction
     "windage": lambda m: {
         "size": 0.012 * m.torque_rated_nm / m.speed_rated_rad_s**2,
         "exponent": 2.0,
     },
+    # [1] size * |electromagnetic torque| against the direction
     "load_dependent_friction": lambda _: {"size": 0.02},
+    # [rad] Dahl bristle: friction builds up over size of travel after a reversal
     "presliding": lambda m: {"size": 0.05 * 2.0 * math.pi / cogging_order(m)},
+    # [N·m] orders LCM(slots, 2p) and twice it, and by request `slots` and 2p
     "cogging": lambda m: {
         "size": 0.015 * m.torque_rated_nm,
         "second": 0.15,
@@ -153,13 +146,18 @@ FORMS: dict[str, Defaults] = {
         "order_poles": 0.0,
         "phase_rad": 0.7,
     },
+    # [N·m] size * sin(theta + phase_rad)
     "unbalance": lambda m: {"size": 0.01 * m.torque_rated_nm, "phase_rad": 1.1},
+    # [rad/(N·m)] two masses, shaft compliance size, load_fraction of J far
     "compliance": _compliance,
+    # [rad] total gap of the coupling
     "backlash": lambda m: {"size": 0.05 / m.pole_pairs},
+    # [1] transducer times 1 + size
     "torque_scale": lambda _: {"size": 0.02},
+    # [N·m] transducer plus size
     "torque_offset": lambda m: {"size": 0.006 * m.torque_rated_nm},
 }
-"""Parameters of each effect at a typical size, by the motor."""
+"""Parameters of each effect at a typical size, by the motor; the unit of the size in brackets."""
 
 
 def parameters(name: str, motor: Motor, size: Size | None = None) -> dict[str, float]:

@@ -50,11 +50,15 @@ def _table(stream: StreamSeen) -> dict[str, Any]:
 
 def _field(seen: FieldSeen) -> dict[str, Any]:
     known = seen.first is not None and math.isfinite(seen.first)
-    kept = ("column", "unit", "certain", "scale", "wraps", "per_pole_pair")
     return {
         "name": seen.name,
         "first": seen.first if known else None,
-        **{name: getattr(seen, name) for name in kept},
+        "column": seen.column,
+        "unit": seen.unit,
+        "certain": seen.certain,
+        "scale": seen.scale,
+        "wraps": seen.wraps,
+        "per_pole_pair": seen.per_pole_pair,
         "evidence": seen.why,
         "asked": None if seen.question is None else seen.question[0],
     }

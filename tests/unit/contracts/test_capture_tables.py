@@ -110,6 +110,9 @@ def test_a_voltage_that_an_inverter_holds_is_whole() -> None:
     current = np.cumsum(steps) * 1e-2
     made = capture("drive", t_s=CLOCK, vq_v=steps, iq_a=current)
     assert held_apart(made) == (made, [])
+    none = np.zeros(CLOCK.size)
+    made = capture("drive", t_s=CLOCK, theta_mech_rad=CLOCK, vq_v=steps, iq_a=steps, id_a=none)
+    assert held_apart(made)[0].tables[1].columns == ["t_s", "vq_v", "iq_a"]
     alone, findings = held_apart(capture("drive", t_s=CLOCK, theta_mech_rad=CLOCK, vq_v=steps))
     assert [t.columns for t in alone.tables] == [["t_s", "theta_mech_rad"], ["t_s", "vq_v"]]
     assert len(findings) == 1
