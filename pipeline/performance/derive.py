@@ -30,11 +30,11 @@ from pipeline.performance.sources import (
 )
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.capture import Array
+from pipeline.records.consistent_constants import combined
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.performance import Blank, Curve, Derived, Operation, Performance
-from pipeline.records.shaft_constants import combined
 
 SPEEDS, CURRENTS = 33, 21
 FASTEST = 4.0

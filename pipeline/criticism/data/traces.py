@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -276,6 +277,30 @@ def window_between_gaps(
     stretches = np.sort(np.diff(ends) - 1)
     usual = int(stretches[np.searchsorted(np.cumsum(stretches), 0.5 * float(stretches.sum()))])
     return max(min(window_of(period, keep.size, policy), usual // each), policy.least_window)
+
+
+def lagged(signal: Array, step: float) -> Array:
+    """A signal behind a lag of first order, at rest before its first sample.
+
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit], on straight lines between.
+    step
+        Sample period over the time constant [1], above zero.
+
+    Returns
+    -------
+    array [n]
+        Same unit.
+
+    """
+    from scipy.signal import lfilter  # slow to import and rarely used
+
+    kept = math.exp(-step)
+    mean = -math.expm1(-step) / step
+    behind: Array = lfilter([1.0 - mean, mean - kept], [1.0, -kept], signal - signal[0])
+    return behind + signal[0]
 
 
 def parabolas(signal: Array, width: int) -> Array:

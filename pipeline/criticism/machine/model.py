@@ -120,6 +120,7 @@ BASE: tuple[Constant, ...] = (
     _unlogged("unlogged_magnet_k", words="unrecorded magnet over ambient"),
     _of_log("late_speed_s", "s", "lateness of a speed that no angle is beside", curved=True),
     _of_log("bend_speed_s2", "s²", "second order of that lateness", curved=True),
+    _of_log("lag_speed_s", "s", "lag of that second order", prior="late_speed_s", curved=True),
     _of_log("late_voltage_s", "s", "by how much motion follows a voltage late", curved=True),
     _of_log("electrical_s", "s", "L/R of a winding whose current is not logged"),
     _of_log("unsampled_share", "1", "change of flux that samples of a voltage miss"),
@@ -149,6 +150,10 @@ LATE_SPEED = "late_speed_s"
 """Nuisance of a log whose motion is known by an observer's or a tachometer's speed alone."""
 BEND_SPEED = "bend_speed_s2"
 """Its second order: a filter of first order has none, an observer half of a delay's."""
+LAG_SPEED = "lag_speed_s"
+"""Lag of that second order, of a tracking loop: 2 ζ over its bandwidth."""
+LATENESS = (LATE_SPEED, BEND_SPEED, LAG_SPEED)
+"""How a drive's own speed is behind that of the shaft."""
 LATE_VOLTAGE = "late_voltage_s"
 """Nuisance of a log of voltage and motion that two computers, or a filter, put on one clock."""
 ELECTRICAL = "electrical_s"

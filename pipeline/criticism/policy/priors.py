@@ -67,7 +67,7 @@ class Priors:
         derived: half the negligible size of `torque_lag`, which names what is well beyond two of
         these: amplifiers filter at 1 kHz and above
     late_speed_s : s
-        lateness of a speed that no angle is beside
+        lateness of a speed that no angle is beside, and lag of the second order of that
         chosen: observers and filters of drives are 1 to 10 ms late
     bend_speed_s2 : s²
         second order of that lateness

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.machine_scale import base_scales
-from pipeline.criticism.machine.model import Model
+from pipeline.criticism.machine.model import LAG_SPEED, Model
 from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.regression.columns import Column
 
@@ -36,10 +36,10 @@ def limits_of(model: Model) -> dict[str, tuple[float, float]]:
     Notes
     -----
     A resistance, inductance or flux below zero, or an inertia next to nothing, would stand for an
-    effect that is not in the model.
+    effect that is not in the model. A loop with a lag below zero is not stable.
 
     """
-    limits = dict.fromkeys(("r_ohm", "ld_h", "lq_h"), (0.0, np.inf))
+    limits = dict.fromkeys(("r_ohm", "ld_h", "lq_h", LAG_SPEED), (0.0, np.inf))
     least, scales = model.policy.fit.least_constant, base_scales(model.machine)
     for name in ("j_kgm2", "psi_wb"):
         limits[name] = (least * scales[name], np.inf)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import gammainc, gammaincinv
+from scipy.special import gammainc, gammaincinv, ndtr, ndtri
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.machine.model import PHYSICAL, base_of
@@ -245,6 +245,31 @@ def together_nonzero(
     gradient[at] = np.linalg.pinv(covariance, hermitian=True) @ values
     least = math.sqrt(2.0 * gammaincinv(0.5 * max(at.size, 1), gammainc(0.5, 0.5 * least**2)))
     return fit.excludes_zero(float(gradient[at] @ values), gradient, least)
+
+
+def least_of_several(least: float, count: int) -> float:
+    """How far the largest of several numbers must be from zero to be no more likely by chance than
+    one number alone.
+
+    Parameters
+    ----------
+    least
+        Standard uncertainties that one alone must be away from zero.
+    count
+        How many there are; one at the least.
+
+    Returns
+    -------
+    float
+        Standard uncertainties that one of several must be away from zero.
+
+    References
+    ----------
+    Šidák, J. Am. Stat. Assoc. 62(318), 1967, 626, doi:10.1080/01621459.1967.10482935.
+
+    """
+    alone = 2.0 * ndtr(-least)
+    return float(-ndtri(-0.5 * math.expm1(math.log1p(-alone) / max(count, 1))))
 
 
 def _inward(system: LinearSystem) -> Array:

@@ -15,11 +15,10 @@ from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equation_of, equations
 from pipeline.criticism.machine.model import (
-    BEND_SPEED,
     COAST_SHARES,
     EARLY_S,
     EARLY_SHARES,
-    LATE_SPEED,
+    LATENESS,
     OPEN_FLUX,
     UNLOGGED_AT_REST,
 )
@@ -177,7 +176,7 @@ def _late_speed(segment: Segment, capture: Capture) -> dict[str, float]:
     """The nuisances of a motion that is known by a drive's own speed alone."""
     has_angle = capture.has("theta_mech_rad") or capture.has("theta_elec_rad")
     drive_speed = segment.instrument.name == "drive" and capture.has("omega_mech_rad_s")
-    return {LATE_SPEED: 1.0, BEND_SPEED: 1.0} if drive_speed and not has_angle else {}
+    return dict.fromkeys(LATENESS, 1.0) if drive_speed and not has_angle else {}
 
 
 def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:

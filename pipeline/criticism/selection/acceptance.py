@@ -18,7 +18,11 @@ from pipeline.criticism.regression.cross_validation import (
     predicted_chi2,
 )
 from pipeline.criticism.regression.goodness import floor_factors, significant_groups
-from pipeline.criticism.regression.identifiability import significantly_nonzero, together_nonzero
+from pipeline.criticism.regression.identifiability import (
+    least_of_several,
+    significantly_nonzero,
+    together_nonzero,
+)
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.selection.discrimination import discriminate
@@ -130,8 +134,8 @@ def is_determined(system: LinearSystem, before: LinearSystem, effect: Effect | N
     Returns
     -------
     bool
-        Whether one is two standard uncertainties away from zero, whichever capture is left out, or
-        all of them together are. Of a coupling, its twist or gap must be so as well, by the fit or
+        Whether one is `least_u` away from zero, whichever capture is left out, or all of them
+        together are. Of a coupling, its twist or gap must be so as well, by the fit or
         by full logs, and full logs must not exclude it.
 
     Notes
@@ -163,13 +167,14 @@ def sure_amplitudes(system: LinearSystem, held_out: HeldOut, effect: Effect) -> 
     Returns
     -------
     list of Parameter
-        As `is_determined` asks it of them; none of a coupling without a twist that is sure, nor of
-        one that full logs exclude.
+        As `is_determined` asks it of them, each as one of several; none of a coupling without a
+        twist that is sure, nor of one that full logs exclude.
 
     """
     parameters = effect.parameters_of(system.fit.machine)
     least, discrimination = system.policy.selection.least_u, discriminate(system.fit, effect)
-    sure = significantly_nonzero(system, held_out, least)
+    amplitudes = [p for p in parameters if p.amplitude and p.negligible > 0.0]
+    sure = significantly_nonzero(system, held_out, least_of_several(least, len(amplitudes)))
     excluded = discrimination is not None and discrimination.name is None
     logged = {p.name: (system.fit.size(effect, p), p.u) for p in parameters if p.u > 0.0}
     logged |= discrimination.values if discrimination is not None else {}
@@ -177,7 +182,6 @@ def sure_amplitudes(system: LinearSystem, held_out: HeldOut, effect: Effect) -> 
     nonzero = [p for p in parameters if f"{effect.name}.{p.name}" in sure or p.name in by_logs]
     twists = [p for p in parameters if p.negligible > 0 and not p.amplitude]
     coupled = effect.discriminator is None or not twists or any(p in nonzero for p in twists)
-    amplitudes = [p for p in parameters if p.amplitude and p.negligible > 0.0]
     names = [f"{effect.name}.{p.name}" for p in amplitudes]
     present = [p for p in amplitudes if p in nonzero]
     if not present and together_nonzero(system, held_out, names, least):

@@ -9,12 +9,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import Instrument, Segment, clock, slow_orders
-from pipeline.criticism.data.traces import smoothed
+from pipeline.criticism.data.segment import Instrument, Segment, clock, joins, slow_orders
+from pipeline.criticism.data.traces import lagged, smoothed
 from pipeline.criticism.machine.model import (
-    BEND_SPEED,
     EARLY_S,
-    LATE_SPEED,
+    LATENESS,
     UNLOGGED_AT_REST,
     Model,
     clock_gain,
@@ -295,9 +294,9 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
         The error is evaluated at the true angle by a few rounds of iteration.
 
     """
-    late, bend = (segment.fixed.get(name, 0.0) * values[name] for name in (LATE_SPEED, BEND_SPEED))
+    late, bend, lag = (segment.fixed.get(name, 0.0) * values[name] for name in LATENESS)
     if late or bend:
-        x = _in_time(segment, x, late, bend)
+        x = _in_time(segment, x, late, bend, lag)
     none = np.zeros(x.omega_rad_s.shape)
     zero, frame = zero_angle(segment, x, values), frame_angle(segment, x, values)
     if not any(effect.angle is not None for effect in model.effects):
@@ -331,24 +330,46 @@ def _turned_back(x: Operating, error: Array, frame: Array, ahead: Complex) -> Op
     )
 
 
-def _in_time(segment: Segment, x: Operating, late_s: float, bend_s2: float) -> Operating:
-    """The state with a motion that was recorded late taken ahead, to the second order.
+def _in_time(
+    segment: Segment, x: Operating, late_s: float, bend_s2: float, lag_s: float
+) -> Operating:
+    """The state with a motion that was recorded late taken ahead.
+
+    A filter of first order is late by `late_s`, an observer of second order and a delay are by
+    `late_s` and `bend_s2`; a tracking loop is by `bend_s2` with a lag, 2 ζ over its bandwidth:
+
+        θ − θ_recorded = (late s + bend s² / (1 + lag s)) θ_recorded
 
     The angle goes ahead by its own differences: smoothed ones would bend it where the speed does.
     """
-    points = x.theta_rad.size // segment.size
+    points, policy = x.theta_rad.size // segment.size, x.machine.policy.cutting
     speed = np.gradient(x.theta_rad[::points], segment.ts_s)
-    ahead = late_s * speed
+    bent = bend_s2 * np.gradient(speed, segment.ts_s)
+    if lag_s > 0.0:
+        bent = np.concatenate(
+            [_lagged(part, segment.ts_s / lag_s) for part in np.split(bent, joins(segment))]
+        )
+    ahead = late_s * speed + bent
+    omega = late_s * np.gradient(x.omega_rad_s, segment.ts_s / points)
     if bend_s2:
-        ahead += bend_s2 * np.gradient(speed, segment.ts_s)
+        faster = _speed(bent, segment.ts_s, 1, policy)
+        omega += faster if points == 1 else np.repeat(faster, points)
     if points > 1:
         ahead = np.interp(np.arange(x.theta_rad.size) / points, np.arange(segment.size), ahead)
     return replace(
         x,
         eps_rad=x.eps_rad + x.machine.pole_pairs * ahead,
         theta_rad=x.theta_rad + ahead,
-        omega_rad_s=x.omega_rad_s + late_s * np.gradient(x.omega_rad_s, segment.ts_s / points),
+        omega_rad_s=x.omega_rad_s + omega,
     )
+
+
+def _lagged(part: Array, step: float) -> Array:
+    """Second differences [n] of what follows without a gap, behind a lag; those of the two samples
+    at either end reach across gaps, and are those of their neighbours instead.
+    """
+    inner = part[2:-2]
+    return lagged(np.pad(inner, 2, mode="edge"), step) if inner.size else part
 
 
 def _speed(theta: Array, period: float, finer: int, policy: Cutting) -> Array:

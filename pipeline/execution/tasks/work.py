@@ -22,6 +22,7 @@ from pipeline.execution.tasks.model_tests import Verdicts, judged_model
 from pipeline.io.storage.publish import canonical_json
 from pipeline.records.agreement import Disagreement
 from pipeline.records.capture import Campaign
+from pipeline.records.consistent_constants import separated
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet
 from pipeline.records.diagnosis import Diagnosis
@@ -30,7 +31,6 @@ from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.outcome import Stopwatch
-from pipeline.records.shaft_constants import separated
 
 UNTESTED = ModelVerdict("not_tested", note="the residual test is not made yet")
 

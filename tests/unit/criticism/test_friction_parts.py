@@ -14,10 +14,10 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.parameter import Machine
 from pipeline.estimation.estimators.derived import FORMULAS
 from pipeline.estimation.estimators.derived_electrical import FORMULAS as ELECTRICAL
+from pipeline.records.consistent_constants import FOLLOWING, combined, separated
 from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import FoundEffect, ModelVerdict
-from pipeline.records.shaft_constants import FOLLOWING, combined, separated
 from pipeline.records.uncertainty import type_b
 
 B, DRY = "b_visc_nm_s_rad", "torque_coulomb_nm"

@@ -29,14 +29,15 @@ LATE_S, BEND_S2 = 2.0 * DAMPING / OBSERVER_RAD_S, OBSERVER_RAD_S**-2
 SPEED_NOISE_RAD_S, CURRENT_NOISE_A = 0.02, 0.01
 
 
-def log(seed: int, windage: float, volts: bool = False) -> Capture:
+def log(seed: int, windage: float, volts: bool = False, tracks: bool = False) -> Capture:
     """Three seconds of a shaft that levels of current turn either way; `windage` [N·m s²]. With the
-    voltages of both axes where asked for.
+    voltages of both axes where asked for. A loop that `tracks` the angle has no lag at a constant
+    acceleration.
     """
     random, step = np.random.default_rng(seed), PERIOD_S / FINER
     levels = random.uniform(0.3, 2.2, 20) * np.tile((1.0, 1.0, -1.0, -1.0), 5)
     level = np.repeat(levels, round(0.15 / step))
-    omega = seen = change = current = 0.0
+    omega = seen = change = error = current = 0.0
     rows = []
     for number, wanted in enumerate(level):
         slope = (wanted - 0.01 * omega - current) / 2e-3
@@ -47,6 +48,11 @@ def log(seed: int, windage: float, volts: bool = False) -> Capture:
         current += step * slope
         drag = DRY_NM * math.tanh(omega / 0.05) + VISCOUS * omega + windage * omega * abs(omega)
         omega += step / J_KGM2 * (1.5 * PAIRS * PSI_WB * current - drag)
+        error += step * (omega - seen)
+        if tracks:
+            change += step * OBSERVER_RAD_S**2 * error
+            seen = change + 2.0 * DAMPING * OBSERVER_RAD_S * error
+            continue
         change += step * (
             OBSERVER_RAD_S**2 * (omega - seen) - 2.0 * DAMPING * OBSERVER_RAD_S * change
         )
@@ -118,6 +124,20 @@ def test_a_speed_beside_voltages_shows_inertia_and_friction() -> None:
     assert values["psi_wb"] == pytest.approx(PSI_WB, rel=0.003)
     assert values["j_kgm2"] == pytest.approx(J_KGM2, rel=0.01)
     assert values["coulomb_friction.torque_nm"] == pytest.approx(DRY_NM, rel=0.02)
+
+
+def test_a_loop_that_tracks_the_angle_is_behind_by_what_accelerates() -> None:
+    """Its speed is that of the angle that it tracks, and follows the acceleration with a lag."""
+    base = base_fit(
+        Campaign("m", (log(1, 0.0, volts=True, tracks=True),)), ModelSpec(), Constants({})
+    )
+    assert isinstance(base, BaseFit)
+    assert float(base.system.reduced_chi2(base.system.residual).max()) < 1.5
+    values = base.system.fit.values
+    assert values["late_speed_s"] == pytest.approx(0.0, abs=0.05 * LATE_S)
+    assert values["bend_speed_s2"] == pytest.approx(BEND_S2, rel=0.1)
+    assert values["lag_speed_s"] == pytest.approx(LATE_S, rel=0.2)
+    assert values["j_kgm2"] == pytest.approx(J_KGM2, rel=0.01)
 
 
 def test_without_a_torque_constant_it_is_asked_for() -> None:

@@ -15,7 +15,11 @@ from pipeline.criticism.ranking import _share_of_fall, ranked
 from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.cross_validation import HeldOut
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.identifiability import significantly_nonzero, together_nonzero
+from pipeline.criticism.regression.identifiability import (
+    least_of_several,
+    significantly_nonzero,
+    together_nonzero,
+)
 from pipeline.criticism.regression.linear_system import LinearSystem, model_columns
 from pipeline.criticism.search import Ladder, ladder_from
 from pipeline.criticism.selection.acceptance import _improves_held_out, is_determined
@@ -236,6 +240,8 @@ def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept
         ("windage", {"drag_nm": 0.1}, {"drag_nm": 0.04}, True),
         ("windage", {"drag_nm": 0.1}, {"drag_nm": 0.06}, False),
         ("bemf_harmonics", {"q6_sin": 1e-4, "d12_sin": 1e-2}, {"d12_sin": 6e-3}, False),
+        ("bemf_harmonics", {"q6_sin": 1e-4, "d12_sin": 1e-2}, {"d12_sin": 4.4e-3}, False),
+        ("bemf_harmonics", {"q6_sin": 1e-4, "d12_sin": 1e-2}, {"d12_sin": 3e-3}, True),
         ("bemf_harmonics", {"q6_sin": 1e-3, "d12_sin": 1e-2}, {"d12_sin": 6e-3}, True),
         ("current_gain", {"mean": 0.05, "cosine": 0.01}, {"cosine": 6e-3}, False),
         ("presliding", {"torque_nm": 0.1, "travel_rad": 1e-3}, {"travel_rad": 1e-2}, True),
@@ -264,6 +270,13 @@ def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, s
     held = HeldOut(plain.residual, 1.0, {0: step, 1: -step})
     monkeypatch.setattr("pipeline.criticism.selection.acceptance.leave_out", lambda _: held)
     assert is_determined(system, plain) is sure
+
+
+@pytest.mark.parametrize("count", [1, 4, 8])
+def test_the_largest_of_several_is_by_chance_no_further_from_zero_than_one_alone(count):
+    least = least_of_several(2.0, count)
+    largest = np.abs(np.random.default_rng(5).standard_normal((200_000, count))).max(axis=1)
+    assert np.mean(largest > least) == pytest.approx(math.erfc(2.0 / math.sqrt(2.0)), rel=0.04)
 
 
 def test_what_all_current_sensors_share_names_no_difference_of_them(monkeypatch):
