@@ -308,7 +308,7 @@ def _undetermined(part: _Part, fastest: float) -> NDArray[np.bool_]:
     slow |= part.hidden
     if part.kind == COAST:
         gaining = weak.integral(part.theta, 2) * weak.integral(part.theta, 1) > 0.0
-        slow |= np.convolve(gaining, np.ones(3), mode="same") > 1.5
+        slow |= np.convolve(gaining, np.ones(3))[1:-1] > 1.5
         slow |= _held(weak, part.speed)
     return slow
 

@@ -588,3 +588,14 @@ def test_a_nuisance_takes_ten_windows(drives, coasts, most, monkeypatch) -> None
     law = np.column_stack([rng.standard_normal(speed.size), -np.sign(speed), -speed])
     drag.drag_of(replace(rows, columns=forms), law, [], 0.01)
     assert asked[0] == most
+
+
+def test_a_coast_of_two_windows_has_a_row_for_each() -> None:
+    """A window's neighbours are counted where it has two, one or none."""
+    coast = coasting()
+    for count in range(30, 90):
+        short = replace(coast, tables=(coast.tables[0].head(count),))
+        rows = shaft_rows([short], {})
+        if rows is not None and rows.count == 2:
+            return
+    pytest.fail("no length of a coast gives two windows")
