@@ -28,6 +28,7 @@ from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT
 from pipeline.io.tables.csv_table import read_csv
 from pipeline.io.tables.foreign import find_reader
 from pipeline.io.tables.raw_table import RawTable, is_of_stamp
+from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.physics.glossary import COLUMNS
 from pipeline.records.capture import Capture, Integrity
 from pipeline.records.errors import CaptureError
@@ -77,7 +78,8 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
     else:
         raw, source, verified = _read_csv(content, entry)
     starts = common_starts(raw, source)
-    framed = (to_frame(table, source, meta.pole_pairs, starts) for table in raw)
+    timed = meta.test not in TESTS_WITHOUT_CLOCK
+    framed = (to_frame(table, source, meta.pole_pairs, starts, timed=timed) for table in raw)
     frames = [frame for frame in framed if frame is not None]
     if source is not None:
         frames = _with_columns(frames, source.columns_from_name(entry.path))

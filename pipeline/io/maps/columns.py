@@ -210,6 +210,8 @@ def to_frame(
     source: SourceMap | None,
     pole_pairs: int | None = None,
     starts: Mapping[str, int] | None = None,
+    *,
+    timed: bool = True,
 ) -> pl.DataFrame | None:
     """The contract's columns of one table.
 
@@ -223,6 +225,8 @@ def to_frame(
         Of the nameplate, for fields that a drive logs in electrical terms.
     starts
         Of `common_starts`; None for a table by itself.
+    timed
+        Whether the test needs a clock; blocks of a test without one have no times of their own.
 
     Returns
     -------
@@ -250,7 +254,7 @@ def to_frame(
         columns[part.column] = columns[part.column] * columns[_factor(part, named)]
     clock = next((part for part in chosen if part.column == "t_s"), None)
     starts = common_starts((table,), source) if starts is None else starts
-    time = _time(table, clock, source, starts)
+    time = _time(table, clock, source, starts, timed)
     if time is not None:
         columns = {"t_s": time} | columns
     frame = pl.DataFrame(columns)
@@ -319,7 +323,11 @@ def _converted(values: NDArray[Any], part: FieldMap, units: Mapping[str, str]) -
 
 
 def _time(
-    table: RawTable, clock: FieldMap | None, source: SourceMap | None, starts: Mapping[str, int]
+    table: RawTable,
+    clock: FieldMap | None,
+    source: SourceMap | None,
+    starts: Mapping[str, int],
+    timed: bool,
 ) -> Array | None:
     origin = "field" if source is None else source.time.origin
     if origin == "increment" and source is not None:
@@ -339,6 +347,8 @@ def _time(
     if not table.blocks:
         return time
     increment = None if source is None else source.time.increment_s
+    if increment is None and not timed:
+        return None
     if increment is None:
         raise CaptureError(
             "missing_time",

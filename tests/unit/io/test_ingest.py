@@ -341,6 +341,17 @@ def test_blocks_without_t_s_are_refused_unless_a_map_states_the_increment(tmp_pa
     assert table["omega_mech_rad_s"].to_list() == [0, 1, 2, 3, 4, 5]
 
 
+def test_blocks_of_a_test_without_a_clock_need_no_t_s(tmp_path: Path) -> None:
+    rows = [
+        ("/s", START_NS + n, json.dumps({"theta_elec_deg": [30 * n, 15], "lab_h": [2, 3]}).encode())
+        for n in range(2)
+    ]
+    found = fill(tmp_path, a__mcap=mcap_file(rows, metadata=META | {"test": "lcr"}))
+    (table,) = captures(tmp_path, found)[0].tables
+    assert table["theta_elec_deg"].to_list() == [0.0, 15.0, 30.0, 15.0]
+    assert "t_s" not in table.columns
+
+
 def test_a_block_whose_arrays_differ_in_length_is_refused_with_its_row(tmp_path: Path) -> None:
     rows = [{"t_s": [0, 1], "ia_a": [1, 2]}, {"t_s": [2, 3], "ia_a": [3]}]
     found = fill(tmp_path, a__mcap=mcap_file(json_messages(rows)))
