@@ -14,7 +14,12 @@ from pipeline.estimation.electrical.magnet_temperature import (
 )
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.electrical.ripple_torque import RIPPLE, winding_of
-from pipeline.estimation.mechanical.drag import drag_beside_offset, drag_by_current, drag_of
+from pipeline.estimation.mechanical.drag import (
+    drag_beside_offset,
+    drag_by_current,
+    drag_by_own_speed,
+    drag_of,
+)
 from pipeline.estimation.mechanical.drag_fit import DragFit, drag_description
 from pipeline.estimation.mechanical.drag_forms import DRAG_FORMS, DRAG_NAMES
 from pipeline.estimation.mechanical.drag_over_time import DragOverTime, drag_over_time
@@ -23,10 +28,11 @@ from pipeline.estimation.mechanical.drive_windows import (
     too_short,
     torque_is_separable,
 )
-from pipeline.estimation.mechanical.sampled_current import in_step, sampling_drag
+from pipeline.estimation.mechanical.sampled_current import in_step, lagging_inertia, sampling_drag
 from pipeline.estimation.mechanical.setups import another_setup, setups_of
 from pipeline.estimation.mechanical.shaft_doubts import DRAGS, Doubts
 from pipeline.estimation.mechanical.shaft_nuisances import (
+    CURRENT_LAG,
     NUISANCES,
     OFFSET,
     RELUCTANCE,
@@ -247,7 +253,7 @@ def _drag(
         drag = drag_of(rows, law, nuisances, level)
     if OFFSET in drag.names:
         drag = drag_beside_offset(rows, law, nuisances, level)
-    return drag
+    return drag if _by_angle(rows) else drag_by_own_speed(rows, law, nuisances, level, drag)
 
 
 def _over_time(
@@ -376,6 +382,8 @@ def _estimates(
         parts.append(Contribution("assumed:drag_form", float(drag.u_form[i]), "B"))
         parts += doubts.parts(i, float(constants[i]), float(constants[0]), logged)
         parts += sampled if name == "b_visc_nm_s_rad" else ()
+        if name == "j_rotor_kgm2" and CURRENT_LAG not in drag.names:
+            parts.append(lagging_inertia(rows.captures, float(constants[2])))
         parts += _of_a_speed(rows, float(constants[i]))
         parts += _of_a_d_current(rows, float(per_kt[i]) * torque.kt_nm_a)
         slopes = [float(slope[i]) for slope in (per_kt, per_rel, per_alpha)]
@@ -385,10 +393,14 @@ def _estimates(
     return tuple(estimates)
 
 
+def _by_angle(rows: ShaftRows) -> bool:
+    """Whether the motion of every drive is an angle, and no speed of the bench's own."""
+    return all(c.has("theta_mech_rad") for c in rows.captures if c.meta.test == "drive")
+
+
 def _of_a_speed(rows: ShaftRows, value: float) -> list[Contribution]:
     """What a bench's own speed, lagging or smoothed, may make of J, T_c or B without an angle."""
-    drives = [c for c in rows.captures if c.meta.test == "drive"]
-    if all(c.has("theta_mech_rad") for c in drives):
+    if _by_angle(rows):
         return []
     return [Contribution("assumed:speed_estimate", policy().drag.speed_share * value, "B")]
 

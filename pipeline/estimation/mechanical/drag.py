@@ -122,6 +122,38 @@ def drag_beside_offset(
     return replace(drag, u_form=np.hypot(drag.u_form, change))
 
 
+def drag_by_own_speed(
+    rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float, drag: DragFit
+) -> DragFit:
+    """The same fit where the motion is a bench's own speed: the current's instant is in doubt.
+
+    Parameters
+    ----------
+    rows, law, nuisances, level
+        As `drag_of` takes them.
+    drag
+        Their fit.
+
+    Returns
+    -------
+    DragFit
+        With the change of J, T_c and B that columns of the current's instant make in `u_form`.
+
+    Notes
+    -----
+    A speed that lags and is smoothed bends where the current jumps or changes. Columns of an open
+    instant of the current follow that, and take the place of the torque.
+
+    """
+    if not TIMING & set(drag.names):
+        return drag
+    others = drag_of(rows, law, [name for name in nuisances if name not in TIMING], level)
+    change = others.constants(others.coefficients) - drag.constants(drag.coefficients)
+    if {*others.names} - TIMING != {*drag.names} - TIMING:  # T_c and B of another form
+        change[1:] = 0.0
+    return replace(drag, u_form=np.hypot(drag.u_form, change))
+
+
 def drag_by_current(
     rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float, noise_nm: Array
 ) -> DragFit | None:

@@ -56,3 +56,40 @@ def test_a_jump_may_be_anywhere_between_its_rows(first_step: int, limit_a: float
     found = estimates(inertia.ESTIMATOR, drive(first_step, limit_a), known=known)["j_rotor_kgm2"]
     assert abs(found.number - J_KGM2) < 3.0 * found.u
     assert found.u < u * J_KGM2
+
+
+def propeller(seed: int):
+    """Twelve seconds of a speed loop with a propeller, logged at 100 Hz without an angle: mean
+    currents, and the speed of an observer of 100 Hz at the end of each row.
+    """
+    inertia_kgm2, kt, dry, square, limit_a = 8.3e-5, 0.26, 0.02, 1.1e-5, 7.2
+    gain, step_s, row, observer = 0.022, 1e-4, 100, 2.0 * math.pi * 100.0
+    rng = np.random.default_rng(seed)
+    points = np.repeat(rng.uniform(110.0, 310.0, 18), 70 * row)[: 1200 * row]
+    current, speed = np.empty(points.size), np.empty(points.size)
+    omega = theta = seen = seen_theta = integral = 0.0
+    for n, wanted in enumerate(points):
+        integral = float(
+            np.clip(integral + 6.0 * gain * step_s * (wanted - seen), -limit_a, limit_a)
+        )
+        current[n] = np.clip(gain * (wanted - seen) + integral, -limit_a, limit_a)
+        drag = dry * math.tanh(omega / 0.1) + square * omega * abs(omega)
+        omega += step_s / inertia_kgm2 * (kt * current[n] - drag)
+        theta += step_s * omega
+        ahead = theta - seen_theta
+        seen_theta += step_s * (seen + 2.0 * observer * ahead)
+        seen += step_s * observer**2 * ahead
+        speed[n] = seen
+    rows = np.arange(row - 1, points.size, row)
+    means = current.reshape(-1, row).mean(axis=1) + rng.normal(0.0, 1e-3, rows.size)
+    columns = {"t_s": step_s * rows, "omega_mech_rad_s": speed[rows], "iq_a": means}
+    return capture("drive", f"drive_{seed}", **columns), inertia_kgm2, kt
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_a_smoothed_speed_hides_is_no_torque_of_a_jumping_current(seed: int) -> None:
+    """Columns of the current's instant took the torque's place: J was twice what it is."""
+    made, true, kt = propeller(seed)
+    known = Constants((known_value("kt_peak_nm_a", kt, 1e-4 * kt),))
+    found = estimates(inertia.ESTIMATOR, made, known=known)["j_rotor_kgm2"]
+    assert not found.known or abs(found.number - true) < 3.0 * found.u

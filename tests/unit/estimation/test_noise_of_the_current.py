@@ -88,3 +88,24 @@ def test_what_the_timing_takes_of_a_torque_is_not_held_against_its_size() -> Non
     assert not has_torque_of_its_own(SimpleNamespace(design=design, names=names))
     alone = SimpleNamespace(design=design[:, :4], names=names[:4])
     assert has_torque_of_its_own(alone)
+
+
+def test_rows_that_are_means_up_to_their_time_are_late_by_half_a_row() -> None:
+    """J - τB stands for J under a current that is τ late; it was J, sure to a percent."""
+    row_s, parts, viscous = 5e-3, 50, 0.5
+    fine = np.arange(0.0, 60.0, row_s / parts)
+    theta, omega, alpha = 6.0 * fine, np.full(fine.size, 6.0), np.zeros(fine.size)
+    for amplitude, hz, phase in ((0.8, 0.31, 0.0), (0.25, 0.83, 1.0)):
+        w = 2.0 * math.pi * hz
+        theta += amplitude * np.sin(w * fine + phase)
+        omega += amplitude * w * np.cos(w * fine + phase)
+        alpha -= amplitude * w**2 * np.sin(w * fine + phase)
+    torque = J_KGM2 * alpha + DRY_NM + viscous * omega
+    means = torque.reshape(-1, parts).mean(axis=1) / KT
+    rows = slice(parts - 1, None, parts)
+    made = log(fine[rows], theta[rows], means, 0.014, 147_456)
+    found = estimates(inertia.ESTIMATOR, made, known=KNOWN)["j_rotor_kgm2"]
+    late_kgm2 = 0.5 * row_s * viscous
+    assert found.number == pytest.approx(J_KGM2 - late_kgm2, abs=0.5 * late_kgm2)
+    assert abs(found.number - J_KGM2) < 3.0 * found.u
+    assert found.u < late_kgm2
