@@ -26,7 +26,9 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.stated import stated_constants
 
 _TRACED = ("torque_map", "drive", "heat_run")
-_TABLES = (*sorted(TESTS_WITHOUT_CLOCK), "holding_current")
+_HELD = "holding_current"
+"""A rotor that is held from angle to angle: its pace is the bench's."""
+_TABLES = (*sorted(TESTS_WITHOUT_CLOCK), _HELD)
 _SHAFT_ALONE = ("spin_down", "cogging")
 """Tests without a current, of which a winding's pole pairs say nothing."""
 _OF_AN_ANGLE = ("vd_v", *LINES_V, "va_v", "vb_v", "vc_v", "ia_a", "ib_a", "ic_a")
@@ -131,7 +133,8 @@ def _scales(
     current = current or _largest(tables, ("id_a", "iq_a"))
     voltage = _largest(logs, ("vd_v", "vq_v")) or _largest(campaign.captures, LINES_V)
     voltage = voltage or _largest(tables, ("vq_v",))
-    speed = max((_speed(c) for c in campaign.captures), default=0.0) or 1.0
+    turned = max((_speed(c) for c in campaign.captures if c.meta.test != _HELD), default=0.0)
+    speed = turned or max((_speed(c) for c in campaign.captures), default=0.0) or 1.0
     flux = 0.0 if voltage else _largest(tables, ("psi_d_wb", "psi_q_wb"))
     voltage = voltage or flux * pole_pairs * speed
     # without a winding on record the torque's own size is all there is
@@ -141,6 +144,9 @@ def _scales(
     recorded = {"impedance_ohm": voltage / current} if current and voltage else {}
     current, voltage = current or 1.0, voltage or 1.0
     psi = voltage / (pole_pairs * speed)
+    if not turned and (amperes := _largest(campaign.of("torque_table"), ("iq_a",))):
+        # the voltage of a winding that no test turned is that of its resistance
+        psi = clamped / (1.5 * pole_pairs * amperes)
     fitted = start.best("psi_pm_wb")
     psi = fitted.number if fitted is not None else known.get("psi_wb", (psi, 0.0))[0]
     return {
@@ -302,7 +308,10 @@ def _largest(captures: Iterable[Capture], names: tuple[str, ...]) -> float:
 
 
 def _speed(capture: Capture) -> float:
-    """The largest speed [rad/s] but for spikes; 0 of an angle that moves by its rounding alone."""
+    """The largest speed [rad/s] but for spikes; 0 of an angle that moves by its rounding alone.
+
+    Of a turn by hand without an angle it is that of one turn in its time.
+    """
     if capture.has("omega_mech_rad_s"):
         speed = capture.arrays("omega_mech_rad_s")["omega_mech_rad_s"]
         return float(np.nanquantile(np.abs(speed), 0.999))
@@ -314,6 +323,8 @@ def _speed(capture: Capture) -> float:
                 return 0.0
             speed = np.gradient(theta, columns["t_s"])
             return float(np.nanquantile(np.abs(speed), 0.999))
+    if capture.meta.test == "hand_turn" and capture.has("t_s"):
+        return TURN_RAD / float(np.ptp(capture.arrays("t_s")["t_s"]))
     return 0.0
 
 

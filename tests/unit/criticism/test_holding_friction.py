@@ -20,6 +20,7 @@ from pipeline.simulator.bench import campaign
 from pipeline.simulator.design import Bench
 from tests.simulated import campaign_of, design
 from tests.unit.criticism.machines import BASE
+from tests.unit.estimation.signals import capture as signal_capture
 
 MOTOR = replace(design("gimbal-5208"), effects={})
 
@@ -73,3 +74,24 @@ def test_a_held_rotor_has_any_friction_up_to_stiction(share) -> None:
     found = diagnose(replace(whole, captures=tuple(captures)), ModelSpec(), Constants())
     assert found.missing == ()
     assert found.verdict != "unknown"
+
+
+def test_the_pace_of_a_held_rotor_is_no_speed_of_its_winding() -> None:
+    """The voltage of a resistance over 0.04 rad/s made a flux a thousand times too large, and
+    nothing that a table or a held rotor shows was of a size that matters.
+    """
+    still = recorded("holding_current", "torque_table", "resistance")
+    machine = machine_of(still, Constants())
+    assert machine is not None
+    assert machine.scales["flux_wb"] == pytest.approx(MOTOR.psi_pm_wb, rel=0.2)
+    table = still.of("torque_table")[0].arrays("torque_shaft_nm")["torque_shaft_nm"]
+    assert machine.scales["torque_nm"] == pytest.approx(np.max(np.abs(table)), rel=0.05)
+
+
+def test_a_turn_by_hand_without_an_angle_is_one_turn_in_its_time() -> None:
+    seconds = np.linspace(0.0, 1.5, 300)
+    turned = signal_capture("hand_turn", t_s=seconds, vab_v=np.sin(40.0 * seconds))
+    whole = recorded("holding_current")
+    machine = machine_of(replace(whole, captures=(*whole.captures, turned)), Constants())
+    assert machine is not None
+    assert machine.scales["speed_rad_s"] == pytest.approx(2.0 * np.pi / 1.5)
