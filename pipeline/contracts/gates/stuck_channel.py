@@ -36,6 +36,7 @@ MUST_MOVE: dict[str, tuple[str, ...]] = {
     "drive": ("iq_a", "vq_v"),
 }
 NOISY = (*TERMINALS, "va_v", "vb_v", "vc_v", "id_a", "iq_a", "torque_shaft_nm")
+DQ_VOLTAGES = ("vd_v", "vq_v")
 BESIDE = 50
 REMEDY = "check the sensor and its lead, and record again"
 
@@ -54,7 +55,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     for index, table in enumerate(capture.tables):
         for name in table.columns:
             signal = table[name].to_numpy()
-            if name in MUST_MOVE[capture.meta.test]:
+            if name in MUST_MOVE[capture.meta.test] and not _is_command(capture, name):
                 _refuse_dead(name, signal)
             if name not in NOISY:
                 continue
@@ -68,6 +69,11 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
             masks.append(Mask(NAME, index, ~frozen))
             findings.append(warning(capture, NAME, f"{words}; set aside", REMEDY, span_of(frozen)))
     return Passed(tuple(masks), tuple(findings))
+
+
+def _is_command(capture: Capture, name: str) -> bool:
+    """Whether a column is what a drive was told to apply: a step is one value in every row."""
+    return name in DQ_VOLTAGES and capture.meta.voltage_kind == "commanded"
 
 
 def _refuse_dead(name: str, values: Array) -> None:

@@ -38,6 +38,17 @@ def test_a_fifth_of_the_rows_may_stand_still(share: float, expected: str) -> Non
     assert said("stuck_channel", dead) == "refused"
 
 
+@pytest.mark.parametrize(
+    ("kind", "expected"), [("commanded", ""), ("measured", "refused"), (None, "refused")]
+)
+def test_a_step_of_the_voltage_is_one_command_in_every_row(kind, expected) -> None:
+    """A drive in open loop that began before its log; a sensor of a voltage would show noise."""
+    speed = 50.0 * -np.expm1(-np.arange(500) / 80.0)
+    meta = {"voltage_kind": kind}
+    made = capture("drive", meta=meta, vq_v=np.full(500, 1.9), omega_mech_rad_s=speed)
+    assert said("stuck_channel", made) == expected
+
+
 @pytest.mark.parametrize(("repeats", "settles"), [(24, False), (25, True)])
 def test_a_signal_that_repeats_beside_a_run_settles(repeats: int, settles: bool) -> None:
     """Of the 49 steps of the 50 rows before it, more than half repeat."""
