@@ -15,9 +15,9 @@ from pipeline.estimation.electrical.magnet_temperature import (
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.electrical.ripple_torque import RIPPLE, winding_of
 from pipeline.estimation.mechanical.drag import (
+    drag_beside_current,
     drag_beside_offset,
     drag_by_current,
-    drag_by_own_speed,
     drag_of,
 )
 from pipeline.estimation.mechanical.drag_fit import DragFit, drag_description
@@ -253,7 +253,7 @@ def _drag(
         drag = drag_of(rows, law, nuisances, level)
     if OFFSET in drag.names:
         drag = drag_beside_offset(rows, law, nuisances, level)
-    return drag if _by_angle(rows) else drag_by_own_speed(rows, law, nuisances, level, drag)
+    return drag_beside_current(rows, drag, smoothed=not _by_angle(rows))
 
 
 def _over_time(

@@ -23,9 +23,9 @@ from pipeline.estimation.mechanical.drive_windows import coasts_decide, drive_co
 from pipeline.estimation.mechanical.shaft_nuisances import (
     BY_SENSE,
     COAST_LOAD,
-    OF_CURRENT,
     SAMPLED,
     TIMING,
+    is_of_current,
 )
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.estimation.policy import policy
@@ -122,36 +122,53 @@ def drag_beside_offset(
     return replace(drag, u_form=np.hypot(drag.u_form, change))
 
 
-def drag_by_own_speed(
-    rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float, drag: DragFit
-) -> DragFit:
-    """The same fit where the motion is a bench's own speed: the current's instant is in doubt.
+def drag_beside_current(rows: ShaftRows, drag: DragFit, smoothed: bool) -> DragFit:
+    """The same fit, in doubt by what nuisances of the current move its constants.
 
     Parameters
     ----------
-    rows, law, nuisances, level
-        As `drag_of` takes them.
+    rows
+        Windows of drives and coast-downs.
     drag
         Their fit.
+    smoothed
+        Whether the motion is a bench's own speed, which lags.
 
     Returns
     -------
     DragFit
-        With the change of J, T_c and B that columns of the current's instant make in `u_form`.
+        With the change of J, T_c and B in `u_form` that each of these nuisances makes, and all do
+        together, times √(χ²/χ₀²), χ₀² being that of the drives without it; of the current's instant
+        all of it where the motion is smoothed, for that bends as a late current does.
 
     Notes
     -----
-    A speed that lags and is smoothed bends where the current jumps or changes. Columns of an open
-    instant of the current follow that, and take the place of the torque.
+    A column that goes with the current or its instant is much like the torque, and takes its place
+    where it follows another error. Where it explains all that the torque leaves, there is none.
 
     """
-    if not TIMING & set(drag.names):
-        return drag
-    others = drag_of(rows, law, [name for name in nuisances if name not in TIMING], level)
-    change = others.constants(others.coefficients) - drag.constants(drag.coefficients)
-    if {*others.names} - TIMING != {*drag.names} - TIMING:  # T_c and B of another form
-        change[1:] = 0.0
-    return replace(drag, u_form=np.hypot(drag.u_form, change))
+    certain = {"torque"} if smoothed else {"torque"} | TIMING
+    beside = [k for k, n in enumerate(drag.names) if is_of_current(n) and n not in certain]
+    square = drag.u_form**2
+    for left_out in {(k,) for k in beside} | {tuple(beside)} - {()}:
+        square = square + _moved_by(rows, drag, left_out, smoothed) ** 2
+    return replace(drag, u_form=np.sqrt(square))
+
+
+def _moved_by(rows: ShaftRows, drag: DragFit, columns: Sequence[int], smoothed: bool) -> Array:
+    """What J, T_c and B [3] change by without some columns, as far as it is in doubt."""
+    keep = ~np.isin(np.arange(len(drag.names)), columns)
+    others = linear_fit(drag.design[:, keep], drag.target, drag.sigma)
+    coefficients = np.zeros(keep.size)
+    coefficients[keep] = others.coefficients
+    change = drag.constants(coefficients) - drag.constants(drag.coefficients)
+    drives = rows.kind == DRIVE
+    own, without = (
+        float(np.sum((r / drag.sigma)[drives] ** 2)) for r in (drag.residuals, others.residuals)
+    )
+    if smoothed and TIMING.issuperset(drag.names[k] for k in columns):
+        return change
+    return change * math.sqrt(min(own / without, 1.0) if without else 1.0)
 
 
 def drag_by_current(
@@ -184,7 +201,7 @@ def drag_by_current(
     Fuller, Measurement Error Models, Wiley, 1987, section 1.1. doi:10.1002/9780470316665
 
     """
-    others = [name for name in nuisances if not name.startswith(OF_CURRENT)]
+    others = [name for name in nuisances if not is_of_current(name)]
     names = [name for name in others if float(np.ptp(rows.columns[name])) > 0.0]
     if np.any(rows.kind == COAST) or rows.disjoint(DRIVE) < len(names) + law.shape[1]:
         return None

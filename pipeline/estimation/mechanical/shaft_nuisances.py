@@ -23,3 +23,15 @@ OF_CURRENT = ("torque", "load", "current", "d current", "q current", "d q curren
 """How the names of columns begin that the current makes."""
 RELUCTANCE = "d q current"
 """What reluctance adds to the torque, where nothing shows how much."""
+
+
+def is_of_current(name: str) -> bool:
+    """Whether the current makes a column of the rows, be it a wave over the angle.
+
+    Parameters
+    ----------
+    name
+        Of the column.
+
+    """
+    return name.startswith(OF_CURRENT) or "q current" in name

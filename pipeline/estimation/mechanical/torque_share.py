@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.estimation.mechanical.drag_fit import DragFit
-from pipeline.estimation.mechanical.shaft_nuisances import OF_CURRENT, TIMING
+from pipeline.estimation.mechanical.shaft_nuisances import TIMING, is_of_current
 from pipeline.estimation.mechanical.shaft_rows import DRIVE, ShaftRows
 from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import linear_fit
@@ -28,7 +28,7 @@ def is_apart(rows: ShaftRows, driving_nm: Array, name: str) -> bool:
         Of the nuisance.
 
     """
-    if not name.startswith(OF_CURRENT) or name not in rows.columns:
+    if not is_of_current(name) or name not in rows.columns:
         return True
     column = rows.columns[name]
     own = linear_fit(driving_nm[:, None], column).residuals
@@ -63,7 +63,7 @@ def is_of_size(name: str) -> bool:
         Of the nuisance.
 
     """
-    return name.startswith(OF_CURRENT) and name not in TIMING
+    return is_of_current(name) and name not in TIMING
 
 
 def share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
@@ -97,7 +97,7 @@ def share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
     if drag.steady:
         return 0.0
     drives = rows.kind == DRIVE
-    others = [k for k, name in enumerate(drag.names) if not name.startswith(OF_CURRENT)]
+    others = [k for k, name in enumerate(drag.names) if not is_of_current(name)]
     without = linear_fit(drag.design[drives][:, others], drag.target[drives])
     costs = [float(np.sum(r**2)) for r in (drag.residuals[drives], without.residuals)]
     if drag.by_current:

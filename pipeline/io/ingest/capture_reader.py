@@ -28,8 +28,7 @@ from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT
 from pipeline.io.tables.csv_table import read_csv
 from pipeline.io.tables.foreign import find_reader
 from pipeline.io.tables.raw_table import RawTable, is_of_stamp
-from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
-from pipeline.physics.glossary import COLUMNS
+from pipeline.physics.glossary import COLUMNS, TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Capture, Integrity
 from pipeline.records.errors import CaptureError
 
