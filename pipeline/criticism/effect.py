@@ -270,6 +270,17 @@ class Effect(Description, Evidence, Hooks):
         """
         return self.expand(machine) if self.expand is not None else self.parameters
 
+    def named(self, machine: Machine) -> dict[str, Parameter]:
+        """The parameters for one machine by full name, `effect.parameter`.
+
+        Parameters
+        ----------
+        machine
+            Determines how many there are, where the effect has `expand`.
+
+        """
+        return {f"{self.name}.{p.name}": p for p in self.parameters_of(machine)}
+
     def gone_through(self, machine: Machine) -> bool:
         """Whether some capture goes through enough of a wave of the effect over the angle.
 

@@ -129,11 +129,8 @@ def _nearest(
 
 def _amplitudes(effect: Effect, wide: LinearSystem) -> Array:
     """The effect's fitted amplitudes [P], zero at every other column and at shapes."""
-    names = {
-        f"{effect.name}.{p.name}": wide.fit.values[f"{effect.name}.{p.name}"]
-        for p in effect.parameters_of(wide.fit.machine)
-        if p.amplitude
-    }
+    named, values = effect.named(wide.fit.machine), wide.fit.values
+    names = {name: values[name] for name, p in named.items() if p.amplitude}
     return np.array([names.get(column.name, 0.0) for column in wide.columns])
 
 

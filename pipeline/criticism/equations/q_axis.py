@@ -10,7 +10,7 @@ from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.traces import window_between_gaps
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
-from pipeline.criticism.machine.model import STATE, UNSAMPLED, Model, Pieces, values_of
+from pipeline.criticism.machine.model import STATE, UNSAMPLED, Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.true_current import drive_current
@@ -133,10 +133,8 @@ def predicted(
 def _recorded_speed(segment: Segment, x: Operating, model: Model, values: Values) -> Array:
     """Speed [n] of the angle as a drive's own estimate gives it [rad/s]."""
     speed: Array = central(x.theta_rad, segment.ts_s)
-    for effect in model.effects:
-        if effect.speed is not None:
-            q = values_of(effect, model.machine, values)
-            speed = effect.speed(speed, q, segment.ts_s)
+    for estimate, q in model.hooks("speed", values):
+        speed = estimate(speed, q, segment.ts_s)
     return speed
 
 

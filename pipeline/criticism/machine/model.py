@@ -12,9 +12,10 @@ Woodson & Melcher, Electromechanical Dynamics (1968), ch. 3 (torque from co-ener
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -219,10 +220,26 @@ class Model:
     def parameters(self) -> dict[str, tuple[Effect, Parameter]]:
         """Every effect parameter by its full name, in order."""
         return {
-            f"{effect.name}.{parameter.name}": (effect, parameter)
+            name: (effect, parameter)
             for effect in self.effects
-            for parameter in effect.parameters_of(self.machine)
+            for name, parameter in effect.named(self.machine).items()
         }
+
+    def hooks(self, name: str, values: Values) -> Iterator[tuple[Any, Values]]:
+        """One hook of every effect that has it, with the effect's parameters by short name.
+
+        Parameters
+        ----------
+        name
+            Of the hook (`effect.Hooks`).
+        values
+            Parameters by full name.
+
+        """
+        for effect in self.effects:
+            hook = getattr(effect, name)
+            if hook is not None:
+                yield hook, values_of(effect, self.machine, values)
 
     def priors(self) -> dict[str, tuple[float, float]]:
         """Centre and standard uncertainty of every nuisance and stated parameter.
@@ -330,11 +347,7 @@ def clock_gain(recorder: str | None, model: Model, values: Values) -> float:
     """
     if recorder is None:
         return 0.0
-    gains = [
-        effect.clock(recorder, values_of(effect, model.machine, values))
-        for effect in model.effects
-        if effect.clock is not None
-    ]
+    gains = [clock(recorder, q) for clock, q in model.hooks("clock", values)]
     return values["gain_clock"] + sum(gains)
 
 
@@ -408,10 +421,8 @@ def evaluate(model: Model, x: Operating, values: Values, hooks: frozenset[str] =
             added, turn = effect_flux(effect, x, values_of(effect, model.machine, values))
             flux, slope = flux + added, slope + turn
     x.psi_wb = flux
-    for effect in model.effects:
-        if effect.parallel is not None:
-            beside = effect.parallel(x, values_of(effect, model.machine, values))
-            flux = flux - flux_of(beside, values)
+    for parallel, q in model.hooks("parallel", values):
+        flux = flux - flux_of(parallel(x, q), values)
     x.psi_wb = flux
     x.torque_em_nm = air_gap_torque(x, flux, slope)
     drop = _drops(model, x, values) if "drop" in hooks else np.zeros_like(flux)
@@ -433,9 +444,8 @@ def _drops(model: Model, x: Operating, values: Values) -> Complex:
     """Voltage [n, V] of the resistance and of every effect that has a drop."""
     mean = mean_current(x, values)
     drop: Complex = (values["r_ohm"] + lead_ohm(x, values)) * mean.i_a
-    for effect in model.effects:
-        if effect.drop is not None:
-            drop = drop + effect.drop(mean, values_of(effect, model.machine, values))
+    for lost, q in model.hooks("drop", values):
+        drop = drop + lost(mean, q)
     return drop
 
 
@@ -516,8 +526,7 @@ def zero(effect: Effect, model: Model, at: Iterable[tuple[str, float]] = ()) -> 
     """
     shapes = dict(at)
     values = {}
-    for p in effect.parameters_of(model.machine):
-        name = f"{effect.name}.{p.name}"
+    for name, p in effect.named(model.machine).items():
         scale = model.machine.scale(p)
         values[name] = 0.0 if p.amplitude else shapes.get(p.name, p.scan[0] * scale)
     return values

@@ -84,8 +84,8 @@ def effect_columns(
     """
     inside = effect in model.effects
     columns = []
-    for p in effect.parameters_of(model.machine):
+    for name, p in effect.named(model.machine).items():
         if p.amplitude or (inside and not p.choice):
             step = max(p.negligible, 1e-2 * p.typical) * model.machine.scale(p)
-            columns.append(Column(f"{effect.name}.{p.name}", step, effect, at))
+            columns.append(Column(name, step, effect, at))
     return columns

@@ -328,8 +328,8 @@ def _sizes(fit: Fit, columns: Sequence[Column]) -> Array:
     known["b_nm_s_rad"] = max(abs(values["b_nm_s_rad"]), orders["b_nm_s_rad"])
     for name, (effect, p) in model.parameters().items():
         alike = [
-            abs(values[f"{effect.name}.{q.name}"])
-            for q in effect.parameters_of(model.machine)
+            abs(values[other])
+            for other, q in effect.named(model.machine).items()
             if q.amplitude and (q.unit, q.scale) == (p.unit, p.scale)
         ]
         sizes = alike if p.amplitude else [abs(values[name])]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
-from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
+from pipeline.criticism.machine.model import Model, evaluate, zero
 from pipeline.criticism.operating import Array, Complex, Operating, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.regression import NoiseFloors
@@ -341,13 +341,11 @@ def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
     factor = 1.0 + model.policy.selection.form_error
     moved = replace(x, id_a=x.id_a * factor, iq_a=x.iq_a * factor, cache={})
     change = np.zeros(x.omega_rad_s.shape, dtype=complex)
-    for effect in model.effects:
-        if effect.drop is not None:
-            q = values_of(effect, model.machine, values)
-            before = effect.drop(x, q)
-            step = effect.drop(moved, q) - before
-            steeper = np.abs(step) - (factor - 1.0) * np.abs(before)
-            change = change + np.maximum(steeper, 0.0) * np.exp(1j * np.angle(step))
+    for drop, q in model.hooks("drop", values):
+        before = drop(x, q)
+        step = drop(moved, q) - before
+        steeper = np.abs(step) - (factor - 1.0) * np.abs(before)
+        change = change + np.maximum(steeper, 0.0) * np.exp(1j * np.angle(step))
     return change
 
 

@@ -79,7 +79,7 @@ def reported_parameters(system: LinearSystem, held_out: HeldOut) -> dict[str, Mo
             reported[c.name] = _or_stated(reported[c.name], stated.get(c.name))
     for name, (effect, p) in model.parameters().items():
         value = fit.values[name]
-        beside = [f"{effect.name}.{q.name}" for q in effect.parameters_of(model.machine)]
+        beside = effect.named(model.machine)
         sure = sized[name] if name in u else any(sized.get(one, False) for one in beside)
         bound = not p.choice and at_bound(value, limits[name])
         reported[name] = _parameter(value, u.get(name, p.u), p.unit, sure, bound)

@@ -157,10 +157,7 @@ def detectable(effect: Effect, wide: LinearSystem, offered: Sequence[Candidate])
 
     """
     model_columns, machine = wide.model_columns, wide.fit.machine
-    sizes = {
-        f"{effect.name}.{p.name}": p.typical * machine.scale(p)
-        for p in effect.parameters_of(machine)
-    }
+    sizes = {name: p.typical * machine.scale(p) for name, p in effect.named(machine).items()}
     best = 0.0
     for candidate, places in placed(wide, offered):
         if candidate.effect.name != effect.name:

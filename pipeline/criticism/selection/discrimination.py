@@ -82,11 +82,9 @@ def _full_log(segment: Segment, model: Model, fit: Fit) -> FullLog:
 def _true_torque(recorded: Array, model: Model, values: Values) -> Array:
     """True shaft torque [n] behind a recorded one: gain and offset of the transducer taken out."""
     torque = recorded / (1.0 + values["gain_torque"])
-    for effect in reversed(model.effects):
-        if effect.shaft is not None:
-            q = values_of(effect, model.machine, values)
-            offset, at_one = effect.shaft(np.array([0.0, 1.0]), q)
-            torque = (torque - offset) / (at_one - offset)
+    for shaft, q in reversed(list(model.hooks("shaft", values))):
+        offset, at_one = shaft(np.array([0.0, 1.0]), q)
+        torque = (torque - offset) / (at_one - offset)
     return torque
 
 

@@ -81,10 +81,9 @@ def with_linear_start(
 def _by_choices(begun: Fit) -> list[Fit]:
     """A start with every value of its last effect's choices: a linear form is of one of them."""
     effect = begun.model.effects[-1]
-    choices = [p for p in effect.parameters_of(begun.machine) if p.choice]
-    names = [f"{effect.name}.{p.name}" for p in choices]
-    values = product(*(p.scan for p in choices))
-    return [begun.at(dict(zip(names, one, strict=True))) for one in values]
+    choices = {name: p.scan for name, p in effect.named(begun.machine).items() if p.choice}
+    values = product(*choices.values())
+    return [begun.at(dict(zip(choices, one, strict=True))) for one in values]
 
 
 def with_better(
@@ -194,19 +193,16 @@ def score_between(base: LinearSystem, end: LinearSystem, candidate: Candidate) -
     """
     before, after = _quality(base), _quality(end)
     effect, machine = end.fit.model.effects[-1], base.fit.machine
-    parameters = effect.parameters_of(machine)
-    values = {
-        f"{effect.name}.{p.name}": end.fit.values[f"{effect.name}.{p.name}"] for p in parameters
-    }
-    amplitudes = [f"{effect.name}.{p.name}" for p in parameters if p.amplitude]
+    parameters = effect.named(machine)
+    values = {name: end.fit.values[name] for name in parameters}
     score = Score(
         replace(candidate, effect=effect, values=values),
         before.deviance - after.deviance,
         0.0,
-        {name: values[name] for name in amplitudes},
+        {name: values[name] for name, p in parameters.items() if p.amplitude},
         _moves(base.fit, end.fit),
         share_of(base, effect, before, after),
-        size_of(end.fit, effect, parameters),
+        size_of(end.fit, effect, parameters.values()),
         fall_below_floor(base, before.reduced_chi2, after.reduced_chi2),
         policy=base.policy.selection,
     )

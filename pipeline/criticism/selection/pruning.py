@@ -151,8 +151,8 @@ def _unless_worth(
 
 def _parameters(fit: Fit, effect: Effect, terms: Sequence[int]) -> tuple[str, ...]:
     """Full names of the parameters of some terms."""
-    parameters = effect.parameters_of(fit.model.machine)
-    return tuple(f"{effect.name}.{p.name}" for p in parameters if p.optional in terms)
+    named = effect.named(fit.model.machine)
+    return tuple(name for name, p in named.items() if p.optional in terms)
 
 
 def _spare(system: LinearSystem, effect: Effect, penalty: float) -> tuple[int, ...]:

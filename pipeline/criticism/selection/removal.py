@@ -106,14 +106,9 @@ def loss_without(
     left_out = np.array(
         [n for n in model_columns if system.columns[n].name.startswith(stems)], dtype=int
     )
-    machine = fit.machine
-    amplitude = {
-        f"{e.name}.{p.name}": p.amplitude
-        for e in fit.model.effects
-        for p in e.parameters_of(machine)
-    }
+    known = fit.model.parameters()
     names_out = [system.columns[n].name for n in left_out]
-    move = np.array([-fit.values[n] if amplitude[n] else 0.0 for n in names_out])
+    move = np.array([-fit.values[n] if known[n][1].amplitude else 0.0 for n in names_out])
     equations = system.normal_equations() if normal_equations is None else normal_equations
     places = () if instead is None else instead
     return loss_at(system, equations, left_out, move, places, *fit.policy.selection.thorough)

@@ -176,8 +176,8 @@ def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
     """
     used = {} if score is None else score.step
     return sum(
-        not p.optional or bool(used.get(f"{effect.name}.{p.name}"))
-        for p in effect.parameters_of(machine)
+        not p.optional or bool(used.get(name))
+        for name, p in effect.named(machine).items()
         if not p.choice
     )
 
@@ -209,9 +209,7 @@ class _Scoring:
     ) -> Score | None:
         """Score of one candidate with parameters on the wrong side of a bound left at zero."""
         system, machine = self.system, self.system.fit.machine
-        parameters = {
-            f"{candidate.effect.name}.{p.name}": p for p in candidate.effect.parameters_of(machine)
-        }
+        parameters = candidate.effect.named(machine)
         best = self._inside(places, parameters, effort)
         if best is None:
             return None

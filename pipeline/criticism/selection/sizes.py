@@ -61,8 +61,8 @@ def _beyond(fit: Fit, effect: Effect) -> bool:
     """
     limits = limits_of(fit.model)
     held = [
-        f"{effect.name}.{p.name}"
-        for p in effect.parameters_of(fit.machine)
+        name
+        for name, p in effect.named(fit.machine).items()
         if p.amplitude and (p.negligible > 0.0 or not p.optional)
     ]
     return any(fit.values[name] != 0.0 and fit.values[name] in limits[name] for name in held)
@@ -106,6 +106,6 @@ def is_rare(effect: Effect, fit: Fit) -> bool:
 
     """
     return effect.rare or any(
-        fit.values[f"{effect.name}.{p.name}"] < p.rare_below * fit.machine.scale(p)
-        for p in effect.parameters_of(fit.machine)
+        fit.values[name] < p.rare_below * fit.machine.scale(p)
+        for name, p in effect.named(fit.machine).items()
     )

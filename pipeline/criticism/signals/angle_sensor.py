@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.machine.model import Model, values_of
+from pipeline.criticism.machine.model import Model
 from pipeline.criticism.operating import Array, Complex, Operating, Values
 
 _ERRORS = ("zero_angle_rad", "late_angle_s", "bend_angle_s2")
@@ -125,7 +125,6 @@ def angle_error(x: Operating, model: Model, values: Values) -> Array:
 
     """
     total = np.zeros(x.omega_rad_s.shape)
-    for effect in model.effects:
-        if effect.angle is not None:
-            total = total + effect.angle(x, values_of(effect, model.machine, values))
+    for angle, q in model.hooks("angle", values):
+        total = total + angle(x, q)
     return total

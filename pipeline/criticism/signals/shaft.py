@@ -14,7 +14,6 @@ from pipeline.criticism.machine.model import (
     LATE_TORQUE,
     Model,
     Pieces,
-    values_of,
 )
 from pipeline.criticism.machine.sample_period import ripple
 from pipeline.criticism.operating import Array, Complex, Operating, Recorded, Signals, Values
@@ -285,9 +284,8 @@ def as_sensed(torque_nm: Array, model: Model, values: Values) -> Array:
         In N·m.
 
     """
-    for effect in model.effects:
-        if effect.shaft is not None:
-            torque_nm = effect.shaft(torque_nm, values_of(effect, model.machine, values))
+    for shaft, q in model.hooks("shaft", values):
+        torque_nm = shaft(torque_nm, q)
     return torque_nm * (1.0 + values["gain_torque"])
 
 
@@ -312,7 +310,7 @@ def true_load(
     array [n, N·m]
 
     """
-    hooks = [e for e in model.effects if e.load is not None]
+    hooks = list(model.hooks("load", values))
     torque = signals["torque_shaft_nm"]
     if late_s := values[LATE_TORQUE]:
         torque = torque + late_s * np.gradient(torque, segment.ts_s)
@@ -329,10 +327,8 @@ def true_load(
         segment.instrument.name,
         ahead=ahead_in(segment, signals, model.machine.pole_pairs),
     )
-    for effect in hooks:
-        if effect.load is not None:
-            q = values_of(effect, model.machine, values)
-            r = replace(r, torque_nm=effect.load(r, q))
+    for load, q in hooks:
+        r = replace(r, torque_nm=load(r, q))
     return r.torque_nm
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.machine.model import Model, values_of
+from pipeline.criticism.machine.model import Model
 from pipeline.criticism.operating import Array, Complex, Recorded, Signals, Values, between
 from pipeline.criticism.signals.angle_sensor import both_axes
 from pipeline.criticism.signals.between_rows import Waves, at_parts, evenly
@@ -305,8 +305,6 @@ def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values)
             return gain * current, torque, turned
 
         recorded = replace(recorded, ahead=scaled)
-    for effect in model.effects:
-        if effect.current is not None:
-            q = values_of(effect, model.machine, values)
-            recorded = replace(recorded, i_a=effect.current(recorded, q))
+    for current, q in model.hooks("current", values):
+        recorded = replace(recorded, i_a=current(recorded, q))
     return recorded.i_a

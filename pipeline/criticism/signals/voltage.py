@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.machine.model import Model, Pieces, values_of
+from pipeline.criticism.machine.model import Model, Pieces
 from pipeline.criticism.operating import Array, Complex, Operating, Values
 from pipeline.criticism.signals.angle_sensor import frame_turn
 
@@ -132,10 +132,8 @@ def recorded_voltage(
     complex array [n], V
 
     """
-    for effect in model.effects:
-        if effect.voltage is not None:
-            q = values_of(effect, model.machine, values)
-            voltage = effect.voltage(voltage, x, q, segment.instrument.name)
+    for shown, q in model.hooks("voltage", values):
+        voltage = shown(voltage, x, q, segment.instrument.name)
     if in_frame and (turn := frame_turn(segment, x, model, values)) is not None:
         voltage = voltage * np.conj(turn)
     return voltage * (1.0 + values[segment.instrument.meter])
