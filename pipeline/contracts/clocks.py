@@ -7,13 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
 from pipeline.contracts.protocol import warning
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Capture, Indices
 from pipeline.records.finding import Finding
-
-Rows = NDArray[np.int64]
 
 _SAMPLED = ("_v", "_a", "_nm", "omega_mech_rad_s")
 """Ends of columns that are new in every sample; an angle or a temperature may stay."""
@@ -62,7 +59,7 @@ def held_apart(capture: Capture) -> tuple[Capture, list[Finding]]:
     return (replace(capture, tables=(*tables, *streams)) if findings else capture), findings
 
 
-def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Rows, int]]:
+def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Indices, int]]:
     """Rows in which columns that hold are new, and how many rows they hold, by name.
 
     An inverter holds its voltage as well, such as a square wave, and the current follows it in
@@ -114,7 +111,7 @@ def streams_split(capture: Capture, dense_share: float) -> Capture:
     return replace(capture, tables=(*tables, *streams)) if streams else capture
 
 
-def _slow_columns(table: pl.DataFrame, dense_share: float) -> dict[str, Rows]:
+def _slow_columns(table: pl.DataFrame, dense_share: float) -> dict[str, Indices]:
     """Rows that hold a value of each slow column."""
     places = {n: np.flatnonzero(np.isfinite(table[n].to_numpy())) for n in table.columns}
     dense = [n for n, rows in places.items() if rows.size >= dense_share * table.height]
@@ -124,7 +121,7 @@ def _slow_columns(table: pl.DataFrame, dense_share: float) -> dict[str, Rows]:
     return {name: rows for name, rows in blanks.items() if np.median(np.diff(rows)) > 1.0}
 
 
-def _in_common_rows(table: pl.DataFrame, rows: Mapping[str, Rows]) -> Iterable[pl.DataFrame]:
+def _in_common_rows(table: pl.DataFrame, rows: Mapping[str, Indices]) -> Iterable[pl.DataFrame]:
     """A table for all columns that hold values in the same rows: they are one stream."""
     together: dict[bytes, list[str]] = {}
     for name, places in rows.items():

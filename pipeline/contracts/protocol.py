@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.records.capture import Capture, Mask
+from pipeline.records.capture import Capture, Flags, Mask
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
 
@@ -87,7 +86,7 @@ def time_of(capture: Capture, rows: tuple[int, int] | None) -> str:
     return f" (at {first} s)" if rows[0] == rows[1] else f" ({first} to {last} s)"
 
 
-def span_of(rows: NDArray[np.bool_]) -> tuple[int, int]:
+def span_of(rows: Flags) -> tuple[int, int]:
     """First and last row that a mask marks.
 
     Parameters

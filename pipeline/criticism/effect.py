@@ -11,12 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pipeline.criticism.operating import (
     Array,
     Complex,
+    Flags,
     Operating,
     Recorded,
     Values,
@@ -67,7 +65,7 @@ class FullLog:
     x: Operating
     drag_nm: Array
     shaft_nm: Array
-    good: NDArray[np.bool_]
+    good: Flags
     u_theta_rad: float
     u_shaft_nm: float
     u_air_gap_nm: float

@@ -14,6 +14,8 @@ from pipeline.criticism.parameter import Machine
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
 Made = TypeVar("Made")
 _NEIGHBOURS = 2
 
@@ -83,7 +85,7 @@ class ShaftState:
     stator: bool = False
     alone: bool = False
     finer: int = 1
-    run: NDArray[np.int64] | None = None
+    run: Indices | None = None
     runs_rad: Array | None = None
     behind_nm: Array | None = None
     age_s: Array | None = None
@@ -275,7 +277,7 @@ class Operating(Samples):
         first = self.at(np.zeros(1, dtype=np.int64))
         return replace(first, shaft=replace(first.shaft, run=None))
 
-    def at(self, rows: NDArray[np.int64]) -> Operating:
+    def at(self, rows: Indices) -> Operating:
         """Some of the samples, for hooks that use nothing before or after a sample.
 
         Parameters

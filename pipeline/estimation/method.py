@@ -7,13 +7,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.protocol import Fit
 from pipeline.estimation.uncertainty.instruments import budget_of
 from pipeline.numerics.plateaus import decimated
 from pipeline.physics.glossary import CONSTANTS, Term
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Capture, Indices
 from pipeline.records.estimate import Conditions, Estimate, not_identifiable, not_there
 from pipeline.records.evidence import Evidence, PlotKind, Series
 from pipeline.records.uncertainty import Contribution
@@ -186,7 +185,7 @@ class Method:
         captures: Sequence[Capture],
         titles: str | Sequence[str],
         column: str,
-        rows: tuple[NDArray[np.int64], Array, Array, Array],
+        rows: tuple[Indices, Array, Array, Array],
         caption: str,
     ) -> list[Evidence]:
         """A plot over time a capture, thinned, of regression rows of several captures.

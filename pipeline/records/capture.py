@@ -20,6 +20,8 @@ Integrity = Literal["verified", "unverified"]
 VoltageTiming = Literal["instant", "held", "centred"]
 VoltageKind = Literal["measured", "commanded"]
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
 
 _ALTERNATING = frozenset(
     name for line in ("a", "b", "c", "ab", "bc", "ca") for name in (f"v{line}_v", f"i{line}_a")
@@ -230,7 +232,7 @@ class Capture:
         """
         return replace(self, masks=self.masks + masks)
 
-    def kept(self, table: int) -> NDArray[np.bool_]:
+    def kept(self, table: int) -> Flags:
         """Rows of a table that every mask keeps.
 
         Parameters

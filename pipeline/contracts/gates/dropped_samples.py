@@ -6,12 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.requirements import LINE_CURRENTS
 from pipeline.contracts.waveform import gaps_of, missing_samples
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Capture, Indices
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
 
@@ -69,9 +68,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     return Passed(findings=tuple(findings))
 
 
-def _refuse_lost_edge(
-    table: pl.DataFrame, gaps: NDArray[np.int64], edge_share: float, words: str
-) -> None:
+def _refuse_lost_edge(table: pl.DataFrame, gaps: Indices, edge_share: float, words: str) -> None:
     for name in LINE_CURRENTS:
         if name not in table.columns:
             continue

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.policy.captures import Cutting
 
 _REACH = 2
 """Samples at either side that a cubic goes through; it needs four."""
 
 
-def counted(time: Array, policy: Cutting) -> tuple[float, NDArray[np.int64]] | None:
+def counted(time: Array, policy: Cutting) -> tuple[float, Indices] | None:
     """The even clock behind stamps that scatter.
 
     Parameters
@@ -56,7 +55,7 @@ def counted(time: Array, policy: Cutting) -> tuple[float, NDArray[np.int64]] | N
 
 
 def sampled_unevenly(
-    time: Array, number: NDArray[np.int64], columns: Iterable[Array], policy: Cutting
+    time: Array, number: Indices, columns: Iterable[Array], policy: Cutting
 ) -> bool:
     """Whether the samples came unevenly, and not only their stamps.
 

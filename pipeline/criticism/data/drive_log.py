@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Sensors
 from pipeline.criticism.data.sensors import TEMPERATURES, prepared
 from pipeline.criticism.data.shaft_angle import shaft_angle
 from pipeline.criticism.data.traces import even_clock
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags, Indices
 from pipeline.criticism.parameter import Machine
 from pipeline.records.capture import Capture
 
@@ -47,7 +46,7 @@ class DriveLog:
 
     period_s: float
     columns: dict[str, Array]
-    keep: NDArray[np.bool_]
+    keep: Flags
     sensors: Sensors
     speed: bool
     angle: bool
@@ -84,7 +83,7 @@ def drive_log(capture: Capture, machine: Machine) -> DriveLog | None:
     return DriveLog(period, columns, keep, sensors, speed is not None, angle)
 
 
-def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:
+def _on_time(capture: Capture, period: float, size: int) -> Flags:
     """Samples [size] of the even clock that are not near a reading that came late.
 
     A host that was held up reads again at once, and then gets old values. After samples that were
@@ -100,7 +99,7 @@ def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:
     return on_time
 
 
-def in_time(middle: Array | NDArray[np.int64], size: int) -> NDArray[np.int64]:
+def in_time(middle: Array | Indices, size: int) -> Indices:
     """Which twelfth of a capture each window lies in.
 
     Parameters

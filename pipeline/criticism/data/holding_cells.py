@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.sensor_noise import sensor_noise
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.policy.policy import Policy
 from pipeline.numerics.turns import passes
@@ -38,7 +37,7 @@ class Cells:
     theta_mech_rad: Array
     iq_a: Array
     sense: Array
-    sector: NDArray[np.int64]
+    sector: Indices
     noise_a: float
 
 
@@ -119,7 +118,7 @@ def _noise(spread: list[Array], means: list[Array], policy: Policy) -> float:
     return max(scatter / math.sqrt(free), least)
 
 
-def _sectors_of(theta: Array, sectors: int) -> NDArray[np.int64]:
+def _sectors_of(theta: Array, sectors: int) -> Indices:
     """Number of the sector of the turn that each angle [n] is in."""
     turn = np.mod(theta, TURN_RAD) / TURN_RAD
     return np.minimum((turn * sectors).astype(np.int64), sectors - 1)

@@ -6,10 +6,9 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.holding_cells import holding_cells
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.policy.policy import Policy
 from pipeline.records.capture import Capture
 
@@ -82,7 +81,7 @@ def _strongest(design: Array, current: Array, theta: Array, offered: Sequence[in
 
 def _joined(
     captures: Iterable[Capture], policy: Policy
-) -> tuple[Array, Array, Array, NDArray[np.int64]] | None:
+) -> tuple[Array, Array, Array, Indices] | None:
     """Angle, current, an offset a capture and sense, and the sector, of all cells."""
     by_capture = (holding_cells(capture, policy) for capture in captures)
     tables = [cells for cells in by_capture if cells is not None]
@@ -96,7 +95,7 @@ def _joined(
     return theta, current, side, sector
 
 
-def _held_out(design: Array, current: Array, sector: NDArray[np.int64]) -> Array:
+def _held_out(design: Array, current: Array, sector: Indices) -> Array:
     """Mean square [sectors] of the current in each sector as predicted from the others."""
     normal, slope = design.T @ design, design.T @ current
     errors = []

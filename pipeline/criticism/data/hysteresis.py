@@ -6,13 +6,12 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.policy.captures import Cutting
 
 
-def reversals(theta: Array, slack: float) -> NDArray[np.int64]:
+def reversals(theta: Array, slack: float) -> Indices:
     """First samples of the runs after each reversal of an angle.
 
     Parameters

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.policy.captures import Tables
 
 
-def set_levels(current: Array, policy: Tables) -> NDArray[np.int64]:
+def set_levels(current: Array, policy: Tables) -> Indices:
     """The level that was set for each current, noise and all.
 
     Parameters
@@ -45,7 +44,7 @@ def set_levels(current: Array, policy: Tables) -> NDArray[np.int64]:
     return np.zeros(current.size, dtype=np.int64)
 
 
-def levels_of(current: Array, least: float = 0.0) -> NDArray[np.int64]:
+def levels_of(current: Array, least: float = 0.0) -> Indices:
     """The level that each current is at; levels are separated by a gap between them.
 
     Parameters

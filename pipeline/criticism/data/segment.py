@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.criticism.operating import Array, Made
+from pipeline.criticism.operating import Array, Flags, Indices, Made
 from pipeline.criticism.parameter import Machine
 from pipeline.numerics.projection import Projection
 from pipeline.physics.units import REFERENCE_DEGC
@@ -221,7 +220,7 @@ class Segment:
     fixed: Mapping[str, float] = field(default_factory=dict)
     disturbances: Disturbances = Disturbances()
     unthinned: Unthinned = Unthinned()
-    blocks: NDArray[np.int64] | None = None
+    blocks: Indices | None = None
     whole: bool = False
     cache: Cache = field(default_factory=Cache, repr=False, compare=False)
 
@@ -270,7 +269,7 @@ def segment_of(
     *,
     channels: tuple[str, ...],
     weak: Projection | None = None,
-    blocks: NDArray[np.int64] | None = None,
+    blocks: Indices | None = None,
     offsets: Array | None = None,
     fixed: Mapping[str, float] | None = None,
 ) -> Segment:
@@ -334,7 +333,7 @@ def segment_of(
     )
 
 
-def joins(segment: Segment) -> NDArray[np.int64]:
+def joins(segment: Segment) -> Indices:
     """Where the samples of a segment begin anew: it may be a selection of windows.
 
     Parameters
@@ -409,7 +408,7 @@ def projected(segment: Segment, sampled: Array) -> Array:
 
 def row_index(
     segment: Segment,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_], tuple[tuple[str, int], ...]]:
+) -> tuple[Indices, Indices, Flags, tuple[tuple[str, int], ...]]:
     """Group and window of every weak sample.
 
     Parameters
@@ -439,7 +438,7 @@ def row_index(
     return group, window, np.broadcast_to(valid[None], shape), groups
 
 
-def rows_where(segment: Segment, holds: Callable[[str, float], bool]) -> NDArray[np.bool_]:
+def rows_where(segment: Segment, holds: Callable[[str, float], bool]) -> Flags:
     """Which of the valid weak samples are of certain groups.
 
     Parameters

@@ -7,13 +7,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.rounding import coarse_step, scatter
 from pipeline.criticism.data.segment import UNSMOOTHED, Sensors, SpeedSensor
 from pipeline.criticism.data.sensor_noise import sensor_noise, slow_noise
 from pipeline.criticism.data.traces import parabolas, smoothed, window_of
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.records.capture import Capture
@@ -163,9 +162,7 @@ def with_smooth_angle(
     return replace(sensors, noise=noise, parabola=width)
 
 
-def held_speed(
-    theta_rad: Array, noise_rad: float, window: int, policy: Cutting
-) -> NDArray[np.bool_]:
+def held_speed(theta_rad: Array, noise_rad: float, window: int, policy: Cutting) -> Flags:
     """Samples around which a recorded speed does not change beyond its noise.
 
     Parameters
@@ -198,8 +195,8 @@ def held_speed(
 
 
 def out_of_step(
-    capture: Capture, theta_rad: Array, keep: NDArray[np.bool_], machine: Machine, window: int
-) -> NDArray[np.bool_]:
+    capture: Capture, theta_rad: Array, keep: Flags, machine: Machine, window: int
+) -> Flags:
     """Samples of a drive's log but for those at whose speed its encoder counts in step with them.
 
     Parameters

@@ -8,10 +8,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.clocks import counted, sampled_unevenly
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags, Indices
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.numerics.projection import window_starts
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
@@ -67,9 +66,7 @@ def _rises(table: pl.DataFrame) -> bool:
     return bool((np.diff(table["t_s"].to_numpy()) > 0.0).all())
 
 
-def _has_values(
-    table: pl.DataFrame, name: str, home: pl.DataFrame, kept: NDArray[np.bool_]
-) -> bool:
+def _has_values(table: pl.DataFrame, name: str, home: pl.DataFrame, kept: Flags) -> bool:
     """Whether a column has a finite value in the rows that are kept, and one of another clock has
     it while this one ran.
     """
@@ -82,7 +79,7 @@ def _has_values(
 
 def even_clock(
     capture: Capture, names: tuple[str, ...], policy: Cutting
-) -> tuple[float, dict[str, Array], NDArray[np.bool_]]:
+) -> tuple[float, dict[str, Array], Flags]:
     """Columns of a capture on an even clock.
 
     Parameters
@@ -190,8 +187,8 @@ def decimated(signal: Array, factor: int) -> Array:
 
 
 def thinned(
-    columns: Mapping[str, Array], keep: NDArray[np.bool_], length: int, most: int, pad: int = PAD
-) -> tuple[dict[str, Array], NDArray[np.int64]]:
+    columns: Mapping[str, Array], keep: Flags, length: int, most: int, pad: int = PAD
+) -> tuple[dict[str, Array], Indices]:
     """Signals cut to an even selection of windows.
 
     Parameters
@@ -251,9 +248,7 @@ def window_of(period: float, size: int, policy: Cutting) -> int:
     return max(min(samples, size // 4), policy.least_window)
 
 
-def window_between_gaps(
-    period: float, keep: NDArray[np.bool_], policy: Cutting, each: int = 1
-) -> int:
+def window_between_gaps(period: float, keep: Flags, policy: Cutting, each: int = 1) -> int:
     """Samples a window of which some fit into the stretches that most of a capture is in.
 
     Parameters

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from pipeline.criticism.data.drive_log import DriveLog
 from pipeline.criticism.data.segment import slow_orders
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.numerics.weak_rows import WeakRows, smooth_speed, weak_rows
@@ -106,7 +105,7 @@ def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
     return min(shares)
 
 
-def rests(theta_rad: Array, size: int, policy: Cutting) -> NDArray[np.bool_]:
+def rests(theta_rad: Array, size: int, policy: Cutting) -> Flags:
     """Where a shaft stays within what bristles bend.
 
     There dry friction holds any torque below its own, and no acceleration follows the current.

@@ -14,12 +14,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri, chndtr
 
 from pipeline.criticism.design.planned_tests import PLANNED, planned, planned_words
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.linearise import linearise
@@ -116,7 +115,7 @@ def _power(noncentrality: float, freedom: int, policy: Design) -> float:
 
 def _nearest(
     effect: Effect, other: str, wide: LinearSystem, offered: Sequence[Candidate]
-) -> NDArray[np.int64] | None:
+) -> Indices | None:
     """Places of the alternative's columns, of its trial shapes the one that is hardest to part."""
     best, least = None, np.inf
     for candidate, places in placed(wide, offered):
@@ -135,8 +134,8 @@ def _amplitudes(effect: Effect, wide: LinearSystem) -> Array:
 
 
 def _normal_matrix(
-    effect: Effect, alternative: NDArray[np.int64], wide: LinearSystem
-) -> tuple[Array, NDArray[np.int64]]:
+    effect: Effect, alternative: Indices, wide: LinearSystem
+) -> tuple[Array, Indices]:
     """Normal matrix of [d, the model's other columns, the alternative's], and their places."""
     prefix = f"{effect.name}."
     fixed = np.array([n for n in wide.model_columns if not wide.columns[n].name.startswith(prefix)])
@@ -147,7 +146,7 @@ def _normal_matrix(
     return normal + np.diag(np.concatenate([[0.0], wide.prior_precision[places]])), places
 
 
-def _stacked(matrix: Array, amplitudes: Array, places: NDArray[np.int64]) -> Array:
+def _stacked(matrix: Array, amplitudes: Array, places: Indices) -> Array:
     return np.column_stack([matrix @ amplitudes, matrix[:, places]])
 
 
@@ -161,7 +160,7 @@ def _noncentrality(normal: Array) -> float:
     return float(normal[0, 0]) * share if share > 1e-9 else 0.0
 
 
-def _plans(effect: Effect, places: NDArray[np.int64], wide: LinearSystem) -> Iterator[Plan]:
+def _plans(effect: Effect, places: Indices, wide: LinearSystem) -> Iterator[Plan]:
     """Every experiment whose outcome can be predicted: repeats, tests not done, calibrations."""
     policy, amplitudes = wide.policy.design, _amplitudes(effect, wide)
     weight = wide.weights(wide.reduced_chi2(wide.residual))
@@ -181,7 +180,7 @@ def _plans(effect: Effect, places: NDArray[np.int64], wide: LinearSystem) -> Ite
     yield from _calibrations(places, wide)
 
 
-def _calibrations(places: NDArray[np.int64], wide: LinearSystem) -> Iterator[Plan]:
+def _calibrations(places: Indices, wide: LinearSystem) -> Iterator[Plan]:
     policy = wide.policy.design
     for place, column in enumerate(places):
         name = wide.columns[column].name

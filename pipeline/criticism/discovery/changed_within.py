@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import clock
 from pipeline.criticism.discovery.changed_constants import End, by_words, may_change, unit_of
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
@@ -135,8 +135,8 @@ class _Steps:
 
     system: LinearSystem
     time_s: Array
-    in_capture: NDArray[np.bool_]
-    away: NDArray[np.bool_]
+    in_capture: Flags
+    away: Flags
     column: Array
     times: Array
 
@@ -169,7 +169,7 @@ def _changes(
     rows: _Rows,
     capture: str,
     places: list[int],
-    significant: NDArray[np.bool_],
+    significant: Flags,
 ) -> Iterator[ChangeWithin]:
     """The best change of every constant within one capture that passes."""
     in_capture, tie = rows.capture == capture, system.policy.selection.tie
@@ -206,7 +206,7 @@ def _changes(
 def _scanned(
     system: LinearSystem,
     rows: _Rows,
-    shows: NDArray[np.bool_],
+    shows: Flags,
     place: int,
     times: Array,
     least: int,

@@ -16,7 +16,6 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.discovery.bases import Variable
 from pipeline.criticism.discovery.dictionary import CENTRED, POWER, SHAPES, WAVES, Term
@@ -368,7 +367,7 @@ def _inverse(normal: Array) -> Array:
 
 
 def curve_about(
-    pursuit: Pursuit, expression: Expression, coarse: NDArray[np.float64], at: Array, carrier: int
+    pursuit: Pursuit, expression: Expression, coarse: Array, at: Array, carrier: int
 ) -> tuple[Array, Array]:
     """The curve of a structure and its standard uncertainty: its expression and what that leaves.
 

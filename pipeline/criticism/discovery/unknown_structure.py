@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.discovery.description import describe
 from pipeline.criticism.discovery.matching_pursuit import Pursuit, expression
 from pipeline.criticism.discovery.residual_inputs import Port, ports, refined
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.columns import Column, effect_columns
 from pipeline.criticism.regression.fit import Fit
@@ -160,7 +159,7 @@ def _ranked(
     return sorted(ranked, key=lambda f: (-f.held_out_gain, f.port.effect.name)), wide
 
 
-def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fit: Fit) -> Array:
+def _ridge(columns: Sequence[Column], live: Indices, fit: Fit) -> Array:
     """Inverse prior variance [k] of a port's coefficients: the machine's own scale."""
     machine = fit.model.machine
     scales = []
@@ -188,7 +187,7 @@ def _simplest(candidates: Sequence[RankedInput], policy: Policy) -> RankedInput:
     return min((one for one in simple if one.held_out_gain >= level), key=lambda one: one.place)
 
 
-def _segments_over_floor(system: LinearSystem) -> NDArray[np.int64]:
+def _segments_over_floor(system: LinearSystem) -> Indices:
     """Numbers of the segments in which a fit leaves something that is reported."""
     significant = np.flatnonzero(significant_groups(system))
     return np.unique([system.labels[place][0] for place in significant])
@@ -196,10 +195,10 @@ def _segments_over_floor(system: LinearSystem) -> NDArray[np.int64]:
 
 def _units(
     system: LinearSystem,
-    model_columns: NDArray[np.int64],
+    model_columns: Indices,
     residual: Array,
-    missed: NDArray[np.int64] | None,
-) -> NDArray[np.int64]:
+    missed: Indices | None,
+) -> Indices:
     """For every row [R] the number of what is held out together: a capture, or a part of one of the
     segments in `missed`; -1 for rows that are always in the fit.
 
@@ -221,9 +220,9 @@ def _units(
 
 def _carrying(
     system: LinearSystem,
-    model_columns: NDArray[np.int64],
+    model_columns: Indices,
     residual: Array,
-    units: NDArray[np.int64],
+    units: Indices,
 ) -> list[int]:
     """Units without which some constant of the model is lost."""
     policy = system.policy.goodness
@@ -246,9 +245,7 @@ def _carrying(
     return carrying
 
 
-def _ridge_step(
-    system: LinearSystem, places: NDArray[np.int64], residual: Array, ridge: Array
-) -> Array:
+def _ridge_step(system: LinearSystem, places: Indices, residual: Array, ridge: Array) -> Array:
     """Step [k] of least deviance; by `ridge`, curve and constant of one shape do not run away."""
     weight = system.weights(system.reduced_chi2(residual))
     matrix = system.matrix[:, places]
@@ -261,10 +258,10 @@ def _ridge_step(
 
 def _held_out(
     system: LinearSystem,
-    places: NDArray[np.int64],
+    places: Indices,
     residual: Array,
     ridge: Array,
-    units: NDArray[np.int64],
+    units: Indices,
 ) -> float:
     """Deviance of every unit as predicted without it, by the columns at `places`.
 

@@ -7,17 +7,17 @@ from itertools import accumulate
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
+from pipeline.criticism.operating import Flags
 
 
-def _stepped(x: Operating) -> NDArray[np.bool_]:
+def _stepped(x: Operating) -> Flags:
     """Whether a bench steps the current at each sample [n], at standstill."""
     return (x.omega_rad_s == 0.0) & (not x.inverter) & (x.freq_hz == 0.0)
 
 
-def _above(x: Operating) -> NDArray[np.bool_]:
+def _above(x: Operating) -> Flags:
     """Whether a meter's frequency is above any of the machine's, at each sample [n]."""
     at_rest = (x.omega_rad_s == 0.0) & (not x.inverter)
     return at_rest & (x.freq_hz > x.machine.scales["freq_hz"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.hysteresis import with_travel
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of, slow_orders
@@ -21,7 +20,7 @@ from pipeline.criticism.data.traces import (
 )
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import COAST_SHARES, Model, Pieces, clock_gain
-from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.operating import Array, Flags, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.signals.shaft import (
@@ -79,7 +78,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     )
 
 
-def _coasts(theta: Array, window: int, policy: Policy) -> NDArray[np.bool_]:
+def _coasts(theta: Array, window: int, policy: Policy) -> Flags:
     """Samples [n] in which a shaft coasts.
 
     A shaft at rest does not: friction holds it, and what is left of its recorded speed is of the
@@ -113,7 +112,7 @@ def _slow_turn(
     machine: Machine,
     period: float,
     columns: dict[str, Array],
-    keep: NDArray[np.bool_],
+    keep: Flags,
     channel: str,
 ) -> Segment | None:
     orders, policy = slow_orders(machine), machine.policy.cutting

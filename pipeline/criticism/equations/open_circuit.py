@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.rounding import coarse_step
 from pipeline.criticism.data.segment import (
@@ -29,7 +28,7 @@ from pipeline.criticism.data.traces import (
 )
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import OPEN_FLUX, Model, Pieces
-from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
+from pipeline.criticism.operating import Array, Complex, Flags, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
@@ -162,9 +161,7 @@ def _waves(theta_rad: Array, machine: Machine, window: int) -> Complex:
     return waves
 
 
-def _by_voltage(
-    columns: dict[str, Array], machine: Machine, window: int, period: float
-) -> NDArray[np.bool_]:
+def _by_voltage(columns: dict[str, Array], machine: Machine, window: int, period: float) -> Flags:
     """Adds the angle [n, rad] at which the voltage stands; the samples where it is known.
 
     The magnet's angle at the start differs between spins, and a speed does not show it. The voltage
@@ -183,9 +180,7 @@ def _by_voltage(
     known = (np.abs(voltage) > machine.policy.cutting.audible_u * noise) & (
         np.diff(sense, prepend=sense[0]) == 0.0
     )
-    inside: NDArray[np.bool_] = (
-        np.convolve(known.astype(float), np.ones(width), mode="same") > width - 0.5
-    )
+    inside: Flags = np.convolve(known.astype(float), np.ones(width), mode="same") > width - 0.5
     upright = phase - 0.5 * math.pi * sense
     angle = smoothed(upright, width)
     short = _phase_samples(window, period, machine.policy.cutting)
@@ -204,7 +199,7 @@ def _phase_samples(window: int, period: float, policy: Cutting) -> int:
     return min(2 * (round(policy.speed_s / period) // 2), 2 * (window // 2)) + 1
 
 
-def _steady(weak: Projection, theta: Array, policy: Cutting) -> NDArray[np.bool_]:
+def _steady(weak: Projection, theta: Array, policy: Cutting) -> Flags:
     """The windows [W] of constant speed, which an open-circuit test is made of; all if too few.
 
     An instantaneous voltage sample at a kink of the speed belongs to neither side of it.

@@ -6,13 +6,12 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.levels import levels_of
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
-from pipeline.criticism.operating import Array, Operating, Signals, Values
+from pipeline.criticism.operating import Array, Indices, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.signals.shaft import as_sensed, net_torque
@@ -101,7 +100,7 @@ def predicted(_: Segment, x: Operating, pieces: Pieces, model: Model, values: Va
     return as_sensed(net_torque(x, pieces, values), model, values)[None]
 
 
-def _parts(current: Array, policy: Tables) -> NDArray[np.int64] | None:
+def _parts(current: Array, policy: Tables) -> Indices | None:
     """Number of the level [n], of a sweep without levels that of its part; None of too few."""
     levels = levels_of(current)
     if levels.max(initial=0) + 1 >= policy.levels:

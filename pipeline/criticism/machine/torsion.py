@@ -29,9 +29,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags, Indices
 from pipeline.criticism.policy.machine import Torsion
 
 
@@ -67,7 +66,7 @@ class Shaft:
     u_theta_rad: float
     u_through_nm: float
     u_momentum_nm: float
-    valid: NDArray[np.bool_]
+    valid: Flags
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,7 +240,7 @@ def _kernel(block: int) -> tuple[Array, Array]:
     return box, np.convolve(np.convolve(box, box), box)
 
 
-def _closed(through: Array, least: float) -> NDArray[np.bool_]:
+def _closed(through: Array, least: float) -> Flags:
     """Blocks [n] that pass torque on, as do those beside them, to the same side."""
     side = np.where(np.abs(through) > least, np.sign(through), 0.0)
     return np.abs(sliding_window_view(np.pad(side, 1), 3).sum(axis=1)) == 3.0
@@ -286,7 +285,7 @@ class _Noise:
             u_theta * torque @ angle.T,
         )
 
-    def products(self, inverse: Array, rows: NDArray[np.int64]) -> Array:
+    def products(self, inverse: Array, rows: Indices) -> Array:
         """What noise adds to the whitened columns' products with columns and angle [3, 4]."""
         among = np.ix_(rows, rows)
         added = np.zeros((3, 4))

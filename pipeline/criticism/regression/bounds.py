@@ -9,11 +9,10 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.machine.model import LAG_SPEED, Model
-from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.operating import Array, Indices, Values
 from pipeline.criticism.regression.columns import Column
 
 _AT = 1e-9
@@ -58,7 +57,7 @@ class Step(Protocol):
         ...
 
 
-Best = Callable[[NDArray[np.int64]], Step]
+Best = Callable[[Indices], Step]
 
 
 def bounded_step(best: Best, columns: Sequence[Column], model: Model, values: Values) -> Array:

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.policy.regression import Goodness
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import pseudo_inverse, unit_diagonal
@@ -227,7 +226,7 @@ def predicted_chi2(system: LinearSystem, held_out: HeldOut) -> Array:
     return system.reduced_chi2(held_out.or_fit(system) / held_out.widening)
 
 
-def _units(system: LinearSystem, divided: frozenset[str]) -> NDArray[np.int64]:
+def _units(system: LinearSystem, divided: frozenset[str]) -> Indices:
     """Number of what is held out together, of every row [R]: a segment, or a block of a capture.
 
     Segments of one capture that are split alike are held out together.

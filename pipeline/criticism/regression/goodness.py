@@ -7,11 +7,10 @@ from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri, ndtr
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags
 from pipeline.criticism.regression.fit import Fit, current_floors_grown
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import (
@@ -160,7 +159,7 @@ def of_motor(system: LinearSystem, name: str) -> bool:
     return bool((moves & np.array(counts)[system.group]).any())
 
 
-def significant_groups(system: LinearSystem) -> NDArray[np.bool_]:
+def significant_groups(system: LinearSystem) -> Flags:
     """Groups that a fit leaves over their floor, as `remainder` judges it.
 
     Parameters

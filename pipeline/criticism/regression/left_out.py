@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import NormalEquations
 from pipeline.criticism.residuals.channels import of_acceleration
@@ -16,9 +15,9 @@ from pipeline.criticism.residuals.channels import of_acceleration
 def loss_at(
     system: LinearSystem,
     known: NormalEquations,
-    left_out: NDArray[np.int64],
+    left_out: Indices,
     move: Array,
-    instead: Sequence[int] | NDArray[np.int64] = (),
+    instead: Sequence[int] | Indices = (),
     starts: Sequence[float] = (1.0, 0.5, 0.0),
     rounds: int | None = None,
 ) -> float:
@@ -71,7 +70,7 @@ def _free(system: LinearSystem) -> Array:
     return np.array(free, dtype=float)
 
 
-def _drags(system: LinearSystem, places: NDArray[np.int64]) -> Array:
+def _drags(system: LinearSystem, places: Indices) -> Array:
     """1 for columns [k] of effects that drag at the shaft, else 0."""
     effects = [system.columns[n].effect for n in places.tolist()]
     return np.array([e is not None and e.hook == "torque" for e in effects], dtype=float)

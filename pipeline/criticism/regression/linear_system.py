@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.operating import Array, Indices, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.column_validity import is_valid
@@ -73,8 +72,8 @@ class LinearSystem:
     columns: tuple[Column, ...]
     residual: Array
     matrix: Array
-    group: NDArray[np.int64]
-    window: NDArray[np.int64]
+    group: Indices
+    window: Indices
     unit: Array
     noise_ratio: Array
     row_weight: Array
@@ -96,7 +95,7 @@ class LinearSystem:
         return int(self.residual.size)
 
     @property
-    def model_columns(self) -> NDArray[np.int64]:
+    def model_columns(self) -> Indices:
         """Places of the columns of the model's own parameters."""
         return np.arange(self.model_column_count)
 
@@ -106,7 +105,7 @@ class LinearSystem:
         return self.fit.segments
 
     @property
-    def segment(self) -> NDArray[np.int64]:
+    def segment(self) -> Indices:
         """Number [R] of the segment that every weak sample is of."""
         return np.array([number for number, _, _ in self.labels])[self.group]
 
@@ -140,9 +139,7 @@ class LinearSystem:
         nats = np.log(np.maximum(self.reduced_chi2(self.residual), 1.0))
         return float(self.counts @ nats) + float(self.prior_costs().sum())
 
-    def prior_costs(
-        self, places: NDArray[np.int64] | None = None, step: Array | None = None
-    ) -> Array:
+    def prior_costs(self, places: Indices | None = None, step: Array | None = None) -> Array:
         """Squared distance of every parameter from the centre of its prior, after a step.
 
         Parameters
@@ -227,7 +224,7 @@ class LinearSystem:
         """
         return deviance_of(self.counts, reduced_chi2)
 
-    def place(self, names: Iterable[str]) -> NDArray[np.int64]:
+    def place(self, names: Iterable[str]) -> Indices:
         """Indices of columns by name.
 
         Parameters
@@ -244,7 +241,7 @@ class LinearSystem:
         requested = set(names)
         return np.array([n for n, c in enumerate(self.columns) if c.name in requested], dtype=int)
 
-    def normal_equations(self, places: NDArray[np.int64] | None = None) -> NormalEquations:
+    def normal_equations(self, places: Indices | None = None) -> NormalEquations:
         """Normal matrices by group.
 
         Parameters
@@ -293,7 +290,7 @@ class LinearSystem:
             power[number] = (group_residuals**2).sum(axis=1)
         return [replace(known, power=power[:, n], slope=slope[:, n]) for n in range(len(residuals))]
 
-    def only(self, places: NDArray[np.int64]) -> LinearSystem:
+    def only(self, places: Indices) -> LinearSystem:
         """The same system with some of its columns.
 
         Parameters
@@ -313,7 +310,7 @@ class LinearSystem:
             prior_gradient=prior_gradient,
         )
 
-    def after(self, places: NDArray[np.int64], step: Array) -> Array:
+    def after(self, places: Indices, step: Array) -> Array:
         """The residual after a step along some columns, to first order.
 
         Parameters
@@ -330,7 +327,7 @@ class LinearSystem:
         """
         return self.residual + self.matrix[:, places] @ step
 
-    def covariance(self, places: NDArray[np.int64]) -> Array:
+    def covariance(self, places: Indices) -> Array:
         """Covariance of parameters when they are fitted together.
 
         Parameters
@@ -405,7 +402,7 @@ def linear_system(
 
 def _numbered(
     rows: Sequence[Rows],
-) -> tuple[NDArray[np.int64], tuple[tuple[int, str, int], ...]]:
+) -> tuple[Indices, tuple[tuple[int, str, int], ...]]:
     """Group [R] of every row of all segments, and the groups' labels."""
     first, labels, groups = 0, [], []
     for number, one in enumerate(rows):

@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.operating import Array, Flags, Indices, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.regression.columns import Column, ColumnKey
 from pipeline.criticism.regression.noise_floors import Floor, offsets, reading_error, window_gain
@@ -50,8 +49,8 @@ class Rows:
 
     residual: Array
     columns: Array
-    group: NDArray[np.int64]
-    window: NDArray[np.int64]
+    group: Indices
+    window: Indices
     unit: Array
     noise_ratio: Array
     row_weight: Array
@@ -139,7 +138,7 @@ def trial_residuals(
 
 
 def _weak_columns(
-    segment: Segment, sampler: Sampler, columns: Sequence[Column], valid: NDArray[np.bool_]
+    segment: Segment, sampler: Sampler, columns: Sequence[Column], valid: Flags
 ) -> list[Array]:
     """Weak samples [P][R] of every column, zero where the segment does not observe it."""
     known, nothing = sampler.weak, np.zeros(int(valid.sum()))

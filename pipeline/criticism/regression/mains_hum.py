@@ -17,12 +17,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, clock, with_lines
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.operating import Array, Indices, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.regression import MainsHum
 from pipeline.criticism.residuals.residual import disturbed, residual
@@ -226,7 +225,7 @@ class _Spectrum:
     ts_s: float
     bins: int
     runs: tuple[slice, ...]
-    place: NDArray[np.int64]
+    place: Indices
     weight: Array
     policy: MainsHum
 

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, evaluate, zero
-from pipeline.criticism.operating import Array, Complex, Operating, Values
+from pipeline.criticism.operating import Array, Complex, Flags, Indices, Operating, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.standstill import at_rest, at_reversals
@@ -53,7 +52,7 @@ class Floor:
     near: Values
     tolerance: Array | None = None
 
-    def noise_and_scale(self, group: NDArray[np.int64], reading: Array) -> tuple[Array, Array]:
+    def noise_and_scale(self, group: Indices, reading: Array) -> tuple[Array, Array]:
         """Noise floor of the weak samples, without and with the tolerance of form.
 
         Parameters
@@ -407,9 +406,7 @@ def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Arr
     return wave * (omega[:, None] * weak.orders[None, :]) ** 2
 
 
-def offsets(
-    segment: Segment, valid: NDArray[np.bool_], row_weight: Array, machine: Machine
-) -> list[Array]:
+def offsets(segment: Segment, valid: Flags, row_weight: Array, machine: Machine) -> list[Array]:
     """Whitened weak samples of the disturbances that a segment may hold.
 
     Parameters

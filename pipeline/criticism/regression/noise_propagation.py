@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.rounding import rounding_error, smoothed, unrounded
 from pipeline.criticism.data.segment import (
@@ -21,7 +20,7 @@ from pipeline.criticism.data.segment import (
 from pipeline.criticism.data.traces import LINES_V, parabolas
 from pipeline.criticism.data.traces import smoothed as box_mean
 from pipeline.criticism.machine.model import Model, zero
-from pipeline.criticism.operating import Array, Signals, Values
+from pipeline.criticism.operating import Array, Indices, Signals, Values
 from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.criticism.regression.sampler import Sampler
 from pipeline.criticism.residuals.residual import residual
@@ -134,7 +133,7 @@ class _Recording:
     model: Model
     values: Values
     even: Mapping[str, Array]
-    group: NDArray[np.int64]
+    group: Indices
     counts: Array
     unperturbed: Array
 

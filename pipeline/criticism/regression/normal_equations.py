@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.policy.regression import GaussNewton
 
 _UNSEEN = math.sqrt(sys.float_info.min)
@@ -86,7 +85,7 @@ class Prior:
         gradient = self.gradient + self.precision * step
         return float(prior_costs(gradient, self.precision).sum())
 
-    def only(self, places: NDArray[np.int64]) -> Prior:
+    def only(self, places: Indices) -> Prior:
         """The prior of some of the parameters.
 
         Parameters
@@ -132,7 +131,7 @@ class NormalEquations:
 
     @classmethod
     def of(
-        cls, rows: Array, group: NDArray[np.int64], count: int, prior: Prior, policy: GaussNewton
+        cls, rows: Array, group: Indices, count: int, prior: Prior, policy: GaussNewton
     ) -> NormalEquations:
         """The normal equations of some rows.
 
@@ -164,7 +163,7 @@ class NormalEquations:
             normal[places, number] = (in_group.T @ in_group)[upper]
         return cls(counts.astype(float), normal[0], normal[1:size].T, normal[size:], prior, policy)
 
-    def only(self, places: NDArray[np.int64]) -> NormalEquations:
+    def only(self, places: Indices) -> NormalEquations:
         """The normal equations of some of the columns.
 
         Parameters
@@ -175,17 +174,17 @@ class NormalEquations:
         """
         return self._only(places, self.prior.only(places))
 
-    def _only(self, places: NDArray[np.int64], prior: Prior) -> NormalEquations:
+    def _only(self, places: Indices, prior: Prior) -> NormalEquations:
         rows, columns = _upper(places.size)
         normal = self.normal[self._products(places[rows], places[columns])]
         return replace(self, slope=self.slope[:, places], normal=normal, prior=prior)
 
-    def _products(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _products(self, rows: Indices, columns: Indices) -> Indices:
         """Where the products of columns are in `normal`."""
         first, second = np.minimum(rows, columns), np.maximum(rows, columns)
         return _place(first, second, self.slope.shape[1])
 
-    def moved(self, places: NDArray[np.int64], step: Array) -> NormalEquations:
+    def moved(self, places: Indices, step: Array) -> NormalEquations:
         """The normal equations at the end of a step; the priors stay where they were.
 
         Parameters
@@ -202,7 +201,7 @@ class NormalEquations:
         power = _rounded(self.power + (self.slope + slope)[:, places] @ step)
         return replace(self, power=power, slope=slope)
 
-    def sheared(self, place: int, along: NDArray[np.int64], by: Array) -> NormalEquations:
+    def sheared(self, place: int, along: Indices, by: Array) -> NormalEquations:
         """The normal equations with multiples of some columns added to another one.
 
         Parameters
@@ -288,14 +287,14 @@ class NormalEquations:
 
 
 @cache
-def _upper(size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _upper(size: int) -> tuple[Indices, Indices]:
     """Rows and columns of the upper triangle of a square, by rows; making them costs as much as a
     fit that uses them.
     """
     return np.triu_indices(size)
 
 
-def _place(rows: NDArray[np.int64], columns: NDArray[np.int64], size: int) -> NDArray[np.int64]:
+def _place(rows: Indices, columns: Indices, size: int) -> Indices:
     """Where entries of an upper triangle, `columns` not below `rows`, are in it by rows."""
     return rows * (2 * size - rows - 1) // 2 + columns
 

@@ -6,11 +6,10 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import Model, evaluate
-from pipeline.criticism.operating import Array, Operating, Values
+from pipeline.criticism.operating import Array, Flags, Operating, Values
 
 
 def at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
@@ -99,7 +98,7 @@ def at_reversals(segment: Segment, model: Model, values: Values, x: Operating) -
     return share * np.sqrt((change[rows] ** 2) @ (weak.functions[0, 0] ** 2))
 
 
-def _with_neighbours(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _with_neighbours(which: Flags) -> Flags:
     """Some samples [n] and those beside them, whose speed is a difference across a rest's edge."""
     beside = which.copy()
     beside[1:] |= which[:-1]
@@ -107,7 +106,7 @@ def _with_neighbours(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return beside
 
 
-def _rests(speed: Array, slow: float, least: int, most: float, times: float) -> NDArray[np.bool_]:
+def _rests(speed: Array, slow: float, least: int, most: float, times: float) -> Flags:
     """The samples [n] of runs in which a shaft is slower than `slow` and goes nowhere.
 
     A run has `least` samples, and the sum of its speeds is below `most`: a slow turn is no rest. A

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags
 from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.regression.cross_validation import (
     HeldOut,
@@ -42,7 +41,7 @@ class Baseline:
     held_out: HeldOut
     shrunk: Array
     doubt: Array
-    significant: NDArray[np.bool_]
+    significant: Flags
 
     @classmethod
     def of(cls, wide: LinearSystem, added: Sequence[Effect]) -> Baseline:
@@ -87,7 +86,7 @@ class Baseline:
 def matters(
     system: LinearSystem,
     before: LinearSystem,
-    significant: NDArray[np.bool_],
+    significant: Flags,
     effect: Effect | None = None,
 ) -> bool:
     """Whether an effect of a refit is large enough to matter in use, or takes most.
@@ -110,7 +109,7 @@ def matters(
 
 
 def _takes_most(
-    system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_], effect: Effect
+    system: LinearSystem, before: LinearSystem, significant: Flags, effect: Effect
 ) -> bool:
     """Whether an effect takes most of what was `significant` [G] as a remainder before."""
     fit = system.fit
@@ -269,7 +268,7 @@ def spoils(tried: LinearSystem, before: Array, after: Array, relief: float = 0.0
     return float((tried.counts * change)[counts].sum()) > relief
 
 
-def acts_in(system: LinearSystem) -> NDArray[np.bool_]:
+def acts_in(system: LinearSystem) -> Flags:
     """The groups in which the newest effect acts.
 
     Parameters

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence, Set
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
+from pipeline.criticism.operating import Flags
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
@@ -72,7 +72,7 @@ def _chosen(
     acts there is named in its place.
     """
     policy = wide.policy.selection
-    doubtful: list[tuple[float, NDArray[np.bool_]]] = []
+    doubtful: list[tuple[float, Flags]] = []
     for first in range(0, min(len(passing), policy.refit_rounds * policy.refits), policy.refits):
         batch = list(passing[first : first + policy.refits])
         while (best := _refit_best(wide, batch, added)) is not None:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.operating import Indices
 from pipeline.criticism.regression.columns import Column, effect_columns
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system, model_columns
@@ -110,9 +110,7 @@ def widened(
     return linear_system(fit, columns, before)
 
 
-def placed(
-    wide: LinearSystem, offered: Sequence[Candidate]
-) -> Iterator[tuple[Candidate, NDArray[np.int64]]]:
+def placed(wide: LinearSystem, offered: Sequence[Candidate]) -> Iterator[tuple[Candidate, Indices]]:
     """Every candidate of a widened system with the places of its columns.
 
     Parameters

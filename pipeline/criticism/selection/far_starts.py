@@ -12,12 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.operating import Array, Values
+from pipeline.criticism.operating import Array, Flags, Values
 from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.linearise import trial_residuals
@@ -60,7 +59,7 @@ def with_starts(
     wide: LinearSystem,
     offered: Sequence[Candidate],
     scores: Sequence[Score],
-    significant: NDArray[np.bool_],
+    significant: Flags,
 ) -> tuple[Score, ...]:
     """Scores, those of effects with `starts` from the best of them where that beats the tangent.
 
@@ -158,9 +157,7 @@ def _refitted_ends(base: LinearSystem, trials: Sequence[Sequence[_Trial]]) -> li
     return [[next(ends) for _ in group] for group in trials]
 
 
-def _score(
-    base: LinearSystem, end: _End, before: FitQuality, significant: NDArray[np.bool_]
-) -> Score:
+def _score(base: LinearSystem, end: _End, before: FitQuality, significant: Flags) -> Score:
     """The score of a trial, without what the search over candidates costs."""
     trial, machine, policy = end.trial, base.fit.machine, base.policy.selection
     effect, parameter = trial.candidate.effect, trial.parameter

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags, Indices
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import Descent, deviance_of
 
@@ -33,7 +32,7 @@ class FitQuality:
     prior_cost: float
 
     @classmethod
-    def of(cls, system: LinearSystem, places: NDArray[np.int64], end: Descent) -> FitQuality:
+    def of(cls, system: LinearSystem, places: Indices, end: Descent) -> FitQuality:
         """Quality of a system after a descent.
 
         Parameters
@@ -50,9 +49,7 @@ class FitQuality:
         return cls(end.deviance, end.reduced_chi2, cost)
 
 
-def clears(
-    system: LinearSystem, significant: NDArray[np.bool_], before: Array, after: Array
-) -> bool:
+def clears(system: LinearSystem, significant: Flags, before: Array, after: Array) -> bool:
     """Whether most of the power over the floor goes, of the groups that count as a remainder.
 
     Parameters
@@ -168,9 +165,7 @@ def power_share(system: LinearSystem, before: Array, after: Array) -> float:
     return float((1.0 - has[worth] / had[worth]).max(initial=0.0))
 
 
-def _pools(
-    system: LinearSystem, reduced_chi2: Array
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _pools(system: LinearSystem, reduced_chi2: Array) -> tuple[Indices, Flags]:
     """Which signal at which order each group [G] is of, and of which of them the excess counts."""
     numbers: dict[tuple[str, int], int] = {}
     pool = np.array([numbers.setdefault((name, k), len(numbers)) for _, name, k in system.labels])

@@ -22,11 +22,11 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import rows_where
 from pipeline.criticism.effect import Effect, LinearForm
 from pipeline.criticism.machine.model import zero
+from pipeline.criticism.operating import Flags
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton, summed_error
 from pipeline.criticism.regression.linear_system import LinearSystem
@@ -40,7 +40,7 @@ def with_linear_start(
     wide: LinearSystem,
     offered: Sequence[Candidate],
     scores: Sequence[Score],
-    significant: NDArray[np.bool_],
+    significant: Flags,
 ) -> tuple[Score, ...]:
     """Scores, those of effects with a linear form from that form where it beats the tangent.
 
@@ -115,7 +115,7 @@ def with_better(
     return list(ranked([*others, best]))
 
 
-def _exceeds_floor(wide: LinearSystem, significant: NDArray[np.bool_], channel: str) -> bool:
+def _exceeds_floor(wide: LinearSystem, significant: Flags, channel: str) -> bool:
     """Whether some plain signal misses its floor by so much that the base may be wrong."""
     least = wide.policy.selection.coupling_floors**2
     q = wide.reduced_chi2(wide.residual)

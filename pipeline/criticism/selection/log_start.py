@@ -12,12 +12,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import zero
-from pipeline.criticism.operating import Values
+from pipeline.criticism.operating import Flags, Values
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.candidates import Candidate, first_of_each
@@ -30,7 +27,7 @@ def with_log_start(
     wide: LinearSystem,
     offered: Sequence[Candidate],
     scores: Sequence[Score],
-    significant: NDArray[np.bool_],
+    significant: Flags,
 ) -> tuple[Score, ...]:
     """Scores, those of effects that full logs show from there where no tangent is far better.
 

@@ -20,11 +20,10 @@ from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.operating import Array, Complex
+from pipeline.criticism.operating import Array, Complex, Indices
 from pipeline.criticism.policy.selection import OrderScan
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import material_size
@@ -296,7 +295,7 @@ def _weight(weak: Projection, size: int) -> Array:
     return weight
 
 
-def _parts(theta: Array, weight: Array, policy: OrderScan) -> Iterator[NDArray[np.int64]]:
+def _parts(theta: Array, weight: Array, policy: OrderScan) -> Iterator[Indices]:
     """Rows of each part of a log, of some four turns."""
     rows = np.flatnonzero(weight > 0.0)
     if not rows.size:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.criticism.operating import Indices
 from pipeline.criticism.regression.cross_validation import leave_out
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
@@ -79,7 +79,7 @@ def without_superfluous(system: LinearSystem, base: int) -> LinearSystem:
 def loss_without(
     system: LinearSystem,
     names: Iterable[str],
-    instead: NDArray[np.int64] | None = None,
+    instead: Indices | None = None,
     normal_equations: NormalEquations | None = None,
 ) -> float:
     """Rise of the deviance when effects go to zero amplitude and the rest is refitted.

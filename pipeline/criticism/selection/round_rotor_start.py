@@ -13,10 +13,10 @@ from dataclasses import replace
 from itertools import compress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import zero
+from pipeline.criticism.operating import Flags
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem
@@ -32,7 +32,7 @@ def with_round_rotor_start(
     wide: LinearSystem,
     offered: Sequence[Candidate],
     scores: Sequence[Score],
-    significant: NDArray[np.bool_],
+    significant: Flags,
 ) -> tuple[Score, ...]:
     """Scores, those of errors of the angle from a round rotor where that beats the tangent.
 
@@ -65,7 +65,7 @@ def with_round_rotor_start(
     return tuple(so_far)
 
 
-def _may_bend(wide: LinearSystem, effect: Effect, significant: NDArray[np.bool_]) -> bool:
+def _may_bend(wide: LinearSystem, effect: Effect, significant: Flags) -> bool:
     """Whether captures in which an effect acts have groups [G] that are not explained, and no other
     captures tell the inductances.
     """

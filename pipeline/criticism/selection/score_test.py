@@ -12,9 +12,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Effect
+from pipeline.criticism.operating import Flags, Indices
 from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.selection import Selection
 from pipeline.criticism.regression.linear_system import LinearSystem
@@ -113,7 +113,7 @@ class Score:
 def score_all(
     system: LinearSystem,
     offered: Sequence[Candidate],
-    significant: NDArray[np.bool_] | None = None,
+    significant: Flags | None = None,
 ) -> tuple[Score, ...]:
     """The score of every candidate, of each effect its best shape.
 
@@ -135,7 +135,7 @@ def score_all(
     scoring, policy = _Scoring.of(system, significant), system.policy.selection
     penalty = math.log(float(system.size))
     searched_of = {c.effect.name: searched(offered, c.effect) for c in offered}
-    best: dict[str, tuple[Score, NDArray[np.int64]]] = {}
+    best: dict[str, tuple[Score, Indices]] = {}
     for candidate, places in placed(system, offered):
         score = scoring.score(candidate, places, policy.quick)
         cost = paid_for(candidate.effect, system.fit.machine, score) * penalty
@@ -190,12 +190,12 @@ class _Scoring:
 
     system: LinearSystem
     normal_equations: NormalEquations
-    model_columns: NDArray[np.int64]
+    model_columns: Indices
     before: FitQuality
-    significant: NDArray[np.bool_]
+    significant: Flags
 
     @classmethod
-    def of(cls, system: LinearSystem, significant: NDArray[np.bool_] | None) -> _Scoring:
+    def of(cls, system: LinearSystem, significant: Flags | None) -> _Scoring:
         model_columns, normal_equations = system.model_columns, system.normal_equations()
         before = FitQuality.of(system, model_columns, normal_equations.only(model_columns).best())
         remaining = np.zeros(len(system.labels), dtype=bool) if significant is None else significant
@@ -204,7 +204,7 @@ class _Scoring:
     def score(
         self,
         candidate: Candidate,
-        places: NDArray[np.int64],
+        places: Indices,
         effort: tuple[tuple[float, ...], int],
     ) -> Score | None:
         """Score of one candidate with parameters on the wrong side of a bound left at zero."""
@@ -241,15 +241,15 @@ class _Scoring:
             policy=system.policy.selection,
         )
 
-    def _names(self, places: NDArray[np.int64]) -> list[str]:
+    def _names(self, places: Indices) -> list[str]:
         return [self.system.columns[n].name for n in places]
 
     def _inside(
         self,
-        places: NDArray[np.int64],
+        places: Indices,
         known: Mapping[str, Parameter],
         effort: tuple[tuple[float, ...], int],
-    ) -> tuple[NDArray[np.int64], Descent] | None:
+    ) -> tuple[Indices, Descent] | None:
         """The places along which no parameter is on the wrong side of its bound, and the best fit
         along them and the model's own; None where there are none.
         """
@@ -267,9 +267,7 @@ class _Scoring:
             live = live[keep]
         return None
 
-    def confounder(
-        self, score: Score, best: Mapping[str, tuple[Score, NDArray[np.int64]]]
-    ) -> str | None:
+    def confounder(self, score: Score, best: Mapping[str, tuple[Score, Indices]]) -> str | None:
         """The clearest effect that explains as much as a candidate, its penalty paid, at a size too
         small to matter, and beside which the candidate is not worth its own.
 

@@ -14,10 +14,9 @@ from itertools import pairwise
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, clock
-from pipeline.criticism.operating import Array, Complex
+from pipeline.criticism.operating import Array, Complex, Flags, Indices
 from pipeline.criticism.policy.machine import Ripple
 
 ORDERS = (6, 12)
@@ -90,11 +89,11 @@ class Waves:
 
     """
 
-    rows: NDArray[np.int64]
+    rows: Indices
     fit: Array
-    places: NDArray[np.int64]
+    places: Indices
     beyond: Array
-    slow: NDArray[np.bool_]
+    slow: Flags
     points: int
 
     @classmethod

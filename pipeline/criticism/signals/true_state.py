@@ -21,6 +21,7 @@ from pipeline.criticism.machine.model import (
 from pipeline.criticism.operating import (
     Array,
     Complex,
+    Indices,
     Operating,
     ShaftState,
     Signals,
@@ -413,7 +414,7 @@ def _held(column: NDArray[Number], size: int) -> NDArray[Number]:
     return column if points == 1 else np.repeat(column, points)
 
 
-def _run(signals: Signals, size: int) -> NDArray[np.int64]:
+def _run(signals: Signals, size: int) -> Indices:
     run = signals.get("run")
     if run is None:
         return np.zeros(size, dtype=np.int64)

@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, slow_orders
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags, Indices
 from pipeline.criticism.policy.validation import Validation
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem
@@ -54,8 +53,8 @@ class Errors:
     signal: str
     error: Array
     sigma: Array
-    segment: NDArray[np.int64]
-    window: NDArray[np.int64]
+    segment: Indices
+    window: Indices
     at: Mapping[str, Array]
 
 
@@ -76,7 +75,7 @@ def window_errors(system: LinearSystem, whitened: Array) -> tuple[Errors, ...]:
 
     """
     system_segments = system.segments
-    parts: dict[str, list[tuple[int, NDArray[np.bool_]]]] = {}
+    parts: dict[str, list[tuple[int, Flags]]] = {}
     for place, (number, channel, order) in enumerate(system.labels):
         in_group = system.group == place
         if order == 0 and system_segments[number].weak is not None and in_group.any():
@@ -92,7 +91,7 @@ def window_errors(system: LinearSystem, whitened: Array) -> tuple[Errors, ...]:
 
 def _errors_of(
     signal: str,
-    groups: Sequence[tuple[int, NDArray[np.bool_]]],
+    groups: Sequence[tuple[int, Flags]],
     variables: Sequence[Mapping[str, Array]],
     system: LinearSystem,
     whitened: Array,
@@ -100,7 +99,7 @@ def _errors_of(
     unit = np.concatenate([system.unit[rows] for _, rows in groups])
     noise_ratio = np.concatenate([system.noise_ratio[rows] for _, rows in groups])
 
-    def variable(name: str, number: int, in_capture: NDArray[np.bool_]) -> Array:
+    def variable(name: str, number: int, in_capture: Flags) -> Array:
         values = variables[number].get(name, np.full(system.segments[number].size, np.nan))
         return values[system.window[in_capture]]
 
@@ -228,9 +227,7 @@ def direction(errors: Errors) -> ErrorMap | None:
     return _window_map(errors, inside, (sense > 0).astype(np.int64), x, None)
 
 
-def _window_map(
-    errors: Errors, inside: NDArray[np.bool_], cell: NDArray[np.int64], x: Bins, y: Bins | None
-) -> ErrorMap:
+def _window_map(errors: Errors, inside: Flags, cell: Indices, x: Bins, y: Bins | None) -> ErrorMap:
     visit = visits_of(cell, errors.segment[inside])
     error, sigma = errors.error[inside], errors.sigma[inside]
     return mean_map(errors.signal, (error, sigma), cell, visit, x, y)
@@ -243,7 +240,7 @@ def _even(value: Array, cells: int) -> tuple[float, ...]:
     return tuple(float(edge) for edge in np.linspace(low, high, cells + 1))
 
 
-def _place(value: Array, bins: Bins) -> NDArray[np.int64]:
+def _place(value: Array, bins: Bins) -> Indices:
     inner = np.array(bins.edges[1:-1])
     return np.searchsorted(inner, value, side="right").astype(np.int64)
 
@@ -334,7 +331,7 @@ def _by_angle(
     return parts
 
 
-def disjoint(starts: NDArray[np.int64], length: int) -> NDArray[np.int64]:
+def disjoint(starts: Indices, length: int) -> Indices:
     """Windows that share no samples.
 
     Parameters

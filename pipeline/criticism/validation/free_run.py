@@ -15,12 +15,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.operating import Array, Complex, Signals, Values
+from pipeline.criticism.operating import Array, Complex, Flags, Signals, Values
 from pipeline.criticism.validation.trajectories import (
     Batch,
     Jacobian,
@@ -199,7 +198,7 @@ class _Response:
     batch: Batch
     path: Signals
     jacobian: Jacobian
-    settled: NDArray[np.bool_]
+    settled: Flags
     names: tuple[str, ...]
 
     def inside(self, signals: Mapping[str, Array]) -> dict[str, Array]:

@@ -12,10 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.operating import Array
+from pipeline.criticism.operating import Array, Flags, Indices
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.validation.error_maps import Errors, angle_maps, window_errors
 from pipeline.physics.glossary import unit_of
@@ -128,7 +127,7 @@ def _window_curves(without: LinearSystem, full: LinearSystem) -> Iterator[_Curve
 
 
 def _of_capture(
-    segment: Segment, before: Errors, after: Errors, in_capture: NDArray[np.bool_]
+    segment: Segment, before: Errors, after: Errors, in_capture: Flags
 ) -> Iterator[_Curve]:
     sigma = before.sigma[in_capture]
     for variable, value in _values(segment, before, in_capture).items():
@@ -141,10 +140,10 @@ def _of_capture(
 
         def mean(
             error: Array,
-            cell: NDArray[np.int64] = cell[inside],
-            inside: NDArray[np.bool_] = inside,
+            cell: Indices = cell[inside],
+            inside: Flags = inside,
             count: Array = count,
-            nonempty: NDArray[np.bool_] = nonempty,
+            nonempty: Flags = nonempty,
         ) -> Array:
             return np.bincount(cell, error[inside], count.size)[nonempty] / count[nonempty]
 
@@ -160,7 +159,7 @@ def _of_capture(
         )
 
 
-def _values(segment: Segment, errors: Errors, in_capture: NDArray[np.bool_]) -> Mapping[str, Array]:
+def _values(segment: Segment, errors: Errors, in_capture: Flags) -> Mapping[str, Array]:
     """What a window's error may depend on [n]: means, and the angles at the window's middle."""
     values = {name: errors.at[name][in_capture] for name in _VARIABLES if name in errors.at}
     theta = segment.recorded.get("theta_mech_rad")
@@ -170,7 +169,7 @@ def _values(segment: Segment, errors: Errors, in_capture: NDArray[np.bool_]) -> 
     return values
 
 
-def _cells(variable: str, value: Array) -> tuple[NDArray[np.int64], Array]:
+def _cells(variable: str, value: Array) -> tuple[Indices, Array]:
     """Cell of each value [n], -1 where there is none, and the middle of each cell [C].
 
     Cells of an angle are equally wide. Edges of others lie halfway between those of equal widths

@@ -15,13 +15,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.coenergy import air_gap_torque
 from pipeline.criticism.machine.model import Model, evaluate
-from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
+from pipeline.criticism.operating import Array, Complex, Flags, Operating, Signals, Values
 from pipeline.criticism.regression.noise_floors import reading_error
 from pipeline.criticism.residuals.residual import measured, operate, predicted
 from pipeline.criticism.validation.error_maps import disjoint
@@ -279,7 +278,7 @@ def settle(
     given: Signals,
     rounds: int,
     extra: tuple[Complex, Array] | None = None,
-) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+) -> tuple[dict[str, Array], Flags]:
     """Trajectories that obey the equations, by Newton's method.
 
     Parameters

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipeline.estimation.electrical.sample_hold import hold_s
 from pipeline.estimation.policy import policy
 from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Capture, Indices
 from pipeline.records.estimate import Estimate
 
 COLUMNS = ("id_a", "iq_a", "vd_v", "vq_v")
@@ -330,7 +330,7 @@ def _amplitudes(
     signals: Complex,
     turned_rad: Array,
     t_s: Array,
-    orders: NDArray[np.int64],
+    orders: Indices,
     sizes: NDArray[np.intp],
 ) -> tuple[Complex, Array]:
     """Amplitudes [w, 2, k] of two signals [n, 2] at orders of an angle, beside a straight line, in

@@ -15,7 +15,7 @@ from pipeline.estimation.policy import policy
 from pipeline.numerics.harmonics import hermite, whole_cycles
 from pipeline.numerics.plateaus import true_runs, white_noise_sigma
 from pipeline.physics.units import TURN_RAD
-from pipeline.records.capture import Array
+from pipeline.records.capture import Array, Flags
 
 Rows = NDArray[np.intp]
 
@@ -101,7 +101,7 @@ def _stretches(spin: Spin, change: float) -> tuple[list[Stretch], int]:
     return stretches, int(np.count_nonzero(moving))
 
 
-def _unbroken(t_s: Array, vector: Complex, moving: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def _unbroken(t_s: Array, vector: Complex, moving: Flags) -> Iterator[tuple[int, int]]:
     """Runs of moving rows, split where rows are missing for more than half a cycle.
 
     Across such a gap the phase cannot be unwrapped. Half a cycle is seen by nine tenths of the

@@ -15,7 +15,7 @@ from pipeline.estimation.policy import policy
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.physics.windings import PAIR_AXES_RAD
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Capture, Flags
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +148,7 @@ def read_step(capture: Capture, unknown_rad: float | None = None) -> StepRecord 
     )
 
 
-def _spikes(signal: Array) -> NDArray[np.bool_]:
+def _spikes(signal: Array) -> Flags:
     """Samples [n] more than `steps.spike_sigmas` of the noise from the median of five around them.
 
     A signal that rises or falls through the five is its own median, an edge too. Reference: Hampel,

@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.sample_hold import hold_s
 from pipeline.estimation.electrical.voltage_turn import (
@@ -20,7 +19,7 @@ from pipeline.estimation.electrical.voltage_turn import (
 from pipeline.estimation.policy import policy
 from pipeline.numerics.shaft_log import shaft_log
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Capture, Indices
 
 D_FLUX = "d flux"
 LATE = "acceleration"
@@ -46,8 +45,8 @@ class VoltageRows:
     """
 
     captures: tuple[Capture, ...]
-    capture: NDArray[np.int64]
-    cluster: NDArray[np.int64]
+    capture: Indices
+    cluster: Indices
     time_s: Array
     voltage_v: Array
     current_a: Array

@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.terminals import first_temperature
 from pipeline.estimation.method import Method
@@ -36,7 +35,7 @@ from pipeline.numerics.selection import needed_columns
 from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import Term
 from pipeline.physics.units import REFERENCE_DEGC
-from pipeline.records.capture import Array, Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture, Indices
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
@@ -86,7 +85,7 @@ class Blocks:
     kinetic_rad2_s3: Array
     warm: Array
     torque_noise_nm: Array
-    capture: NDArray[np.int64]
+    capture: Indices
 
 
 MEANS = tuple(field.name for field in fields(Blocks) if field.name != "capture")

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.mechanical.shaft_rows import quiet_windows
 from pipeline.estimation.method import Method
@@ -31,7 +30,7 @@ from pipeline.numerics.least_squares import LinearFit, fit_by_groups, linear_fit
 from pipeline.numerics.shaft_log import shaft_log
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed
 from pipeline.physics.glossary import Term
-from pipeline.records.capture import Array, Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture, Indices
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
@@ -81,8 +80,8 @@ class Rows:
 
     design: Array
     voltage_v: Array
-    capture: NDArray[np.int64]
-    cluster: NDArray[np.int64]
+    capture: Indices
+    cluster: Indices
     time_s: Array
 
 

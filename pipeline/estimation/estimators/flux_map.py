@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from pipeline.estimation.electrical.magnet_temperature import (
@@ -31,7 +30,7 @@ from pipeline.estimation.uncertainty.instruments import (
 )
 from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.physics.units import REFERENCE_DEGC
-from pipeline.records.capture import Array, Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture, Flags, Indices
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
@@ -140,12 +139,12 @@ class _Rows:
 
     axis: str
     captures: Sequence[Capture]
-    table: NDArray[np.int64]
+    table: Indices
     id_a: Array
     iq_a: Array
     signal: Array
     factor: Array
-    level: NDArray[np.int64]
+    level: Indices
     excess_k: Array
 
     @property
@@ -154,7 +153,7 @@ class _Rows:
         shares = [np.abs(i) / max(float(np.abs(i).max()), 1e-300) for i in (self.id_a, self.iq_a)]
         return np.maximum(*shares)
 
-    def at(self, rows: NDArray[np.bool_]) -> _Rows:
+    def at(self, rows: Flags) -> _Rows:
         """Some of the rows."""
         names = ("table", "id_a", "iq_a", "signal", "factor", "level", "excess_k")
         return replace(self, **{name: getattr(self, name)[rows] for name in names})

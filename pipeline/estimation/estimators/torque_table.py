@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.magnet_temperature import (
     assumed_temperature,
@@ -31,7 +30,7 @@ from pipeline.estimation.uncertainty.instruments import (
 from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.numerics.selection import needed_columns
 from pipeline.physics.units import REFERENCE_DEGC
-from pipeline.records.capture import Array, Campaign, Capture
+from pipeline.records.capture import Array, Campaign, Capture, Indices
 from pipeline.records.constants import Constants
 from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Contribution, propagate
@@ -145,7 +144,7 @@ class _Rows:
     torque_nm: Array
     excess_k: Array
     theta_rad: Array
-    table: NDArray[np.int64]
+    table: Indices
     theta_elec_rad: Array | None = None
 
     @classmethod

@@ -13,7 +13,6 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.magnet_temperature import assumed_temperature
 from pipeline.estimation.electrical.ripple_torque import Winding, ripple_by_speed
@@ -33,7 +32,7 @@ from pipeline.numerics.jumps import jumps, speed_jumps
 from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.shaft_log import SPEED, motion_column
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Capture, Flags, Indices
 
 DRIVE, COAST = 0, 1
 ACCELERATION_NOISE, CURRENT_NOISE = "acceleration noise", "current noise"
@@ -76,9 +75,9 @@ class ShaftRows:
     """
 
     captures: tuple[Capture, ...]
-    capture: NDArray[np.int64]
-    kind: NDArray[np.int64]
-    cluster: NDArray[np.int64]
+    capture: Indices
+    kind: Indices
+    cluster: Indices
     time_s: Array
     acceleration_rad_s2: Array
     q_current_a: Array
@@ -98,7 +97,7 @@ class ShaftRows:
         """Number of rows."""
         return int(self.sense.size)
 
-    def kinds(self) -> list[NDArray[np.bool_]]:
+    def kinds(self) -> list[Flags]:
         """Rows [w] of the drives and of the coast-downs, of those that there are."""
         return [rows for rows in (self.kind == DRIVE, self.kind == COAST) if np.any(rows)]
 
@@ -133,7 +132,7 @@ class _Part:
     warm: Array
     load: Array
     ripple: tuple[Array, Array]
-    hidden: NDArray[np.bool_]
+    hidden: Flags
 
 
 def shaft_rows(
@@ -223,11 +222,11 @@ def _part(capture: Capture, winding: Winding | None) -> _Part | None:
     )  # fmt: skip
 
 
-def _hidden(weak: WeakRows, theta: Array, kind: int) -> NDArray[np.bool_]:
+def _hidden(weak: WeakRows, theta: Array, kind: int) -> Flags:
     """Windows [w] of a drive in which the speed jumps: what the current did there is in no row."""
     limits = policy().shaft_rows
     jumping = speed_jumps(theta, limits.jump_share, limits.jump_sigmas, limits.jump_rows)
-    found: NDArray[np.bool_] = weak.integral(jumping.astype(float)) > 0.0
+    found: Flags = weak.integral(jumping.astype(float)) > 0.0
     return found if kind == DRIVE else np.zeros(weak.count, dtype=bool)
 
 
@@ -288,7 +287,7 @@ def quiet_windows(t_s: Array, theta_rad: Array, least_s: float) -> tuple[WeakRow
     return weak, False
 
 
-def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:
+def _held(weak: WeakRows, speed: Array) -> Flags:
     """Windows [w] with a row that belongs to no coast."""
     outside = np.ones(speed.size, dtype=bool)
     for rows, _ in coasting_rows(speed):
@@ -297,14 +296,14 @@ def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:
     return before[weak.starts + weak.sizes] > before[weak.starts]
 
 
-def _undetermined(part: _Part, fastest: float) -> NDArray[np.bool_]:
+def _undetermined(part: _Part, fastest: float) -> Flags:
     """Windows [w] in which the shaft may stand, in which its speed jumps from row to row, or in
     which a coast-down is no coast yet.
     """
     weak = part.weak
     ends = zip(weak.starts, weak.starts + weak.sizes, strict=True)
     least = np.array([np.min(np.abs(part.speed[a:b])) for a, b in ends])
-    slow: NDArray[np.bool_] = least < policy().shaft_rows.slowest_share * fastest
+    slow: Flags = least < policy().shaft_rows.slowest_share * fastest
     slow |= part.hidden
     if part.kind == COAST:
         gaining = weak.integral(part.theta, 2) * weak.integral(part.theta, 1) > 0.0

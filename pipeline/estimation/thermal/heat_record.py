@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.terminals import (
     bridged,
@@ -18,7 +17,7 @@ from pipeline.estimation.policy import policy
 from pipeline.numerics.integrals import GAP
 from pipeline.numerics.plateaus import block_means, find_plateaus
 from pipeline.physics.windings import phase_from_line
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Capture, Flags
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, derived
 
@@ -264,7 +263,7 @@ def _blocks(
     )
 
 
-def _unbroken(t_s: Array, size: int) -> NDArray[np.bool_]:
+def _unbroken(t_s: Array, size: int) -> Flags:
     """Which blocks of `size` rows of a clock [n, s] take no more than `GAP` times what is usual."""
     last = t_s[size - 1 :: size]
     spans = last - t_s[::size][: last.size]

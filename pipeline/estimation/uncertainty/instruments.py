@@ -11,9 +11,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.records.capture import UNSTATED_U, Array, Capture, CaptureMeta
+from pipeline.records.capture import UNSTATED_U, Array, Capture, CaptureMeta, Indices
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import Budget, Contribution, propagate
 
@@ -141,7 +140,7 @@ def instrument_uncertainties(
     return dict(sorted((usual | stated).items()))
 
 
-def shifted_offsets(shift: Shift, sources: Iterable[str], part: NDArray[np.int64]) -> Array:
+def shifted_offsets(shift: Shift, sources: Iterable[str], part: Indices) -> Array:
     """What a shift adds to each of n rows of several captures.
 
     Parameters
@@ -158,7 +157,7 @@ def shifted_offsets(shift: Shift, sources: Iterable[str], part: NDArray[np.int64
 
 
 def shifted_gains(
-    shift: Shift, captures: Sequence[Capture], part: NDArray[np.int64], *kinds: str
+    shift: Shift, captures: Sequence[Capture], part: Indices, *kinds: str
 ) -> tuple[Array, ...]:
     """The gains [n, 1] of some kinds of instruments, by rows of several captures.
 

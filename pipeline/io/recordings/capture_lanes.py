@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 from rerun import RecordingStream, TimeColumn
 
 from pipeline.io.recordings.font import drawable
@@ -22,7 +21,7 @@ from pipeline.numerics.regimes import (
     stretches,
 )
 from pipeline.physics.notation import quantity
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Capture, Indices
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.views.names import quantity_words, unit_words
@@ -224,7 +223,7 @@ def _row_at(capture: Capture, t_s: float) -> int:
 def _index(capture: Capture, rows: Sequence[int]) -> TimeColumn:
     """Where rows stand on the capture's own index."""
     height = capture.tables[0].height if capture.tables else 0
-    places: NDArray[np.int64] = np.clip(np.asarray(rows), 0, max(height - 1, 0))
+    places: Indices = np.clip(np.asarray(rows), 0, max(height - 1, 0))
     clock = _clock_s(capture)
     if clock is None:
         return rr.TimeColumn(ROW, sequence=places.tolist())

@@ -6,11 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.numerics.cell_means import mean_map, visits_of
 from pipeline.physics.glossary import unit_of
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Capture, Indices
 from pipeline.records.error_map import Bins, ErrorMap
 from pipeline.records.evidence import Evidence
 
@@ -186,7 +185,7 @@ def _turn(signal: str, error: Array, at: dict[str, Array], angle: str) -> ErrorM
     return _map(signal, error[inside] - error[inside].mean(), cell, x, None)
 
 
-def _map(signal: str, error: Array, cell: NDArray[np.int64], x: Bins, y: Bins | None) -> ErrorMap:
+def _map(signal: str, error: Array, cell: Indices, x: Bins, y: Bins | None) -> ErrorMap:
     visit = visits_of(cell, np.zeros(cell.size, dtype=np.int64))
     means = mean_map(signal, (error, np.ones(error.size)), cell, visit, x, y)
     return replace(means, mean=np.where(means.count < FEWEST_SAMPLES, np.nan, means.mean))
@@ -199,7 +198,7 @@ def _even(value: Array, cells: int) -> tuple[float, ...]:
     return tuple(np.linspace(low - more, high + more, cells + 1).tolist())
 
 
-def _place(value: Array, bins: Bins) -> NDArray[np.int64]:
+def _place(value: Array, bins: Bins) -> Indices:
     low, high = bins.edges[0], bins.edges[-1]
     place = ((value - low) / (high - low) * bins.count).astype(np.int64)
     return np.clip(place, 0, bins.count - 1)

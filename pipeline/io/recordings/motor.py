@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 import polars as pl
 import rerun as rr
-from numpy.typing import NDArray
 from rerun import RecordingStream
 
 from pipeline.io.recordings.capture_maps import FULL_COLOUR_SHARE, signal_floor
@@ -46,7 +45,7 @@ from pipeline.io.recordings.stream import (
 )
 from pipeline.io.recordings.views import MEASURED, MODEL, RESIDUAL
 from pipeline.numerics.thinning import line_points
-from pipeline.records.capture import Array, Campaign
+from pipeline.records.capture import Array, Campaign, Indices
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
@@ -67,7 +66,7 @@ class Strip:
 
     capture: str
     signal: str
-    places: NDArray[np.int64]
+    places: Indices
     percent: Array
 
 

@@ -10,11 +10,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.numerics.integrals import trapezoid
 from pipeline.physics.machine import DqMeans, air_gap_torque, dq_voltages
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Capture, Flags, Indices
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.evidence import Evidence, Series
 
@@ -33,8 +32,8 @@ class _Windows:
     """A record cut into windows: `edges` [w + 1] rows, `whole` [w] where no gap falls inside."""
 
     t_s: Array
-    edges: NDArray[np.int64]
-    whole: NDArray[np.bool_]
+    edges: Indices
+    whole: Flags
 
     @property
     def middle_s(self) -> Array:
@@ -127,9 +126,7 @@ def _torque(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, ...
     return (_evidence(capture, "torque_shaft_nm", series, "every sample"),)
 
 
-def _jumps(
-    cut: _Windows, speed: Array, j_kgm2: float, record: Mapping[str, Array]
-) -> NDArray[np.bool_]:
+def _jumps(cut: _Windows, speed: Array, j_kgm2: float, record: Mapping[str, Array]) -> Flags:
     """Samples [n] by windows whose accelerating torque differs by 5 % of the largest torque."""
     torque = j_kgm2 * np.gradient(speed, cut.middle_s)
     step = np.abs(np.diff(torque, prepend=torque[:1], append=torque[-1:]))
