@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from pipeline.criticism.data.holding_orders import _held_out, _joined
+from pipeline.criticism.data.holding_cells import _held_out, _joined
 from pipeline.criticism.policy.policy import Policy
 from pipeline.records.capture import Capture
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.criticism.data.holding_orders import holding_orders
+from pipeline.criticism.data.holding_cells import holding_orders
 from pipeline.criticism.policy.policy import DEFAULT
 from tests.sectors import sector_errors
 from tests.stories.fits import REAL, campaign, fit, without

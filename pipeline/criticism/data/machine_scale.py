@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.holding_orders import holding_orders
+from pipeline.criticism.data.holding_cells import holding_orders
 from pipeline.criticism.data.instruments import stated_u
 from pipeline.criticism.data.rounding import rounding_step
 from pipeline.criticism.data.settling import settling_of

@@ -27,13 +27,6 @@ from rerun.blueprint import Blueprint
 from pipeline.io.recordings.datasheet_page import plain
 from pipeline.io.recordings.error_map import map_view, send_frame, send_map
 from pipeline.io.recordings.font import drawable
-from pipeline.io.recordings.ladder_scales import (
-    TIMELINE,
-    angle_reach,
-    angle_scale,
-    error_scale,
-    map_reach,
-)
 from pipeline.io.recordings.stream import (
     Bars,
     recording,
@@ -52,11 +45,20 @@ from pipeline.io.recordings.views import (
     workspace,
 )
 from pipeline.io.storage.publish import canonical_json
-from pipeline.physics.notation import quantity
+from pipeline.physics.notation import Scale, quantity, scale_for
 from pipeline.records.diagnosis import Diagnosis
-from pipeline.views.ladder import CURRENT, SPEED, LadderView, angle_of, ladder_view, mapped_signals
+from pipeline.views.ladder import (
+    CURRENT,
+    SPEED,
+    LadderView,
+    angle_of,
+    ladder_view,
+    mapped_signals,
+    reaches,
+)
 from pipeline.views.names import quantity_words
 
+TIMELINE = "step"
 WORDS = ("speed [rad/s]", "iq [A]")
 
 
@@ -270,3 +272,71 @@ def _overview(signals: tuple[str, ...]) -> Any:
         column_shares=[1.6, 1.0],
         name="All steps",
     )
+
+
+def map_reach(result: Diagnosis, signal: str) -> float:
+    """Full colour of the maps of a signal over speed and current, the same on all steps.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+    signal
+        Glossary name.
+
+    Returns
+    -------
+    float
+        In the unit of the signal.
+
+    """
+    return reaches(result.ladder).get((signal, SPEED), 0.0)
+
+
+def error_scale(result: Diagnosis, signal: str) -> Scale:
+    """The unit in which the errors of a signal are drawn on all steps: mV where volts would be
+    small.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+    signal
+        Glossary name.
+
+    """
+    errors = [step.errors[signal] for step in result.ladder]
+    return scale_for(max(e.rmse for e in errors), errors[0].unit)
+
+
+def angle_reach(result: Diagnosis, signal: str) -> float:
+    """The largest mean error over the angle on any step.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+    signal
+        Glossary name.
+
+    Returns
+    -------
+    float
+        In the unit of the signal.
+
+    """
+    return reaches(result.ladder).get((signal, angle_of(signal)), 0.0)
+
+
+def angle_scale(result: Diagnosis, signal: str) -> Scale:
+    """The unit in which the error of a signal is drawn over the angle on all steps.
+
+    Parameters
+    ----------
+    result
+        The diagnosis.
+    signal
+        Glossary name.
+
+    """
+    return scale_for(angle_reach(result, signal), result.ladder[0].errors[signal].unit)

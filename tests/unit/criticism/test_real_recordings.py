@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.holding_orders import holding_orders
+from pipeline.criticism.data.holding_cells import holding_orders
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.goodness import signal_errors

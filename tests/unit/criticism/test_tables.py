@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.data.holding_orders import holding_orders
+from pipeline.criticism.data.holding_cells import holding_orders
 from pipeline.criticism.data.levels import levels_of, set_levels
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.diagnosis import diagnose

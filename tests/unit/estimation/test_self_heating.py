@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.crosscheck.registry import check_all
-from pipeline.estimation.electrical.self_heating import warming
+from pipeline.estimation.electrical.direct_current import warming
 from pipeline.estimation.estimators import resistance
 from pipeline.numerics.plateaus import find_plateaus
 from pipeline.records.capture import Campaign, Capture

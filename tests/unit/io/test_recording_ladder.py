@@ -19,8 +19,7 @@ from pipeline.io.recordings.comparison import (
     table_of,
 )
 from pipeline.io.recordings.error_map import CELL, diverging, map_labels, map_picture
-from pipeline.io.recordings.ladder import ladder_bytes, step_markdown
-from pipeline.io.recordings.ladder_scales import error_scale, map_reach
+from pipeline.io.recordings.ladder import error_scale, ladder_bytes, map_reach, step_markdown
 from pipeline.io.recordings.seal import write_checksummed
 from pipeline.records.comparison import Comparison, SignalError, Trace
 from pipeline.views.ladder import ladder_view, mapped_signals

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from pipeline.numerics.thinning import cloud_points, line_points
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.charts.axis import axis_for, symmetric_axis
-from pipeline.report.charts.chart import chart
-from pipeline.report.charts.residual import residual_scale
+from pipeline.report.charts.chart import chart, residual_scale
 from pipeline.report.charts.strip import Dot, strip_plot
 from pipeline.views.names import in_words, quantity_words
 
