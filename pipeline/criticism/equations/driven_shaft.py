@@ -23,6 +23,7 @@ from pipeline.criticism.machine.model import (
 )
 from pipeline.criticism.operating import Array, Operating, Signals, Values, between
 from pipeline.criticism.parameter import Machine
+from pipeline.criticism.signals.shaft import second_difference
 from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
 from pipeline.criticism.signals.voltage import recorded_voltage
 from pipeline.numerics.projection import projection, window_starts
@@ -127,8 +128,7 @@ def predicted(segment: Segment, x: Operating, _: Pieces, model: Model, values: V
     mostly noise; R times the difference of both is linear and stays.
 
     """
-    bend = np.zeros(x.theta_rad.size)
-    bend[1:-1] = np.diff(x.theta_rad, 2) / segment.ts_s**2
+    bend = second_difference(x.theta_rad, segment.ts_s)
     smooth = np.gradient(x.omega_rad_s, segment.ts_s)
     driven, pieces = x, evaluate(model, x, values)
     for _round in range(2):

@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import Model, evaluate
 from pipeline.criticism.operating import Array, Flags, Operating, Values
+from pipeline.numerics.plateaus import true_runs
 
 
 def at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
@@ -113,10 +114,8 @@ def _rests(speed: Array, slow: float, least: int, most: float, times: float) -> 
     reversal on the way is none either: the shaft stays for so many `times` what the speed, as it
     changes before and after, takes to pass from `slow` to `-slow`.
     """
-    which = np.abs(speed) < slow
-    edges = np.flatnonzero(np.diff(which.astype(np.int8), prepend=0, append=0))
-    rests = np.zeros(which.size, dtype=bool)
-    for first, end in edges.reshape(-1, 2).tolist():
+    rests = np.zeros(speed.size, dtype=bool)
+    for first, end in true_runs(np.abs(speed) < slow):
         beside = speed[max(first - least, 0) : first + 1], speed[end - 1 : end + least]
         change = min((np.ptp(one) / (one.size - 1) for one in beside if one.size > 1), default=0.0)
         passes = 2.0 * slow / change if change else 0.0

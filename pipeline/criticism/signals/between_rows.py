@@ -15,7 +15,7 @@ from typing import Self
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment, clock
+from pipeline.criticism.data.segment import Segment, joins
 from pipeline.criticism.operating import Array, Complex, Flags, Indices
 from pipeline.criticism.policy.machine import Ripple
 
@@ -282,6 +282,4 @@ def _waves(eps_rad: Array) -> Array:
 
 def _runs(segment: Segment, size: int) -> list[tuple[int, int]]:
     """First row of each run of rows without a gap, and the one behind its last."""
-    gaps = np.flatnonzero(np.abs(np.diff(clock(segment)) / segment.ts_s - 1.0) > 0.5) + 1
-    edges = [0, *gaps.tolist(), size]
-    return list(pairwise(edges))
+    return list(pairwise([0, *joins(segment).tolist(), size]))

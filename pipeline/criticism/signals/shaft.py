@@ -216,7 +216,7 @@ def unexplained_acceleration(
     """
     finer = x.theta_rad.size // segment.size
     torque = averaged(torque_nm, finer) if finer > 1 else torque_nm
-    acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
+    acceleration = second_difference(x.theta_rad[::finer], segment.ts_s)
     return (torque / values["j_kgm2"] - acceleration) / stretch**2
 
 
@@ -251,7 +251,7 @@ def sensed_torque(
     if finer > 1:
         torque = _of_held(segment, torque_nm, finer) if x.shaft.held else averaged(torque_nm, finer)
     if not segment.instrument.stator and not segment.sensors.held_speed:
-        acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
+        acceleration = second_difference(x.theta_rad[::finer], segment.ts_s)
         torque = torque - values["j_kgm2"] * acceleration
     return as_sensed(torque, model, values)
 
@@ -332,10 +332,18 @@ def true_load(
     return r.torque_nm
 
 
-def _second_difference(theta: Array, period: float) -> Array:
-    bend = np.zeros(theta.size)
-    bend[1:-1] = np.diff(theta, 2) / period**2
-    return bend
+def second_difference(theta: Array, period: float) -> Array:
+    """Acceleration [n, rad/s²] of an angle [n, rad] over samples of a period [s]; 0 at both ends.
+
+    Parameters
+    ----------
+    theta
+        Angle [n].
+    period
+        Of the samples [s].
+
+    """
+    return np.pad(np.diff(theta, 2), 1) / period**2
 
 
 def averaged(fine: Array, finer: int) -> Array:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.plateaus import true_runs
+
 Array = NDArray[np.float64]
 
 ZERO_SHARE = 0.02
@@ -101,17 +103,17 @@ def _kinds(
     top = float(np.max(np.abs(speed)))
     stands = np.abs(speed) <= ZERO_SHARE * top
     kind = np.full(time.size, "drive", dtype="U6")
-    for first, last in _runs(~stands & (_drift(speed) <= HELD_SHARE * top) & transducer):
-        if time[last] - time[first] >= LEAST_HELD_S:
-            kind[first : last + 1] = "hold"
-    for first, last in _runs(free & ~stands):
-        fast, slow = abs(float(speed[first])), abs(float(speed[last]))
+    for first, stop in true_runs(~stands & (_drift(speed) <= HELD_SHARE * top) & transducer):
+        if time[stop - 1] - time[first] >= LEAST_HELD_S:
+            kind[first:stop] = "hold"
+    for first, stop in true_runs(free & ~stands):
+        fast, slow = abs(float(speed[first])), abs(float(speed[stop - 1]))
         falls = fast >= FAST_SHARE * top and slow <= (1.0 - FALL_SHARE) * fast
-        if last - first >= LEAST_ROWS and falls:
-            kind[first : last + 1] = "coast"
-    for first, last in _runs(free & stands):
-        if last - first >= LEAST_ROWS:
-            kind[first : last + 1] = "rest"
+        if stop - first > LEAST_ROWS and falls:
+            kind[first:stop] = "coast"
+    for first, stop in true_runs(free & stands):
+        if stop - first > LEAST_ROWS:
+            kind[first:stop] = "rest"
     return kind
 
 
@@ -147,10 +149,3 @@ def _drift(speed: Array) -> Array:
     padded = np.pad(speed, (width // 2, width - width // 2 - 1), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, width)
     return windows.max(axis=1) - windows.min(axis=1)
-
-
-def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last row of each stretch in which the mask holds."""
-    edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
-    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-    return list(zip(first.tolist(), last.tolist(), strict=True))
