@@ -116,10 +116,6 @@ def compare_versions(
         limits=used(limits),
         constants=constants,
         effects=effects,
-        orders=(),
-        cogging=(),
-        outliers=(),
-        golden=(),
         notes=tuple(notes),
     )
 
@@ -169,9 +165,7 @@ class _Seen:
         )
         worst = self.worst
         named = None if worst is None or worst.decision == "pass" else worst.motor_id
-        return Conformity(
-            counts, counts[0].decision if counts else "not_evaluated", named, None, None
-        )
+        return Conformity(counts, counts[0].decision if counts else "not_evaluated", named)
 
 
 def _constant(
@@ -195,14 +189,11 @@ def _constant(
         lots=(),
         bounds=None,
         conformity=seen.conformity(),
-        test=LotTest("not_evaluated", 0, 0, None, None, None, None, False),
+        test=LotTest("not_evaluated", 0, 0),
         equivalence=NOT_EVALUATED,
-        effect=EffectSize(worst.difference if worst else None, None, None, None, None, in_u),
-        power=Power("none", None, None, None),
+        effect=EffectSize(worst.difference if worst else None, in_sd=in_u),
+        power=Power("none"),
         capability=NO_CAPABILITY,
-        variance=(),
-        gauge=None,
-        stations=(),
         missing=(*(f"{m}: lost" for m in seen.lost), *(f"{m}: new" for m in seen.gained)),
     )
 
@@ -284,10 +275,8 @@ def _checks(pairs: Sequence[Pair]) -> tuple[EffectChange, ...]:
             if worse
             else f"no longer failing it: {counted(len(old - new), 'motor')}"
         )
+        counts, motors = (len(old), len(pairs), len(new), len(pairs)), tuple(sorted(new))
         changed.append(
-            EffectChange(
-                f"check {name}", "datasheet", verdict, why, len(old), len(pairs), len(new),
-                len(pairs), None, None, None, None, "", tuple(sorted(new)),
-            )
-        )  # fmt: skip
+            EffectChange(f"check {name}", "datasheet", verdict, why, *counts, motors=motors)
+        )
     return tuple(changed)

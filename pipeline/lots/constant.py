@@ -124,11 +124,11 @@ def result(
 def _test(assessment: Assessment, family: Family, limits: Limits) -> LotTest:
     lots, needed, contrast = len(assessment.base), limits.min_lots, assessment.contrast
     if assessment.confounded:
-        return LotTest("CONFOUNDED", lots, needed, None, None, None, None, False)
+        return LotTest("CONFOUNDED", lots, needed)
     if contrast is None:
-        return LotTest("not_evaluated", lots, needed, None, None, None, None, False)
+        return LotTest("not_evaluated", lots, needed)
     if lots < needed or family.lot_p_holm is None:
-        return LotTest("INSUFFICIENT_HISTORY", lots, needed, None, None, None, None, False)
+        return LotTest("INSUFFICIENT_HISTORY", lots, needed)
     t = contrast.lot_t
     return LotTest(
         "evaluated",
@@ -152,7 +152,7 @@ def _equivalence(assessment: Assessment, margin: float | None, alpha: float) -> 
 def _effect(assessment: Assessment, k: float) -> EffectSize:
     contrast = assessment.contrast
     if contrast is None:
-        return EffectSize(None, None, None, None, None, None)
+        return EffectSize()
     before = float(np.mean(assessment.base_means))
     return EffectSize(
         contrast.difference,
@@ -168,7 +168,7 @@ def _power(assessment: Assessment, limits: Limits, family: int) -> Power:
     """Against a shift of 1.5 standard deviations of motors, at the hardest step of Holm's."""
     contrast = assessment.contrast
     if contrast is None or not assessment.within_sd:
-        return Power("none", None, None, None)
+        return Power("none")
     shift, alpha = SHIFT_SD * assessment.within_sd, limits.alpha / max(family, 1)
     by_lots = len(assessment.base) >= limits.min_lots and contrast.lot_se is not None
     se = contrast.lot_se if by_lots and contrast.lot_se is not None else contrast.u

@@ -67,4 +67,4 @@ def equivalence(
     return Equivalence(status, margin, low, high, p_value, dof)  # type: ignore[arg-type]
 
 
-NOT_EVALUATED = Equivalence("not_evaluated", None, None, None, None, None)
+NOT_EVALUATED = Equivalence("not_evaluated")

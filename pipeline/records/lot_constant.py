@@ -155,9 +155,9 @@ class Conformity:
 
     counts: tuple[Count, ...]
     worst: Decision
-    worst_motor: str | None
-    risk_false_accept: float | None
-    risk_false_reject: float | None
+    worst_motor: str | None = None
+    risk_false_accept: float | None = None
+    risk_false_reject: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,11 +184,11 @@ class LotTest:
     status: Literal["evaluated", "INSUFFICIENT_HISTORY", "CONFOUNDED", "not_evaluated"]
     lots: int
     needed: int
-    t: float | None
-    dof: float | None
-    p_value: float | None
-    p_holm: float | None
-    significant: bool
+    t: float | None = None
+    dof: float | None = None
+    p_value: float | None = None
+    p_holm: float | None = None
+    significant: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,11 +210,11 @@ class Equivalence:
     """
 
     status: Literal["equivalent", "different", "undecided", "not_evaluated"]
-    margin: float | None
-    low: float | None
-    high: float | None
-    p_value: float | None
-    dof: float | None
+    margin: float | None = None
+    low: float | None = None
+    high: float | None = None
+    p_value: float | None = None
+    dof: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,12 +234,12 @@ class EffectSize:
 
     """
 
-    difference: float | None
-    u: float | None
-    k: float | None
-    expanded_u: float | None
-    relative: float | None
-    in_sd: float | None
+    difference: float | None = None
+    u: float | None = None
+    k: float | None = None
+    expanded_u: float | None = None
+    relative: float | None = None
+    in_sd: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,9 +250,9 @@ class Power:
     """
 
     by: Literal["lots", "motors", "none"]
-    shift: float | None
-    power: float | None
-    detectable: float | None
+    shift: float | None = None
+    power: float | None = None
+    detectable: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -346,10 +346,10 @@ class ConstantResult:
     effect: EffectSize
     power: Power
     capability: Capability
-    variance: tuple[Component, ...]
-    gauge: Gauge | None
-    stations: tuple[StationBias, ...]
-    missing: tuple[str, ...]
+    variance: tuple[Component, ...] = ()
+    gauge: Gauge | None = None
+    stations: tuple[StationBias, ...] = ()
+    missing: tuple[str, ...] = ()
 
     def of(self, side: Side) -> tuple[MotorValue, ...]:
         """The motors of one side.

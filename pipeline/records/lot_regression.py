@@ -68,12 +68,12 @@ class EffectChange:
     baseline_of: int
     candidate_shown: int
     candidate_of: int
-    p_value: float | None
-    p_holm: float | None
-    baseline_amplitude: float | None
-    candidate_amplitude: float | None
-    unit: str
-    motors: tuple[str, ...]
+    p_value: float | None = None
+    p_holm: float | None = None
+    baseline_amplitude: float | None = None
+    candidate_amplitude: float | None = None
+    unit: str = ""
+    motors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,11 +157,11 @@ class LotRegression(PlainRecord):
     limits: LimitsUsed
     constants: tuple[ConstantResult, ...]
     effects: tuple[EffectChange, ...]
-    orders: tuple[OrderLevel, ...]
-    cogging: tuple[CoggingBand, ...]
-    outliers: tuple[Outlier, ...]
-    golden: tuple[str, ...]
-    notes: tuple[str, ...]
+    orders: tuple[OrderLevel, ...] = ()
+    cogging: tuple[CoggingBand, ...] = ()
+    outliers: tuple[Outlier, ...] = ()
+    golden: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """The JSON form, schema lot-regression/1."""
