@@ -20,17 +20,19 @@ from pipeline.criticism.selection.changed_over_time import with_changing_frictio
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
-from pipeline.criticism.selection.linear_start import with_linear_start
-from pipeline.criticism.selection.log_start import with_log_start
 from pipeline.criticism.selection.other_readings import by_best_readings
 from pipeline.criticism.selection.pairs import best_pair
 from pipeline.criticism.selection.pruning import reshaped
 from pipeline.criticism.selection.refit import begin_from, floored_anew
 from pipeline.criticism.selection.removal import unsure_effect, without_superfluous
-from pipeline.criticism.selection.round_rotor_start import with_round_rotor_start
 from pipeline.criticism.selection.score_test import Score, score_all
 from pipeline.criticism.selection.sizes import is_rare
-from pipeline.criticism.selection.unusual_nuisances import with_nuisances
+from pipeline.criticism.selection.starts import (
+    with_linear_start,
+    with_log_start,
+    with_nuisances,
+    with_round_rotor_start,
+)
 
 
 @dataclass(frozen=True, slots=True)

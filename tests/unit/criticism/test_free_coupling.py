@@ -20,9 +20,9 @@ from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.discrimination import discriminate
-from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.refit import begin_from
 from pipeline.criticism.selection.score_test import Score
+from pipeline.criticism.selection.starts import with_linear_start
 from pipeline.execution.tasks.start import start_constants
 from pipeline.records.comparison import ModelSpec
 from pipeline.simulator.bench import campaign

@@ -19,8 +19,8 @@ from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.refit import begin_from, refitted
 from pipeline.criticism.selection.score_test import score_all
+from pipeline.criticism.selection.starts import with_nuisances
 from pipeline.criticism.selection.stepwise import search
-from pipeline.criticism.selection.unusual_nuisances import with_nuisances
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign

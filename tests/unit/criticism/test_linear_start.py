@@ -21,10 +21,10 @@ from pipeline.criticism.machine.two_masses import (
     spring_twist,
 )
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.selection import linear_start
+from pipeline.criticism.selection import starts
 from pipeline.criticism.selection.candidates import Candidate
-from pipeline.criticism.selection.linear_start import _by_choices
 from pipeline.criticism.selection.score_test import Score
+from pipeline.criticism.selection.starts import _by_choices
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
@@ -144,11 +144,11 @@ def test_what_moves_is_counted_from_the_fit_that_there_is(monkeypatch):
     ]
     wide, refitted, end = fits
     made = Score(Candidate(effects()["compliance"], ()), 30.0, 10.0, {}, {}, 1.0, 2.0, policy=None)
-    monkeypatch.setattr(linear_start, "_reweighted", lambda *_: refitted)
+    monkeypatch.setattr(starts, "_reweighted", lambda *_: refitted)
     monkeypatch.setattr(
-        linear_start,
+        starts,
         "score_between",
-        lambda base, end, _: replace(made, moves=linear_start._moves(base.fit, end.fit)),
+        lambda base, end, _: replace(made, moves=starts._moves(base.fit, end.fit)),
     )
-    score = linear_start._score_of(wide, made.candidate, end)
+    score = starts._score_of(wide, made.candidate, end)
     assert score.moves["j_kgm2"] == pytest.approx(3.6e-4 - 8e-4)

@@ -10,10 +10,10 @@ import pytest
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import significant_groups
-from pipeline.criticism.selection import round_rotor_start
+from pipeline.criticism.selection import starts
 from pipeline.criticism.selection.candidates import candidates, widened
-from pipeline.criticism.selection.round_rotor_start import _round_rotor, with_round_rotor_start
 from pipeline.criticism.selection.score_test import Score, score_all
+from pipeline.criticism.selection.starts import _round_rotor, with_round_rotor_start
 from tests.unit.criticism.machines import BASE, fitted, in_frame_of, log
 
 NAME = "angle_eccentricity"
@@ -73,7 +73,7 @@ def test_a_tangent_that_passes_is_believed():
 
 
 def test_nothing_is_tried_where_all_is_explained(monkeypatch):
-    monkeypatch.setattr(round_rotor_start, "gauss_newton", None)
+    monkeypatch.setattr(starts, "gauss_newton", None)
     tangent, started = scores_at(fitted([eccentric(0.0, seed) for seed in (5, 6)]))
     assert not tangent.passes
     assert started is tangent
@@ -82,7 +82,7 @@ def test_nothing_is_tried_where_all_is_explained(monkeypatch):
 def test_nothing_is_tried_where_another_capture_tells_the_inductances(monkeypatch):
     fit = bent(0.004)
     other = fit.segments[1]
-    monkeypatch.setattr(round_rotor_start, "observes", lambda segment, _: segment is not other)
-    monkeypatch.setattr(round_rotor_start, "gauss_newton", None)
+    monkeypatch.setattr(starts, "observes", lambda segment, _: segment is not other)
+    monkeypatch.setattr(starts, "gauss_newton", None)
     tangent, started = scores_at(fit)
     assert started is tangent

@@ -1,17 +1,7 @@
-"""An effect tried from its linear form, where the base fit is too far off for a tangent.
+"""Effects fitted from starts of their own, to which no tangent at the base fit leads.
 
-With most of the inertia behind a soft shaft the base fit ends with an inertia and a friction that
-are a tenth of the true ones, and no tangent leads from there to two masses. In the load that a
-transducer beyond the far part reads,
-
-    T_load = T − drags − J θ″ + (f J/k) [T″ − (1 − f) J θ⁗] − (f J/k) (c/k) [T″ − (1 − f) J θ⁗]′,
-
-all is linear in J, the drags and four further parameters, but for the drags in the torque that is
-passed on. So a fit gives the share f, the stiffness k and the damping c, wherever the base fit
-ended, and the coupling is fitted from these.
-Any effect with a `LinearForm` is tried so.
-
-Reference: Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control.
+The start is the linear form of an effect, a rotor that is round, what full logs show, or a nuisance
+that is an effect of unusual size. `selection.far_starts` tries amplitudes far from zero.
 """
 
 from __future__ import annotations
@@ -19,21 +9,84 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import compress, product
 
 import numpy as np
 
 from pipeline.criticism.data.segment import rows_where
 from pipeline.criticism.effect import Effect, LinearForm
 from pipeline.criticism.machine.model import zero
-from pipeline.criticism.operating import Flags
+from pipeline.criticism.operating import Flags, Values
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton, summed_error
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.residuals.observability import observes
 from pipeline.criticism.selection.candidates import Candidate, first_of_each, searched
+from pipeline.criticism.selection.discrimination import full_logs, settled
 from pipeline.criticism.selection.improvement import FitQuality, clears, fall_below_floor, share_of
 from pipeline.criticism.selection.score_test import Score, paid_for, ranked
 from pipeline.criticism.selection.sizes import size_of
+
+_INDUCTANCES = ("ld_h", "lq_h")
+
+
+def with_nuisances(
+    wide: LinearSystem, offered: Sequence[Candidate], scores: Sequence[Score]
+) -> tuple[Score, ...]:
+    """Scores, those of effects `in_place_of` a nuisance from its value where that is as good.
+
+    Parameters
+    ----------
+    wide
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+    scores
+        Scores by the tangent.
+
+    Returns
+    -------
+    tuple of Score
+        The largest fall first.
+
+    Notes
+    -----
+    No tangent leads to a nuisance of unusual size. A lag of the torque is undone before an effect's
+    own is tried, so that a second one beside it is a filter of second order.
+
+    """
+    best = {score.candidate.effect.name: score for score in scores}
+    for name, candidate in first_of_each(offered).items():
+        if candidate.effect.in_place_of is None:
+            continue
+        score, known = _taken_over(wide, offered, candidate), best.get(name)
+        if known is None or score.fall > known.fall - wide.policy.selection.tie:
+            best[name] = score
+    return ranked(best.values())
+
+
+def _taken_over(wide: LinearSystem, offered: Sequence[Candidate], candidate: Candidate) -> Score:
+    """The score of an effect that takes over a nuisance's value, and so saves its prior's cost."""
+    effect, fit, policy = candidate.effect, wide.fit, wide.policy.selection
+    nuisance, parameter = effect.in_place_of or ("", "")
+    (known,) = (p for p in effect.parameters_of(fit.machine) if p.name == parameter)
+    scale, value = fit.machine.scale(known), fit.values[nuisance]
+    costs = wide.prior_costs()
+    own = [n for n, column in enumerate(wide.columns) if column.name == nuisance]
+    saved = float(costs[own].sum()) if value > known.low * scale else 0.0
+    total = float(costs.sum())
+    score = Score(
+        candidate,
+        saved,
+        0.0,
+        {f"{effect.name}.{parameter}": value},
+        {},
+        saved / total if total > policy.excess else 0.0,
+        abs(value) / (known.negligible * scale),
+        policy=policy,
+    )
+    dof = paid_for(effect, fit.machine, score)
+    return replace(score, penalty=dof * math.log(wide.size) + searched(offered, effect))
 
 
 def with_linear_start(
@@ -60,6 +113,22 @@ def with_linear_start(
     -------
     tuple of Score
         The largest fall first.
+
+    Notes
+    -----
+    With most of the inertia behind a soft shaft the base fit ends with an inertia and a friction
+    that are a tenth of the true ones, and no tangent leads from there to two masses. In the load
+    that a transducer beyond the far part reads,
+
+        T_load = T − drags − J θ″ + (f J/k) {[T″ − (1 − f) J θ⁗] − (c/k) [T″ − (1 − f) J θ⁗]′},
+
+    all is linear in J, the drags and four further parameters, but for the drags in the torque that
+    is passed on. So a fit gives the share f, the stiffness k and the damping c, wherever the base
+    fit ended, and the coupling is fitted from these.
+
+    References
+    ----------
+    Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control.
 
     """
     so_far = list(scores)
@@ -253,3 +322,127 @@ def _fits_from_form(fit: Fit, effect: Effect, form: LinearForm) -> list[Fit]:
             start = {f"{effect.name}.{name}": value for name, value in values.items()}
             starts.append(replace(fit, model=fit.model.with_effects(effect)).at({**moved, **start}))
     return starts
+
+
+def with_round_rotor_start(
+    wide: LinearSystem,
+    offered: Sequence[Candidate],
+    scores: Sequence[Score],
+    significant: Flags,
+) -> tuple[Score, ...]:
+    """Scores, those of errors of the angle from a round rotor where that beats the tangent.
+
+    Parameters
+    ----------
+    wide
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+    scores
+        Scores by the tangent.
+    significant
+        Groups [G] over their floor. Without any, and where captures at a standstill tell both
+        inductances, tangents are believed; so is one that passes.
+
+    Returns
+    -------
+    tuple of Score
+        The largest fall first.
+
+    Notes
+    -----
+    In slow logs that hardly move i_d, an encoder off its centre leaves an L_d of many times the
+    true one. An error of the angle turns the current as well, and at such an L_d what that does to
+    the voltage hides it: the tangent does not show the error. The flux of a round rotor, L_d = L_q,
+    turns with its current, so from there the error is fitted whatever the base fit made of both.
+
+    """
+    so_far = list(scores)
+    passing = {score.candidate.effect.name for score in scores if score.passes}
+    for name, candidate in first_of_each(offered).items():
+        effect = candidate.effect
+        if effect.angle is None or name in passing or not _may_bend(wide, effect, significant):
+            continue
+        end = gauss_newton(_round_rotor(wide.fit, candidate))
+        so_far = with_better(so_far, score_between(wide, end, candidate), offered)
+    return tuple(so_far)
+
+
+def _may_bend(wide: LinearSystem, effect: Effect, significant: Flags) -> bool:
+    """Whether captures in which an effect acts have groups [G] that are not explained, and no other
+    captures tell the inductances.
+    """
+    acts = np.array([observes(segment, effect) for segment in wide.segments])
+    if not any(acts[number] for number, _, _ in compress(wide.labels, significant)):
+        return False
+    elsewhere = wide.matrix[~acts[wide.segment]][:, wide.place(_INDUCTANCES)]
+    values = np.array([wide.fit.values[name] for name in _INDUCTANCES])
+    # value over its standard uncertainty by the other captures
+    sure = values * np.sqrt((elsewhere**2).sum(axis=0))
+    return bool(np.any(sure < wide.policy.selection.least_u))
+
+
+def _round_rotor(fit: Fit, candidate: Candidate) -> Fit:
+    """Where a fit with an error of the angle begins: at none, with the smaller inductance twice."""
+    smaller = min(fit.values[name] for name in _INDUCTANCES)
+    values = {**candidate.values, **dict.fromkeys(_INDUCTANCES, smaller)}
+    return _with_effect(fit, candidate.effect, values)
+
+
+def with_log_start(
+    wide: LinearSystem,
+    offered: Sequence[Candidate],
+    scores: Sequence[Score],
+    significant: Flags,
+) -> tuple[Score, ...]:
+    """Scores, those of effects that full logs show from there where no tangent is far better.
+
+    Parameters
+    ----------
+    wide
+        The fit with the columns of all candidates.
+    offered
+        The candidates.
+    scores
+        Scores by the tangent.
+    significant
+        Groups [G] over their floor; without any, nothing is tried.
+
+    Returns
+    -------
+    tuple of Score
+        The largest fall first.
+
+    Notes
+    -----
+    A transducer in a coupling reads what the motor's side passes on, and no twist is in that: to
+    the windows the shaft is rigid there. A shaft that coasts carries the far part as well, so that
+    its inertia contradicts that of the logs, and no linear step shows why. Of the logs as a whole
+    the angle against the torque in the coupling gives the far inertia, the spring and the gap
+    without a fit. A tangent promises, while this start is fitted; and it leaves a twist or a gap
+    open that full logs know.
+
+    """
+    so_far = list(scores)
+    by_name = first_of_each(offered)
+    hooks = {c.effect.shown: c for c in by_name.values() if c.effect.shown is not None}
+    for hook in hooks if significant.any() else ():
+        shown = hook(full_logs(wide.fit, wide.fit.model))
+        if shown is None or shown.discrimination.name not in by_name:
+            continue
+        candidate = by_name[shown.discrimination.name]
+        effect = settled(candidate.effect, shown.discrimination)
+        known = {name: value for name, (value, _) in shown.discrimination.values.items()}
+        start = {f"{effect.name}.{name}": value for name, value in {**known, **shown.start}.items()}
+        started = scored(wide, candidate, _with_effect(wide.fit, effect, {**shown.base, **start}))
+        alike = [s for s in so_far if s.candidate.effect.shown is hook]
+        best = max((s.fall for s in alike), default=0.0)
+        if started.fall > started.policy.close_share * best:
+            so_far = with_better([s for s in so_far if s not in alike], started, offered)
+    return tuple(so_far)
+
+
+def _with_effect(fit: Fit, effect: Effect, values: Values) -> Fit:
+    """The fit with an effect, at such values of its parameters and of constants by full name."""
+    model = fit.model.with_effects(effect)
+    return replace(fit, model=model).at({**zero(effect, model), **values})
