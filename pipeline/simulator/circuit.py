@@ -9,9 +9,8 @@ import math
 
 from numba import njit
 
-from pipeline.simulator.extra_terms import extra
 from pipeline.simulator.field import SQRT3, Array, Pair, current, torque_of
-from pipeline.simulator.motion import Mechanics
+from pipeline.simulator.motion import Mechanics, extra
 from pipeline.simulator.plant import Plant
 
 Field = tuple[float, float, float, float, float, float, float, float, float]

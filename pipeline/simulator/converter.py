@@ -13,12 +13,11 @@ from numba import njit
 
 from pipeline.simulator.circuit import Field, stator_current, windings
 from pipeline.simulator.control import Control, command
-from pipeline.simulator.extra_terms import extra
 from pipeline.simulator.field import SQRT3, Array, Pair, magnet
 from pipeline.simulator.followers import dragged
 from pipeline.simulator.friction import bristle_after
 from pipeline.simulator.heat import heat
-from pipeline.simulator.motion import Mechanics, coupling, passive
+from pipeline.simulator.motion import Mechanics, coupling, extra, passive
 from pipeline.simulator.plant import Plant
 
 COLUMNS = (

@@ -294,7 +294,7 @@ def _dq_log(
     session: Session, i_phase: Array, v_phase: Array, eps: float, heat: Array, t_s: Array
 ) -> dict[str, Array]:
     """Rotor-frame log of a locked motor from phase currents [3] and voltages [n, 3]."""
-    from pipeline.simulator.extra_terms import extra_volts
+    from pipeline.simulator.motion import extra_volts
 
     turn = np.exp(-1j * eps) * 2.0 / 3.0 * np.exp(2j * math.pi * np.arange(3) / 3.0)
     n = t_s.size

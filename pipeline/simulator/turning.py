@@ -21,8 +21,8 @@ def _terminal_voltages(
     `centred` is the mean over half a period either side, a difference of flux. A voltage from
     outside the library is added as it is at the instant.
     """
-    from pipeline.simulator.extra_terms import extra_volts
     from pipeline.simulator.field import open_emf, open_flux
+    from pipeline.simulator.motion import extra_volts
 
     p = session.motor.pole_pairs
     magnet = np.full(theta.size, degc)
