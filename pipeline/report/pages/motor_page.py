@@ -1,4 +1,7 @@
-"""The page of one motor: may I use it, what are its constants, and why should I believe them."""
+"""The page of one motor: may I use it, what are its constants, and why should I believe them.
+
+Its sheet is one page to print, A4 or Letter, as a maker hands it out.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ from pipeline.report.charts.chart import chart
 from pipeline.report.charts.performance_chart import band_chart, efficiency_chart
 from pipeline.report.pages.page import Link, link_block, render
 from pipeline.report.pages.status_block import status_block
-from pipeline.views.constants import GROUPS, KEY_CONSTANTS, OTHER, grouped
+from pipeline.views.constants import GROUPS, KEY_CONSTANTS, OTHER, constant_words, grouped
 from pipeline.views.model_words import model_words
 from pipeline.views.motor import (
     CHECK_ORDER,
@@ -30,6 +33,13 @@ from pipeline.views.motor import (
     ordered_checks,
 )
 from pipeline.views.performance import performance_view
+
+SHOWN = (
+    "r_phase_ohm", "ld_h", "lq_h", "psi_pm_wb", "pole_pairs", "kt_peak_nm_a", "kv_ll_peak_rpm_v",
+    "motor_constant_nm_sqrt_w", "j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad",
+    "cogging_amplitude_nm", "tau_elec_s", "tau_mech_s", "rth_winding_k_w",
+)  # fmt: skip
+"""Constants of the sheet, where they are known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,3 +148,31 @@ def _figures(constants: Mapping[str, Estimate], evidence: tuple[Evidence, ...]) 
     return [
         Figure(one.estimator, one.title, one.caption, one.capture, chart(one)) for one in ordered
     ]
+
+
+def render_sheet(sheet: Datasheet, performance: Performance) -> str:
+    """The self-contained HTML page of one motor's sheet; equal input gives equal text.
+
+    The status is what the datasheet says of itself; an approval is in the registry.
+
+    Parameters
+    ----------
+    sheet
+        The datasheet.
+    performance
+        The performance of the motor.
+
+    """
+    rows = motor_rows(sheet)
+    curves = [
+        c for c in (performance.curve("torque_peak"), performance.curve("torque_continuous")) if c
+    ]
+    return render(
+        "sheet.html.jinja",
+        sheet=sheet,
+        file=quote(file_stem(sheet.motor_id), safe="~"),
+        rows=[(constant_words(n), rows[n]) for n in SHOWN if n in rows and rows[n].reading],
+        view=performance_view(performance),
+        torque=band_chart(curves, "torque_shaft_nm", performance.regimes),
+        efficiency=efficiency_chart(performance.cells, performance.curve("torque_peak")),
+    )

@@ -10,9 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.estimation.registry import BROKEN, estimator_terms, estimators
-from pipeline.execution.caches.fits import FitMemory
+from pipeline.execution.caches.fits import FitMemory, ModelMemory
 from pipeline.execution.caches.keys import SupersedingParts, key_of
-from pipeline.execution.caches.model_memory import ModelMemory
 from pipeline.execution.caches.run_cache import note_motor
 from pipeline.execution.caches.stamp import stamp_of
 from pipeline.execution.caches.versions import datasheet_code
@@ -40,7 +39,7 @@ LATE_IMPORTS = (
     "pipeline.io.recordings.motor",
     "pipeline.performance.derive",
     "pipeline.report.pages.motor_page",
-    "pipeline.report.pages.sheet_page",
+    "pipeline.report.pages.motor_page",
     "rerun",
     "rerun.blueprint",
 )
@@ -203,8 +202,7 @@ def _write(
             write(name, content)
     if job.report:
         from pipeline.execution.outputs.page_links import links_of
-        from pipeline.report.pages.motor_page import render_motor
-        from pipeline.report.pages.sheet_page import render_sheet
+        from pipeline.report.pages.motor_page import render_motor, render_sheet
 
         with watch.stage("report"):
             terms = estimator_terms()

@@ -23,8 +23,7 @@ from pipeline.report.pages.comparison_page import render_comparison
 from pipeline.report.pages.fleet_page import render_fleet
 from pipeline.report.pages.ladder_page import render_ladder
 from pipeline.report.pages.lot_page import render_regression
-from pipeline.report.pages.motor_page import render_motor
-from pipeline.report.pages.sheet_page import render_sheet
+from pipeline.report.pages.motor_page import render_motor, render_sheet
 from tests.unit.ladders import make_diagnosis, make_step
 from tests.unit.performance.constants import salient
 from tests.unit.performance.sheets import sheet_of

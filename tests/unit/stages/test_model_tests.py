@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from pipeline.criticism import adequacy
-from pipeline.execution.caches.model_memory import ModelMemory
+from pipeline.execution.caches.fits import ModelMemory
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.tasks.model_tests import judged_model
 from pipeline.execution.tasks.work import Stamp
