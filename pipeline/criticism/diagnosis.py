@@ -10,14 +10,13 @@ from pipeline.criticism.data.machine_scale import PAIRLESS, PARAMETERS, machine_
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.discovery.changed_constants import Change
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.ladder import step_record
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import BEND_SPEED
 from pipeline.criticism.parameter import UNLOGGED, Machine
 from pipeline.criticism.policy.policy import policy_of
-from pipeline.criticism.ranking import ranked
+from pipeline.criticism.ranking import ranked, step_record
 from pipeline.criticism.regression.cross_validation import HeldOut
 from pipeline.criticism.regression.goodness import of_motor, over_floor
 from pipeline.criticism.regression.linear_system import LinearSystem

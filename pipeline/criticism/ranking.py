@@ -1,4 +1,7 @@
-"""The evidence for each effect: found ones with their alternatives, the others by their score."""
+"""Steps of the ladder as records, and the evidence for each effect.
+
+Found effects have it with their alternatives, the others by their score.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +13,26 @@ from scipy.special import gammaincc
 
 from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.ladder import parameters_of
 from pipeline.criticism.library.headline import headline
 from pipeline.criticism.regression.cross_validation import HeldOut
 from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.goodness import signal_errors
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.reported import reported_parameters
 from pipeline.criticism.search import Ladder
 from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
 from pipeline.criticism.selection.candidates import Candidate
-from pipeline.criticism.selection.removal import loss_without
+from pipeline.criticism.selection.pruning import loss_without
 from pipeline.criticism.selection.score_test import Score
 from pipeline.criticism.selection.stepwise import LadderStep
-from pipeline.records.diagnosis import RankedEffect, ReportedParameter
+from pipeline.criticism.validation.error_maps import (
+    angle_maps,
+    histograms,
+    speed_current_map,
+    window_errors,
+)
+from pipeline.physics.glossary import unit_of
+from pipeline.records.diagnosis import RankedEffect, ReportedParameter, StepError, StepRecord
 
 _AGAINST = "captures contradict it: see the note"
 _UNSUPPORTED = "takes some of what is left, but too little to be named beside what nothing explains"
@@ -147,3 +158,53 @@ def _parameters(
 ) -> dict[str, ReportedParameter]:
     reported, start = parameters_of(step, held_out), f"{effect.name}."
     return {name.removeprefix(start): p for name, p in reported.items() if name.startswith(start)}
+
+
+def step_record(step: LadderStep, held_out: HeldOut) -> StepRecord:
+    """One step of the search as a record for people.
+
+    Parameters
+    ----------
+    step
+        The step.
+    held_out
+        Its held-out residual; maps over an angle are those of the fit.
+
+    """
+    residual = held_out.or_fit(step.system)
+    policy = step.fit.policy.validation
+    errors = window_errors(step.system, residual)
+    flat = (speed_current_map(one, policy) for one in errors)
+    spreads = signal_errors(step.system, residual)
+    floors = signal_errors(step.system, step.system.noise_ratio)
+    return StepRecord(
+        step.added,
+        held_out.total,
+        spreads,
+        {name: StepError(rms, floors[name], unit_of(name)) for name, rms in spreads.items()},
+        parameters_of(step, held_out),
+        (*(one for one in flat if one is not None), *angle_maps(step.fit)),
+        histograms(errors, policy),
+    )
+
+
+def parameters_of(step: LadderStep, held_out: HeldOut) -> dict[str, ReportedParameter]:
+    """The parameters of every effect on a step.
+
+    Parameters
+    ----------
+    step
+        The step.
+    held_out
+        Its held-out residual.
+
+    Returns
+    -------
+    dict of ReportedParameter
+        By full name; without a value where not determined.
+
+    """
+    reported = reported_parameters(step.system, held_out)
+    parameters = step.fit.model.parameters()
+    selected = ((name, reported[name]) for name in parameters)
+    return {name: ReportedParameter(p.value, p.u, p.unit) for name, p in selected}

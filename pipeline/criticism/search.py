@@ -24,9 +24,8 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.selection.changed_between import share_notes
-from pipeline.criticism.selection.changed_over_time import friction_notes
 from pipeline.criticism.selection.drift import drifting_segments
+from pipeline.criticism.selection.free_shares import friction_notes, share_notes
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.order_scan import orders_left
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of

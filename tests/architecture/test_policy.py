@@ -42,7 +42,7 @@ ARITHMETIC = {
     "machine/model.py": {"BASE", "_NOTHING"},  # a centre of ±1/12; all but zero
     "machine/two_masses.py": {"LINEAR_COUPLING"},  # sizes that an effect states for itself
     "regression/bounds.py": {"_AT"},  # rounding
-    "selection/changed_between.py": {"_FREE"},  # the whole of a share
+    "selection/free_shares.py": {"_FREE"},  # the whole of a share
     "signals/voltage.py": {"_EIGHTH_ORDER"},  # of a difference
     "residuals/segments.py": {"_ALTERNATING"},  # of third differences
     "signals/between_rows.py": {"ORDERS"},  # of three equal phases

@@ -147,7 +147,7 @@ def _shares_of_repeats(segment: Segment, others: Sequence[Segment]) -> dict[str,
 
 def _early(segment: Segment) -> dict[str, float]:
     """Nuisances of a friction that changes with time, of what turns a shaft freely from its start
-    on; they are left free where that explains the captures (`selection.changed_over_time`).
+    on; they are left free where that explains the captures (`selection.free_shares`).
     """
     free = segment.test in ("spin_down", "drive") and "t_s" in segment.recorded
     of_shaft = free and "torque" in hooks_in(segment)

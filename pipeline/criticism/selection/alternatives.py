@@ -12,7 +12,7 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.candidates import Candidate, placed
 from pipeline.criticism.selection.discrimination import discriminate, sharing_discriminator
-from pipeline.criticism.selection.removal import loss_without
+from pipeline.criticism.selection.pruning import loss_without
 from pipeline.criticism.selection.sizes import shaped
 
 

@@ -1,4 +1,7 @@
-"""Terms inside an effect: those that the captures do not support are left out, others come back.
+"""What captures do not support is left out: terms inside an effect, and effects as a whole.
+
+Terms come back where others do not explain the captures without them; of effects those go that
+later ones have made superfluous, or whose size may be zero.
 
 Reference: Schwarz, Ann. Stat. 6 (1978), the penalty of a parameter.
 """
@@ -6,20 +9,25 @@ Reference: Schwarz, Ann. Stat. 6 (1978), the penalty of a parameter.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import zero
+from pipeline.criticism.operating import Array, Indices
+from pipeline.criticism.regression.cross_validation import leave_out
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
-from pipeline.criticism.regression.left_out import loss_at
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import NormalEquations
+from pipeline.criticism.residuals.channels import of_acceleration
+from pipeline.criticism.selection.acceptance import sure_amplitudes
 from pipeline.criticism.selection.choices import better_of
+from pipeline.criticism.selection.improvement import clears
+from pipeline.criticism.selection.sizes import material
 
 
 def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
@@ -210,3 +218,162 @@ def _without(system: LinearSystem, effect: Effect, terms: Sequence[int]) -> Line
         replace(c, name=f"-{c.name}") if c.name.startswith(prefix) else c for c in system.columns
     ]
     return gauss_newton(start, before=replace(system, columns=tuple(named)))
+
+
+def unsure_effect(wide: LinearSystem, base: int) -> tuple[str, LinearSystem] | None:
+    """An added effect whose size may be zero, fitted with all others.
+
+    Parameters
+    ----------
+    wide
+        The fit.
+    base
+        Number of effects of the model that were not added.
+
+    Returns
+    -------
+    tuple of str and LinearSystem, or None
+        Its name, and the fit without it; of several the one that explains least.
+
+    Notes
+    -----
+    One may be unsure as long as another stands for it as well, so they go one at a time. One that
+    takes most of an error is there, however badly its size is known.
+
+    """
+    added = wide.fit.model.effects[base:]
+    if not added:
+        return None
+    system = wide.only(np.arange(wide.model_column_count))
+    held_out = leave_out(system)
+    unsure = [e.name for e in added if not sure_amplitudes(system, held_out, e)]
+    for name in sorted(unsure, key=lambda name: loss_without(system, (name,))):
+        without = gauss_newton(system.fit.without(name), before=system)
+        chi2 = [fitted.reduced_chi2(fitted.residual) for fitted in (without, system)]
+        if not clears(system, significant_groups(without), *chi2):
+            return name, without
+    return None
+
+
+def without_superfluous(system: LinearSystem, base: int) -> LinearSystem:
+    """A fit without the added effects that later ones have made superfluous.
+
+    Parameters
+    ----------
+    system
+        The fit; its last effect stays.
+    base
+        Number of effects of the model that were not added.
+
+    """
+    factor = system.policy.selection.most_penalties
+    for effect in system.fit.model.effects[base:-1]:
+        penalty = effect.dof(system.fit.machine) * math.log(system.size)
+        if material(system.fit, effect) and loss_without(system, (effect.name,)) > factor * penalty:
+            continue
+        tried = gauss_newton(system.fit.without(effect.name), before=system)
+        if tried.deviance - system.deviance < penalty:
+            system = tried
+    return system
+
+
+def loss_without(
+    system: LinearSystem,
+    names: Iterable[str],
+    instead: Indices | None = None,
+    normal_equations: NormalEquations | None = None,
+) -> float:
+    """Rise of the deviance when effects go to zero amplitude and the rest is refitted.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    names
+        The effects.
+    instead
+        Places of columns that are fitted in their stead.
+    normal_equations
+        Those of all columns, where they were computed before.
+
+    Returns
+    -------
+    float
+        To first order around the model without them.
+
+    """
+    stems = tuple(f"{name}." for name in names)
+    fit, model_columns = system.fit, system.model_columns
+    left_out = np.array(
+        [n for n in model_columns if system.columns[n].name.startswith(stems)], dtype=int
+    )
+    known = fit.model.parameters()
+    names_out = [system.columns[n].name for n in left_out]
+    move = np.array([-fit.values[n] if known[n][1].amplitude else 0.0 for n in names_out])
+    equations = system.normal_equations() if normal_equations is None else normal_equations
+    places = () if instead is None else instead
+    return loss_at(system, equations, left_out, move, places, *fit.policy.selection.thorough)
+
+
+def loss_at(
+    system: LinearSystem,
+    known: NormalEquations,
+    left_out: Indices,
+    move: Array,
+    instead: Sequence[int] | Indices = (),
+    starts: Sequence[float] = (1.0, 0.5, 0.0),
+    rounds: int | None = None,
+) -> float:
+    """Rise of the deviance when some parameters move and the others of the model are refitted.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    known
+        Normal equations of all its columns.
+    left_out
+        Places of the parameters' columns [k].
+    move
+        Change of each [k].
+    instead
+        Places of columns that are fitted in their stead.
+    starts
+        As `NormalEquations.best` has them.
+    rounds
+        Likewise.
+
+    Returns
+    -------
+    float
+        To first order around where the parameters have moved to.
+
+    Notes
+    -----
+    A free shaft knows torques over its inertia alone, α = −T/J. So its column of J is T/J², and T
+    is that without what has gone: as J changes, what is not there cannot. By the column of before,
+    all torques and J would go to zero together at no cost, and with them any that is asked after.
+
+    """
+    stay = np.setdiff1d(system.model_columns, left_out)
+    kept = np.concatenate([stay, np.asarray(instead, dtype=int)])
+    every = np.concatenate([kept, left_out])
+    ends = np.arange(kept.size, every.size)
+    there = known.only(every).moved(ends, move)
+    (inertia,) = np.flatnonzero(np.isin(every, system.place(("j_kgm2",))))
+    by = np.outer(_free(system), -move * _drags(system, left_out) / system.fit.values["j_kgm2"])
+    if np.any(by):
+        there = there.sheared(int(inertia), ends, by)
+    return there.only(np.arange(kept.size)).best(starts, rounds).deviance - known.deviance()
+
+
+def _free(system: LinearSystem) -> Array:
+    """1 for the groups [G] that are accelerations of a free shaft, else 0."""
+    free = [of_acceleration(system.segments[n], channel) for n, channel, _ in system.labels]
+    return np.array(free, dtype=float)
+
+
+def _drags(system: LinearSystem, places: Indices) -> Array:
+    """1 for columns [k] of effects that drag at the shaft, else 0."""
+    effects = [system.columns[n].effect for n in places.tolist()]
+    return np.array([e is not None and e.hook == "torque" for e in effects], dtype=float)

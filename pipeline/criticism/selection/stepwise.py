@@ -15,16 +15,14 @@ from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.best_candidate import best_candidate
 from pipeline.criticism.selection.candidates import candidates, widened
-from pipeline.criticism.selection.changed_between import with_free_shares
-from pipeline.criticism.selection.changed_over_time import with_changing_friction
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
+from pipeline.criticism.selection.free_shares import with_changing_friction, with_free_shares
 from pipeline.criticism.selection.other_readings import by_best_readings
 from pipeline.criticism.selection.pairs import best_pair
-from pipeline.criticism.selection.pruning import reshaped
+from pipeline.criticism.selection.pruning import reshaped, unsure_effect, without_superfluous
 from pipeline.criticism.selection.refit import begin_from, floored_anew
-from pipeline.criticism.selection.removal import unsure_effect, without_superfluous
 from pipeline.criticism.selection.score_test import Score, score_all
 from pipeline.criticism.selection.sizes import is_rare
 from pipeline.criticism.selection.starts import (

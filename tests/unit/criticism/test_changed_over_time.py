@@ -7,7 +7,7 @@ import pytest
 from pipeline.criticism.diagnosis import base_fit, diagnose
 from pipeline.criticism.machine.model import EARLY_S, EARLY_SHARES
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.selection.changed_over_time import with_changing_friction
+from pipeline.criticism.selection.free_shares import with_changing_friction
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.catalogue import with_effects

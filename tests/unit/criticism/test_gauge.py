@@ -13,7 +13,7 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.selection.alternatives import alternatives_to
 from pipeline.criticism.selection.candidates import candidates, widened
-from pipeline.criticism.selection.removal import loss_without
+from pipeline.criticism.selection.pruning import loss_without
 from tests.unit.criticism.machines import BASE, coast_under_load, machine
 
 

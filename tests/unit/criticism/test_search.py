@@ -12,7 +12,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.search import search_ladder
-from pipeline.criticism.selection import changed_between
+from pipeline.criticism.selection import free_shares
 from pipeline.records.comparison import ModelSpec
 from tests.unit.criticism.machines import machine
 
@@ -165,7 +165,7 @@ def test_orders_of_an_earlier_step_join_where_the_last_one_leaves_something(
 @pytest.mark.parametrize(("u", "told"), [(0.02, True), (0.2, False)])
 def test_a_share_that_may_be_none_is_no_change(u: float, told: bool, monkeypatch) -> None:
     """Friction of a coast was said to have changed by 1.5 ± 6 %."""
-    names = changed_between.SHARES["spin_down"]
+    names = free_shares.SHARES["spin_down"]
     values = dict.fromkeys(names, 0.2)
     segment = SimpleNamespace(test="spin_down", capture="coast")
     system = SimpleNamespace(
@@ -175,5 +175,5 @@ def test_a_share_that_may_be_none_is_no_change(u: float, told: bool, monkeypatch
         covariance=lambda _: u**2 * np.eye(len(names)),
         place=lambda one: [list(names).index(one[0])],
     )
-    monkeypatch.setattr(changed_between, "free_tests", lambda _: ("spin_down",))
-    assert bool(list(changed_between.share_notes(system))) == told
+    monkeypatch.setattr(free_shares, "free_tests", lambda _: ("spin_down",))
+    assert bool(list(free_shares.share_notes(system))) == told

@@ -14,7 +14,7 @@ from pipeline.criticism.machine.model import zero
 from pipeline.criticism.regression.cross_validation import HeldOut
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.selection.removal import unsure_effect
+from pipeline.criticism.selection.pruning import unsure_effect
 from pipeline.criticism.selection.score_test import Score
 from pipeline.criticism.selection.stepwise import search
 from tests.unit.criticism.machines import fitted, with_drag
@@ -22,7 +22,7 @@ from tests.unit.criticism.machines import fitted, with_drag
 NAMES = ("coulomb_friction", "windage")
 LIBRARY = {name: effects()[name] for name in NAMES}
 BEST = "pipeline.criticism.selection.best_candidate"
-REMOVAL = "pipeline.criticism.selection.removal"
+REMOVAL = "pipeline.criticism.selection.pruning"
 
 
 def logs(*curved_nm: float) -> tuple[Segment, ...]:
