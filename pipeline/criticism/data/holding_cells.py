@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.criticism.data.sensor_noise import sensor_noise
+from pipeline.criticism.data.sensors import sensor_noise
 from pipeline.criticism.operating import Array, Indices
 from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.policy.policy import Policy

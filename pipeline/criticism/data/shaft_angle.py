@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.criticism.data.rounding import coarse_step, scatter
 from pipeline.criticism.data.segment import UNSMOOTHED, Sensors, SpeedSensor
-from pipeline.criticism.data.sensor_noise import sensor_noise, slow_noise
+from pipeline.criticism.data.sensors import sensor_noise, slow_noise
 from pipeline.criticism.data.traces import parabolas, smoothed, window_of
 from pipeline.criticism.operating import Array, Flags
 from pipeline.criticism.parameter import Machine

@@ -8,8 +8,7 @@ import numpy as np
 
 from pipeline.criticism.data.hysteresis import with_travel
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of, slow_orders
-from pipeline.criticism.data.sensor_noise import sensor_noise
-from pipeline.criticism.data.sensors import noise_and_steps, prepared
+from pipeline.criticism.data.sensors import noise_and_steps, prepared, sensor_noise
 from pipeline.criticism.data.shaft_angle import shaft_angle, with_angle
 from pipeline.criticism.data.traces import (
     decimated,

@@ -16,8 +16,7 @@ from pipeline.criticism.data.segment import (
     Sensors,
     segment_of,
 )
-from pipeline.criticism.data.sensor_noise import sensor_noise
-from pipeline.criticism.data.sensors import prepared
+from pipeline.criticism.data.sensors import prepared, sensor_noise
 from pipeline.criticism.data.shaft_angle import ANGLES, shaft_angle, with_angle
 from pipeline.criticism.data.traces import (
     LINES_V,

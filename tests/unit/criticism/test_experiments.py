@@ -10,8 +10,7 @@ from scipy.stats import ncx2
 
 from pipeline.criticism.data.segment import row_index
 from pipeline.criticism.design import experiments
-from pipeline.criticism.design.experiments import separations
-from pipeline.criticism.design.planned_tests import PLANNED, planned
+from pipeline.criticism.design.experiments import PLANNED, planned, separations
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.parameter import Parameter

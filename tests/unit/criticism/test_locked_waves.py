@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.locked_waves import LockedWaves
-from pipeline.criticism.data.sensor_noise import sensor_noise
-from pipeline.criticism.data.sensors import noise_and_steps
+from pipeline.criticism.data.sensors import noise_and_steps, sensor_noise
 from pipeline.criticism.policy.policy import DEFAULT
 
 SENSORS = DEFAULT.sensor_noise

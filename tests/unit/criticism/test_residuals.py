@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.segment import Sensors, projected, row_index, slow_orders
-from pipeline.criticism.data.sensor_noise import sensor_noise
+from pipeline.criticism.data.sensors import sensor_noise
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.machine.sample_period import mean_current

@@ -17,7 +17,7 @@ from pipeline.criticism.data.rounding import (
     smoothed,
 )
 from pipeline.criticism.data.segment import Sensors, projected, row_index
-from pipeline.criticism.data.sensor_noise import sensor_noise, slow_noise
+from pipeline.criticism.data.sensors import sensor_noise, slow_noise
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, current_floors_grown, floors

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.segment import UNSMOOTHED, Segment, row_index
-from pipeline.criticism.design.planned_tests import planned
+from pipeline.criticism.design.experiments import planned
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import BASE as CONSTANTS
 from pipeline.criticism.machine.model import Model
