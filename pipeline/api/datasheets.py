@@ -15,7 +15,7 @@ from pipeline.api.models import model_spec
 from pipeline.api.options import check_options, names_of
 from pipeline.api.recordings import Options
 from pipeline.execution.caches.stamp import configuration_digest, stamp_of
-from pipeline.execution.jobs import MotorJob
+from pipeline.execution.jobs import job_of
 from pipeline.execution.tasks import work
 from pipeline.io.storage.datasheets import read_datasheets
 from pipeline.io.storage.diagnoses import read_diagnoses
@@ -167,25 +167,8 @@ def _datasheet(
 ) -> Datasheet:
     required, model_gates = conditions
     model = model_spec(settings.model.name, settings.model.effects, policy=settings.policy)
-    job = MotorJob(
-        motor_id=fit.campaign.motor_id,
-        entries=(),
-        input="",
-        output="",
-        config_sha256=configuration_digest(
-            settings, required, fit.sources, model_gates=model_gates
-        ),
-        required=required,
-        release=settings.release,
-        report=False,
-        recordings=False,
-        fit=settings.fit,
-        constants=settings.constants,
-        crosscheck=settings.crosscheck,
-        model=model if settings.residual_test else None,
-        diagnose=settings.diagnose,
-        model_gates=model_gates,
-    )
+    digest = configuration_digest(settings, required, fit.sources, model_gates=model_gates)
+    job = job_of(settings, fit.campaign.motor_id, digest, conditions, model)
     checked = work.check(job, fit.campaign, fit.constants, Stopwatch())
     judged = work.with_verdict(job, fit.campaign, checked, None, Stopwatch())
     return work.assemble(job, fit.campaign, judged, stamp_of(job, fit.campaign))

@@ -15,7 +15,7 @@ from pipeline.execution.caches.keys import batch_parts, key_of, motor_parts
 from pipeline.execution.caches.run_cache import Batch, RunCache
 from pipeline.execution.caches.stamp import configuration_digest
 from pipeline.execution.caches.versions import RUN, tools
-from pipeline.execution.jobs import ModelTest, MotorJob, MotorResult, WarmUp
+from pipeline.execution.jobs import ModelTest, MotorJob, MotorResult, WarmUp, job_of
 from pipeline.execution.outputs.publishing import (
     fleet_of,
     other_motors,
@@ -271,7 +271,7 @@ def _answers(
 
 
 def _jobs(settings: RunSettings, survey: Survey, limits: Path) -> list[MotorJob]:
-    required, model_gates = release_conditions(limits)
+    conditions = required, model_gates = release_conditions(limits)
     changes = policy_changes(settings.policy)
     model = ModelSpec(settings.model.name, tuple(settings.model.effects), policy=changes)
     by_maps = {_source_names(entries): entries for entries in survey.motors.values()}
@@ -281,30 +281,11 @@ def _jobs(settings: RunSettings, survey: Survey, limits: Path) -> list[MotorJob]
         )
         for names, entries in by_maps.items()
     }
-    jobs = [
-        MotorJob(
-            motor_id=motor_id,
-            entries=entries,
-            input=settings.input,
-            output=settings.output,
-            config_sha256=digests[_source_names(entries)],
-            required=required,
-            release=settings.release,
-            report=settings.report,
-            recordings=settings.recordings,
-            gates=settings.gates,
-            fit=settings.fit,
-            constants=settings.constants,
-            crosscheck=settings.crosscheck,
-            model=model if settings.residual_test else None,
-            diagnose=settings.diagnose,
-            model_gates=model_gates,
-            operate=asdict(settings.operate),
-            findings=tuple(f for f in survey.findings if f.file in {e.path for e in entries}),
-            limits=ReadLimits(settings.read_seconds, settings.read_memory_mb),
-        )
-        for motor_id, entries in survey.motors.items()
-    ]
+    jobs = []
+    for motor_id, entries in survey.motors.items():
+        paths, digest = {e.path for e in entries}, digests[_source_names(entries)]
+        findings = tuple(f for f in survey.findings if f.file in paths)
+        jobs.append(job_of(settings, motor_id, digest, conditions, model, entries, findings))
     return [_keyed(job) for job in jobs] if settings.cache else jobs
 
 
