@@ -229,6 +229,13 @@ class Segment:
         """Samples."""
         return int(next(iter(self.recorded.values())).size)
 
+    @property
+    def windows(self) -> Projection:
+        """Windows and test functions of a log; ValueError for a table, which has none."""
+        if self.weak is None:
+            raise ValueError(f"{self.capture} is a table")
+        return self.weak
+
     def once(self, column: Array, name: Hashable, by: Hashable, make: Callable[[], Made]) -> Made:
         """What depends on one recorded column, computed once for all copies of the segment.
 

@@ -256,9 +256,9 @@ def _of_unseen_waves(segment: Segment, model: Model, values: Values) -> Array | 
 
 def _of_torque(segment: Segment, model: Model, values: Values) -> Array | float:
     """What a drive's log may be off by in its torque [W, M], as weak samples of its channel."""
-    weak, policy = segment.weak, model.policy.noise_floors
+    weak, policy = segment.windows, model.policy.noise_floors
     errors = equation_of(segment).sensing.errors
-    if weak is None or not errors:
+    if not errors:
         return 0.0
     total = np.zeros((weak.starts.size, weak.orders.size))
     if "encoder_lines" in errors:
@@ -287,9 +287,9 @@ def _of_pulses(segment: Segment, model: Model, values: Values, x: Operating) -> 
     resistance the mean of the ripple there is none. Its drop makes one, of up to R T² v/(96 L²):
     a tenth of the friction current where a period is a quarter of L/R. A log may hold means.
     """
-    weak, l_q, pwm_s = segment.weak, values["lq_h"], x.supply.pwm_s or x.supply.hold_s
-    if weak is None or not l_q or not pwm_s:
-        return np.zeros(segment.size if weak is None else weak.starts.size)
+    weak, l_q, pwm_s = segment.windows, values["lq_h"], x.supply.pwm_s or x.supply.hold_s
+    if not l_q or not pwm_s:
+        return np.zeros(weak.starts.size)
     pairs, finer = model.machine.pole_pairs, x.theta_rad.size // segment.size
     emf_v = pairs * values["psi_wb"] * x.omega_rad_s[::finer]
     share = model.policy.noise_floors.pulses * (pwm_s / l_q) ** 2 * values["r_ohm"]
@@ -303,9 +303,9 @@ def _of_waves(segment: Segment, size: int) -> Array:
     Where six electrical turns are nearly a whole number of rows, each row has the same phase of a
     wave, and the mean of the rows is not that of the current.
     """
-    weak, unseen = segment.weak, unseen_waves(segment, size)
-    if weak is None or unseen is None:
-        return np.zeros(segment.size if weak is None else weak.starts.size)
+    weak, unseen = segment.windows, unseen_waves(segment, size)
+    if unseen is None:
+        return np.zeros(weak.starts.size)
     finer = size // segment.size
     rows = [averaged(part, finer) for one in unseen for part in (one.real, one.imag)]
     missed: Array = np.sqrt((weak.project(np.array(rows))[:, :, 0] ** 2).sum(0) / 2.0)
@@ -354,9 +354,7 @@ def _jumps(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array
     A log says what a voltage, current or torque was at its samples, not when within a period it
     changed.
     """
-    weak = segment.weak
-    if weak is None:
-        return np.zeros(segment.size)
+    weak = segment.windows
     there = [name for name in names if name in segment.recorded]
     noise = math.hypot(*(segment.sensors.noise[name] for name in there))
     bends = [np.diff(segment.recorded[name], 2) for name in there]
@@ -374,9 +372,7 @@ def _spikes(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Arra
     Between two instants a log does not say how long a pulse lasted, from no time to two periods. So
     its mean is open by as much as it is.
     """
-    weak, there = segment.weak, [name for name in names if name in segment.channels]
-    if weak is None:
-        return np.zeros((len(there), segment.size))
+    weak, there = segment.windows, [name for name in names if name in segment.channels]
     height = np.zeros((len(there), segment.size))
     for place, name in enumerate(there):
         before, after = np.diff(segment.recorded[name])[:-1], np.diff(segment.recorded[name])[1:]
@@ -395,9 +391,7 @@ def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Arr
     sampling on to any order k. The 10th has 0.03 steps [Widrow & Kollar (2008), ch. 20], and makes
     a torque of J (k ω)² times that.
     """
-    weak = segment.weak
-    if weak is None:
-        return np.zeros((segment.size, 1))
+    weak = segment.windows
     theta = segment.recorded["theta_mech_rad"]
     span = (weak.length - 1) * segment.ts_s
     omega = (theta[weak.starts + weak.length - 1] - theta[weak.starts]) / span

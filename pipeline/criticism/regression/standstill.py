@@ -41,9 +41,7 @@ def at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Arr
     Armstrong-Hélouvry, Control of Machines with Friction (1991), ch. 4.
 
     """
-    weak = segment.weak
-    if weak is None:
-        return np.zeros(segment.size)
+    weak = segment.windows
     policy, floors = model.policy.cutting, model.policy.noise_floors
     slow = policy.slowest_share * model.machine.scales["speed_rad_s"]
     finer = x.theta_rad.size // segment.size
@@ -83,9 +81,7 @@ def at_reversals(segment: Segment, model: Model, values: Values, x: Operating) -
         [N·m], as weak samples.
 
     """
-    weak = segment.weak
-    if weak is None:
-        return np.zeros(segment.size)
+    weak = segment.windows
     finer = x.theta_rad.size // segment.size
     pace = x.omega_rad_s[::finer]
     back = np.flatnonzero(pace[1:] * pace[:-1] < 0.0)
