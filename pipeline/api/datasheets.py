@@ -15,7 +15,7 @@ from pipeline.api.models import model_spec
 from pipeline.api.options import check_options, names_of
 from pipeline.api.recordings import Options
 from pipeline.execution.caches.stamp import configuration_digest, stamp_of
-from pipeline.execution.jobs import job_of
+from pipeline.execution.run_job import job_of
 from pipeline.execution.tasks import work
 from pipeline.io.storage.datasheets import read_datasheets
 from pipeline.io.storage.diagnoses import read_diagnoses

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self
 
@@ -13,7 +13,6 @@ from pipeline.records.comparison import ModelSpec
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation
 from pipeline.records.naming import printable
-from pipeline.settings import RunSettings
 
 Files = tuple[tuple[str, str], ...]
 """Names relative to the output folder, each with its sha256."""
@@ -117,59 +116,6 @@ class MotorJob(OfFiles):
     def name(self) -> str:
         """What the task works on."""
         return f"motor {printable(self.motor_id)}"
-
-
-def job_of(
-    settings: RunSettings,
-    motor_id: str,
-    config_sha256: str,
-    conditions: tuple[tuple[str, ...], bool],
-    model: ModelSpec,
-    entries: tuple[Entry, ...] = (),
-    findings: tuple[Finding, ...] = (),
-) -> MotorJob:
-    """The job of one motor as the settings of a run ask for it, without a key.
-
-    Parameters
-    ----------
-    settings
-        The keys of `run`.
-    motor_id
-        The motor.
-    config_sha256
-        Digest of what of the configuration changes its result.
-    conditions
-        Constants that a release requires, and whether the model's remainder keeps from one.
-    model
-        The model of the residual test, where the settings ask for one.
-    entries
-        Its captures; none where they are read already.
-    findings
-        On its files.
-
-    """
-    required, model_gates = conditions
-    return MotorJob(
-        motor_id=motor_id,
-        entries=entries,
-        input=settings.input,
-        output=settings.output,
-        config_sha256=config_sha256,
-        required=required,
-        release=settings.release,
-        report=settings.report,
-        recordings=settings.recordings,
-        gates=settings.gates,
-        fit=settings.fit,
-        constants=settings.constants,
-        crosscheck=settings.crosscheck,
-        model=model if settings.residual_test else None,
-        diagnose=settings.diagnose,
-        model_gates=model_gates,
-        operate=asdict(settings.operate),
-        findings=findings,
-        limits=ReadLimits(settings.read_seconds, settings.read_memory_mb),
-    )
 
 
 @dataclass(frozen=True, slots=True)

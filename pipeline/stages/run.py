@@ -15,7 +15,7 @@ from pipeline.execution.caches.keys import batch_parts, key_of, motor_parts
 from pipeline.execution.caches.run_cache import Batch, RunCache
 from pipeline.execution.caches.stamp import configuration_digest
 from pipeline.execution.caches.versions import RUN, tools
-from pipeline.execution.jobs import ModelTest, MotorJob, MotorResult, WarmUp, job_of
+from pipeline.execution.jobs import ModelTest, MotorJob, MotorResult, WarmUp
 from pipeline.execution.outputs.publishing import (
     fleet_of,
     other_motors,
@@ -33,6 +33,7 @@ from pipeline.execution.outputs.statuses import (
     status_now,
     with_current_statuses,
 )
+from pipeline.execution.run_job import job_of
 from pipeline.execution.tasks.survey_tasks import survey_with
 from pipeline.execution.workers.gate import HeldJob
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool

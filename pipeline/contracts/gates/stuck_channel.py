@@ -72,7 +72,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _is_command(capture: Capture, name: str) -> bool:
-    """Whether a column is what a drive was told to apply: a step is one value in every row."""
+    """Whether a column is the voltage that a drive commands: a step is one value in every row."""
     return name in DQ_VOLTAGES and capture.meta.voltage_kind == "commanded"
 
 

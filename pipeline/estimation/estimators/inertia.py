@@ -14,12 +14,7 @@ from pipeline.estimation.electrical.magnet_temperature import (
 )
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.electrical.ripple_torque import RIPPLE, winding_of
-from pipeline.estimation.mechanical.drag import (
-    drag_beside_current,
-    drag_beside_offset,
-    drag_by_current,
-    drag_of,
-)
+from pipeline.estimation.mechanical.drag import drag_of_motion
 from pipeline.estimation.mechanical.drag_fit import DragFit, drag_description
 from pipeline.estimation.mechanical.drag_forms import DRAG_FORMS, DRAG_NAMES
 from pipeline.estimation.mechanical.drag_over_time import DragOverTime, drag_over_time
@@ -34,14 +29,12 @@ from pipeline.estimation.mechanical.shaft_doubts import DRAGS, Doubts
 from pipeline.estimation.mechanical.shaft_nuisances import (
     CURRENT_LAG,
     NUISANCES,
-    OFFSET,
     RELUCTANCE,
     SAMPLED,
 )
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
 from pipeline.estimation.mechanical.shaft_rows import (
     COAST,
-    CURRENT_NOISE,
     DRIVE,
     ShaftRows,
     shaft_rows,
@@ -49,9 +42,7 @@ from pipeline.estimation.mechanical.shaft_rows import (
 from pipeline.estimation.mechanical.slow_turns import leading_order
 from pipeline.estimation.mechanical.torque_constant import UNKNOWN, USES, torque_constant
 from pipeline.estimation.mechanical.torque_share import (
-    has_torque_of_its_own,
     is_apart,
-    is_of_size,
     share_of_no_torque,
     words_of_no_torque,
 )
@@ -215,7 +206,7 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
     if short := too_short(rows):
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
     law = acceleration(rows, driving)
-    drag = _drag(rows, law, nuisances, options["level"], torque.kt_nm_a)
+    drag = drag_of_motion(rows, law, nuisances, options["level"], torque.kt_nm_a)
     if not (drag.steady or torque_is_separable(drag.design, drag.sigma)):
         note = f"the drive's torque cannot be separated from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
@@ -236,24 +227,6 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
         words = _setups_reason(setups)
         estimates = tuple(replace(e, note=f"{words}; {e.note}") for e in estimates)
     return Fit(_of_a_known_sign(estimates), _evidence(rows, y, drag))
-
-
-def _drag(
-    rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float, kt_nm_a: float
-) -> DragFit:
-    """The equation of motion fitted to the rows, whichever of its sides the noise is in."""
-    noise_nm = kt_nm_a * rows.columns[CURRENT_NOISE]
-    by_current = drag_by_current(rows, law, nuisances, level, noise_nm)
-    if by_current is not None:
-        return by_current
-    drag = drag_of(rows, law, nuisances, level)
-    if not has_torque_of_its_own(drag):
-        # several nuisances of a current of one size are its torque together
-        nuisances = [name for name in nuisances if not is_of_size(name)]
-        drag = drag_of(rows, law, nuisances, level)
-    if OFFSET in drag.names:
-        drag = drag_beside_offset(rows, law, nuisances, level)
-    return drag_beside_current(rows, drag, smoothed=not _by_angle(rows))
 
 
 def _over_time(
@@ -393,14 +366,9 @@ def _estimates(
     return tuple(estimates)
 
 
-def _by_angle(rows: ShaftRows) -> bool:
-    """Whether the motion of every drive is an angle, and no speed of the bench's own."""
-    return all(c.has("theta_mech_rad") for c in rows.captures if c.meta.test == "drive")
-
-
 def _of_a_speed(rows: ShaftRows, value: float) -> list[Contribution]:
     """What a bench's own speed, lagging or smoothed, may make of J, T_c or B without an angle."""
-    if _by_angle(rows):
+    if rows.by_angle:
         return []
     return [Contribution("assumed:speed_estimate", policy().drag.speed_share * value, "B")]
 

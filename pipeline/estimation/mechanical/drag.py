@@ -23,11 +23,13 @@ from pipeline.estimation.mechanical.drive_windows import coasts_decide, drive_co
 from pipeline.estimation.mechanical.shaft_nuisances import (
     BY_SENSE,
     COAST_LOAD,
+    OFFSET,
     SAMPLED,
     TIMING,
     is_of_current,
 )
-from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
+from pipeline.estimation.mechanical.shaft_rows import COAST, CURRENT_NOISE, DRIVE, ShaftRows
+from pipeline.estimation.mechanical.torque_share import has_torque_of_its_own, is_of_size
 from pipeline.estimation.policy import policy
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import (
@@ -94,6 +96,39 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
         design.names, fit.coefficients, covariance, fit.residuals, dof, free, u_form, reasons,
         design.columns, sigma, y, rows.fastest_rad_s,
     )  # fmt: skip
+
+
+def drag_of_motion(
+    rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float, kt_nm_a: float
+) -> DragFit:
+    """The equation of motion fitted to the rows, whichever of its sides the noise is in.
+
+    Parameters
+    ----------
+    rows
+        Windows of drives and coast-downs.
+    law : array [w, 3]
+        Columns of 1/J, T_c/J and B/J (`estimators.inertia.acceleration`).
+    nuisances
+        Names of columns of the rows that may join.
+    level
+        Chance of a false alarm over all that may join.
+    kt_nm_a
+        Torque constant [N·m/A].
+
+    """
+    noise_nm = kt_nm_a * rows.columns[CURRENT_NOISE]
+    by_current = drag_by_current(rows, law, nuisances, level, noise_nm)
+    if by_current is not None:
+        return by_current
+    drag = drag_of(rows, law, nuisances, level)
+    if not has_torque_of_its_own(drag):
+        # several nuisances of a current of one size are its torque together
+        nuisances = [name for name in nuisances if not is_of_size(name)]
+        drag = drag_of(rows, law, nuisances, level)
+    if OFFSET in drag.names:
+        drag = drag_beside_offset(rows, law, nuisances, level)
+    return drag_beside_current(rows, drag, smoothed=not rows.by_angle)
 
 
 def drag_beside_offset(

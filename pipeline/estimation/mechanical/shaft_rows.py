@@ -93,6 +93,11 @@ class ShaftRows:
     dropped: int
 
     @property
+    def by_angle(self) -> bool:
+        """Whether the motion of every drive is an angle, and no speed of the bench's own."""
+        return all(c.has("theta_mech_rad") for c in self.captures if c.meta.test == "drive")
+
+    @property
     def count(self) -> int:
         """Number of rows."""
         return int(self.sense.size)
