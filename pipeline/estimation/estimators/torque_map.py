@@ -197,10 +197,18 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
 
 def _chosen(points: Sequence[Point], alpha_1_k: float, level: float) -> list[str]:
     base, candidates = torque(points, alpha_1_k)
-    design = np.column_stack([*base.values()])
-    return needed_columns(
-        design, candidates, _column(points, "torque_of_means_nm"), _sigma(points), level
-    )
+    design, sigma = np.column_stack([*base.values()]), _sigma(points)
+    apart = {n: c for n, c in candidates.items() if n not in BENDING or _is_apart(design, c)}
+    return needed_columns(design, apart, _column(points, "torque_of_means_nm"), sigma, level)
+
+
+def _is_apart(design: Array, column: Array) -> bool:
+    """Whether a bend of the torque [n] is another column than K and K_rel have.
+
+    A square or cube of d currents of two sizes is not: it would take K_rel's place.
+    """
+    own = linear_fit(design, column).residuals
+    return bool(np.linalg.norm(own) > policy().drag.least_own_share * np.linalg.norm(column))
 
 
 def _regress(points: Sequence[Point], alpha_1_k: float, chosen: Sequence[str]) -> Regression:

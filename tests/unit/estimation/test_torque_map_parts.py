@@ -84,6 +84,24 @@ def test_a_slope_scaled_keeps_its_uncertainties_positive() -> None:
     assert Slope(2.0, 0.1, 7, 0.3).times(-2.0) == Slope(-4.0, 0.2, 7, 0.6)
 
 
+def test_powers_of_two_d_currents_are_no_other_column_than_reluctance() -> None:
+    """A cube of d currents that are none or -1 A, but for their noise, took K_rel's place: 0.092 for
+    -0.013 N·m/A², and the torque equation of a sound motor failed.
+    """
+    rng = np.random.default_rng(5)
+
+    def points(d):
+        made = ripple_map(lambda i, id_: 0.45 * i - 0.013 * i * id_, (0.6, 1.2, 1.8, 2.4), d=d)
+        return [replace(p, id_a=p.id_a + 2e-3 * rng.standard_normal()) for p in made]
+
+    two = points((0.0, -1.0))
+    bent = [replace(p, torque_nm=p.torque_nm + 0.01 * p.id_a**3 * p.iq_a)
+            for p in points((0.0, -0.5, -1.0, 1.0))]  # fmt: skip
+    bends = {"id^2 iq", "id^3 iq"}
+    assert bends.isdisjoint(_chosen(two, 0.0, 0.05))
+    assert not bends.isdisjoint(_chosen(bent, 0.0, 0.05))
+
+
 def test_columns_of_the_torque() -> None:
     points = [point(2.0, -1.0, cos_turn=0.5, sin_turn=-0.25, w=-5.0, temp_magnet_degc=35.0),
               point(-4.0, 3.0, group=1)]  # fmt: skip
