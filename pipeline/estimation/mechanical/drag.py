@@ -15,6 +15,7 @@ from pipeline.estimation.mechanical.drag_forms import (
     DRAG_NAMES,
     FORMS,
     KNOTS,
+    LOW_KNOTS,
     STRIBECK,
     WINDAGE,
     low_end,
@@ -44,6 +45,10 @@ from pipeline.numerics.selection import needed_columns
 _STEADY = (
     "the speed is steady in every row, or changes between two; record a drive that accelerates and "
     "brakes over many rows, or a spin_down"
+)
+_UNSEEN = (
+    "the slowest row turns at {:.3g} rad/s, and a drag curve is not drawn on to standstill from "
+    "there; record spin_downs down to rest"
 )
 _UNSUPPORTED = (
     "the drag curve is followed to no low speed: drawn on to standstill it is open by {:.2g} N·m, "
@@ -434,7 +439,10 @@ def _drag_part(design: Design, fit: LinearFit) -> Array:
 def _form_allowance(
     coefficients: Array, free: bool, rows: ShaftRows
 ) -> tuple[Array, tuple[str, str, str]]:
-    """Allowance for the form of drag, and why a constant of it has no meaning."""
+    """Allowance for the form of drag, and why a constant of it has no meaning.
+
+    Knots at speeds that no row has are at zero, and say nothing of standstill.
+    """
     if not free:
         return np.zeros(3), ("", "", "")
     inertia = 1.0 / coefficients[0]
@@ -444,6 +452,9 @@ def _form_allowance(
     beyond = float(curve[1] - (curve[2] - curve[1]) * KNOTS[1] / (KNOTS[2] - KNOTS[1]))
     spread = max(abs(float(curve[0]) - level), abs(beyond - level))
     unsupported = "" if spread <= np.median(np.abs(curve)) else _UNSUPPORTED.format(spread)
+    slowest = float(np.min(np.abs(rows.speed_rad_s)))
+    if slowest > KNOTS[LOW_KNOTS - 1] * rows.fastest_rad_s:
+        unsupported = _UNSEEN.format(slowest)
     why = (
         "drag is not Coulomb and viscous: its slope runs from "
         f"{slope.min():.2g} to {slope.max():.2g} N·m·s/rad over the speeds; see the drag curve, "

@@ -193,6 +193,10 @@ def test_the_allowance_for_a_form_that_is_free() -> None:
     slopes = np.diff(torque) / np.diff(knots)
     assert f"from {slopes.min():.2g} to {slopes.max():.2g} N·m·s/rad" in reasons[2]
     assert _form_allowance(np.array([4.0, 1.0, 1.0]), False, rows)[1] == ("", "", "")
+    # knots that no row is near are zero: T_c of a propeller was 7e-16 ± 2e-14 N·m
+    fast = replace(rows, speed_rad_s=np.full(rows.count, 0.07 * rows.fastest_rad_s))
+    unseen = np.array([4.0, 1e-15, 2e-15, 1e-15, *curve[3:]])
+    assert "slowest row turns at 14 rad/s" in _form_allowance(unseen, True, fast)[1][1]
 
 
 def test_an_excess_below_coulomb_friction_is_left_out() -> None:
