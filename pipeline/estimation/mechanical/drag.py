@@ -24,6 +24,8 @@ from pipeline.estimation.mechanical.drive_windows import coasts_decide, drive_co
 from pipeline.estimation.mechanical.shaft_nuisances import (
     BY_SENSE,
     COAST_LOAD,
+    CURRENT_LAG,
+    CURVATURE,
     OFFSET,
     SAMPLED,
     TIMING,
@@ -133,6 +135,7 @@ def drag_of_motion(
         drag = drag_of(rows, law, nuisances, level)
     if OFFSET in drag.names:
         drag = drag_beside_offset(rows, law, nuisances, level)
+    drag = drag_beside_lag(rows, drag, kt_nm_a)
     return drag_beside_current(rows, drag, smoothed=not rows.by_angle)
 
 
@@ -193,6 +196,39 @@ def drag_beside_current(rows: ShaftRows, drag: DragFit, smoothed: bool) -> DragF
     for left_out in {(k,) for k in beside} | {tuple(beside)} - {()}:
         square = square + _moved_by(rows, drag, left_out, smoothed) ** 2
     return replace(drag, u_form=np.sqrt(square))
+
+
+def drag_beside_lag(rows: ShaftRows, drag: DragFit, kt_nm_a: float) -> DragFit:
+    """The same fit, in doubt by what a late current is beyond its rate of change.
+
+    Parameters
+    ----------
+    rows
+        Windows of drives and coast-downs.
+    drag
+        Their fit.
+    kt_nm_a
+        Torque constant [N·m/A].
+
+    Returns
+    -------
+    DragFit
+        With the change of J, T_c and B in `u_form` that the next term makes.
+
+    Notes
+    -----
+    T(t + τ) = T + τ T' + τ² T''/2: without the last, a torque of the frequency ω counts cos(ωτ). It
+    is a doubt, since a row that is late may be a sample or a mean, which counts sin(ωτ)/(ωτ).
+
+    """
+    if CURRENT_LAG not in drag.names or not drag.coefficients[0]:
+        return drag
+    late = drag.coefficients[drag.names.index(CURRENT_LAG)] / (drag.coefficients[0] * kt_nm_a)
+    design = drag.design.copy()
+    design[:, 0] += 0.5 * late**2 * kt_nm_a * rows.columns[CURVATURE]
+    others = linear_fit(design, drag.target, drag.sigma).coefficients
+    change = drag.constants(others) - drag.constants(drag.coefficients)
+    return replace(drag, u_form=np.hypot(drag.u_form, change))
 
 
 def _moved_by(rows: ShaftRows, drag: DragFit, columns: Sequence[int], smoothed: bool) -> Array:

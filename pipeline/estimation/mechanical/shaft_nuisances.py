@@ -8,6 +8,8 @@ BY_SENSE = "viscous drag by sense"
 """What viscous drag has more in one sense than in the other: in coasts of one sense it is drag."""
 CURRENT_LAG, JUMPS = "current lag", "current jumps"
 """A current that is late, and one that jumps between its samples."""
+CURVATURE = "curvature of the current"
+"""Second derivative of the q current: what a lag leaves of a late current, to second order."""
 TIMING = frozenset({CURRENT_LAG, JUMPS})
 """What is not known of a current's instant."""
 SAMPLED = "sampled current"
