@@ -489,7 +489,7 @@ def _form_allowance(
     spread = max(abs(float(curve[0]) - level), abs(beyond - level))
     unsupported = "" if spread <= np.median(np.abs(curve)) else _UNSUPPORTED.format(spread)
     slowest = float(np.min(np.abs(rows.speed_rad_s)))
-    if slowest > KNOTS[LOW_KNOTS - 1] * rows.fastest_rad_s:
+    if slowest > LOW_KNOTS[-1] * rows.fastest_rad_s:
         unsupported = _UNSEEN.format(slowest)
     why = (
         "drag is not Coulomb and viscous: its slope runs from "

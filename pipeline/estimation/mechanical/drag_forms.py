@@ -12,8 +12,8 @@ from pipeline.numerics.least_squares import Array
 # a quarter of the square of their width: by 1.2 % of the largest drag at most, within
 # `drag.material_share`.
 KNOTS = (0.0, 0.03, 0.06, 0.1, 0.16, 0.24, 0.34, 0.46, 0.6, 0.78, 1.0)
-# Knots from which drag is drawn on to standstill.
-LOW_KNOTS = 3
+# Those from which drag is drawn on to standstill.
+LOW_KNOTS = KNOTS[:3]
 # Widths of Stribeck's excess, from what the slowest rows resolve (`SLOWEST_SHARE`) to where it is
 # as good as viscous drag. A fifth apart, the nearest one is off by 7 % of the excess at most.
 BUMPS = tuple(float(f"{0.008 * 1.2**k:.3g}") for k in range(19))
@@ -68,6 +68,6 @@ def low_end(curve: Array, fastest: float) -> tuple[float, float]:
 
     """
     speeds = np.array(KNOTS) * fastest
-    level = float(np.polyfit(speeds[:LOW_KNOTS], curve[:LOW_KNOTS], 1)[1])
+    level = float(np.polyfit(speeds[: len(LOW_KNOTS)], curve[: len(LOW_KNOTS)], 1)[1])
     slope = float(np.polyfit(speeds, curve, 1)[0])
     return level, slope

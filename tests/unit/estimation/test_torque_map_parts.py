@@ -85,8 +85,8 @@ def test_a_slope_scaled_keeps_its_uncertainties_positive() -> None:
 
 
 def test_powers_of_two_d_currents_are_no_other_column_than_reluctance() -> None:
-    """A cube of d currents that are none or -1 A, but for their noise, took K_rel's place: 0.092 for
-    -0.013 N·m/A², and the torque equation of a sound motor failed.
+    """A cube of d currents that are none or -1 A, but for their noise, took K_rel's place: 0.092
+    for -0.013 N·m/A², and the torque equation of a sound motor failed.
     """
     rng = np.random.default_rng(5)
 
