@@ -113,6 +113,9 @@ class Instrument:
         Whether a logged voltage is one vector, from one of which to the next the rotor turns far.
     waves
         Whether the current between its rows has waves of the angle, as far as the rows show some.
+    behind
+        How long before its motion the currents and voltages of a row are [samples]: 0.5 where they
+        are means up to the instant at which the motion is read, else 0.
 
     """
 
@@ -125,6 +128,7 @@ class Instrument:
     points: int = 1
     snapshots: bool = False
     waves: bool = True
+    behind: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,9 @@ Firmware logs the vector from before or behind that: in the frame of the samplin
 which on it is held, or of the middle of its hold. That is known only where each sample is stated
 to be the mean about the middle of one hold.
 
+Telemetry averages currents and voltages over a row, or samples them at its end, where the motion is
+read. Means are half a row before it.
+
 A current that moves fast between slow rows may look as if it had waves of the angle. Where the
 captures are better explained by straight lines between rows, it has none.
 """
@@ -29,7 +32,12 @@ from pipeline.criticism.signals.true_current import ripples
 
 TORQUE = "torque_shaft_nm"
 _HALF_HOLD = 0.5
-"""Of the start of a hold, before its middle."""
+"""Of the start of a hold, before its middle; of the middle of a row, before its end."""
+_MEANS = (
+    "currents and voltages of {} captures are taken as means over the row up to the instant at "
+    "which its motion is read, which explains them better than samples; a current_delay of half a "
+    "row would look the same"
+)
 _STATOR = (
     "torque_shaft_nm of {} captures is read at the stator (a reaction torque): no inertia of the "
     "rotor is in it; in the shaft it would miss by more"
@@ -87,7 +95,8 @@ def reading_notes(segments: Sequence[Segment]) -> tuple[str, ...]:
     """
     sampled = {segment.capture for segment in segments if segment.instrument.frame}
     stator = {segment.capture for segment in segments if segment.instrument.stator}
-    captures = ((_SAMPLED, sampled), (_STATOR, stator))
+    means = {segment.capture for segment in segments if segment.instrument.behind}
+    captures = ((_SAMPLED, sampled), (_MEANS, means), (_STATOR, stator))
     return tuple(note.format(len(names)) for note, names in captures if names)
 
 
@@ -99,6 +108,11 @@ def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
         each = zip(system.segments, held, strict=True)
         turned = tuple(_in_other_frame(s) if its_own else s for s, its_own in each)
         yield gauss_newton(replace(system.fit, segments=turned))
+    slow = [_may_hold_means(segment, share) for segment in system.segments]
+    if any(slow):
+        each = zip(system.segments, slow, strict=True)
+        means = tuple(_of_other_rows(s) if its_own else s for s, its_own in each)
+        yield gauss_newton(replace(system.fit, segments=means))
     if any(ripples(segment) for segment in system.segments):
         yield gauss_newton(replace(system.fit, segments=tuple(map(_other_lines, system.segments))))
     torques = np.array([channel == TORQUE for _, channel, _ in system.labels], dtype=bool)
@@ -127,9 +141,22 @@ def _has_held_vectors(segment: Segment, slower_share: float) -> bool:
     return "vd_v" in segment.channels and (timing == "held" or is_open)
 
 
+def _may_hold_means(segment: Segment, slower_share: float) -> bool:
+    """Whether the rows of a segment may be means of a drive's own current, which no metadata state:
+    those of a log that is slower than its PWM.
+    """
+    pwm_s = segment.fixed.get("pwm_s", 0.0)
+    return 0.0 < pwm_s < slower_share * segment.ts_s and "iq_a" in segment.recorded
+
+
 def _in_other_frame(segment: Segment) -> Segment:
     instrument = segment.instrument
     return replace(segment, instrument=replace(instrument, frame=_HALF_HOLD - instrument.frame))
+
+
+def _of_other_rows(segment: Segment) -> Segment:
+    instrument = segment.instrument
+    return replace(segment, instrument=replace(instrument, behind=_HALF_HOLD - instrument.behind))
 
 
 def _other_lines(segment: Segment) -> Segment:

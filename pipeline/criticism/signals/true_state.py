@@ -296,6 +296,8 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
 
     """
     late, bend, lag = (segment.fixed.get(name, 0.0) * values[name] for name in LATENESS)
+    if behind := segment.instrument.behind * segment.ts_s:
+        late, bend = late - behind, bend + 0.5 * behind**2
     if late or bend:
         x = _in_time(segment, x, late, bend, lag)
     none = np.zeros(x.omega_rad_s.shape)

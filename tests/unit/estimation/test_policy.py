@@ -23,9 +23,9 @@ from pipeline.settings import RunSettings
 ROOT = Path(pipeline.estimation.__file__).parent
 # Grids, conversions and names of places, which judge nothing.
 NO_JUDGEMENT = {
-    "BETWEEN", "BUMPS", "COAST", "DRIVE", "KNOTS", "LD", "LEAST_LEVELS", "LEAST_ROWS", "LOW_KNOTS", "LQ",
-    "ORDERS", "RANGE_OF_THREE", "REFERENCE_DEGC", "SAME", "SPACE", "STEP_1_K", "TERMS", "TURN",
-    "TURN_RAD", "WHOLE", "WITHOUT_ACCELERATION",
+    "BETWEEN", "BUMPS", "COAST", "DRIVE", "KNOTS", "LD", "LEAST_LEVELS", "LEAST_ROWS",
+    "LOW_KNOTS", "LQ", "ORDERS", "RANGE_OF_THREE", "REFERENCE_DEGC", "SAME", "SPACE",
+    "STEP_1_K", "TERMS", "TURN", "TURN_RAD", "WHOLE", "WITHOUT_ACCELERATION",
 }  # fmt: skip
 
 
