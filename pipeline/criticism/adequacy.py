@@ -166,7 +166,8 @@ def _far_inertia(
 ) -> dict[str, ReportedParameter]:
     """Share of the inertia that is beyond a coupling, by the effect that says so.
 
-    Where a drive logs the torque in the coupling, its inertia is of the motor's side alone.
+    Where a drive logs the torque in the coupling, its inertia is of the motor's side alone. Where
+    none logs one, the share may be anything where only a torque shows it.
     """
     logged = any(TORQUE in one.recorded for one in segments if one.test == "drive")
     shares: dict[str, ReportedParameter] = {}
@@ -174,8 +175,10 @@ def _far_inertia(
         share = parameters.get(library[name].far_inertia) if name in library else None
         between = parameters.get("between")
         in_coupling = logged and between is not None and between.value == 1.0
-        if share is not None and None not in (share.value, share.u) and not in_coupling:
-            shares[name] = share
+        if share is None or share.value is None or share.u is None or in_coupling:
+            continue
+        unseen = library[name].far_by_torque and not logged
+        shares[name] = _any_share(1.0, 0.0, share.unit) if unseen else share
     return shares
 
 

@@ -142,7 +142,8 @@ class Description:
     of it, with sizes in braces, or several (`criticism.library.headline`); its name without one.
     `touches`: constants of a datasheet that mean something else where it acts, and what.
     `in_friction`: whether tests without voltages or d current count its drag as friction.
-    `far_inertia`: its parameter that is the share of the inertia of a free shaft beyond a coupling.
+    `far_inertia`: its parameter that is the share of the inertia of a free shaft beyond a coupling;
+    `far_by_torque`: whether only a drive that logs a torque shows that share.
     """
 
     words: str
@@ -152,6 +153,7 @@ class Description:
     touches: Mapping[str, str] = field(default_factory=dict)
     in_friction: bool = False
     far_inertia: str = ""
+    far_by_torque: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

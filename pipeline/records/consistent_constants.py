@@ -133,7 +133,8 @@ def _near(whole: Estimate, effect: str, share: ReportedParameter) -> Estimate:
     """What is left of an inertia of all that turns on the motor's side of a coupling."""
     far, u = share.value or 0.0, share.u or 0.0
     parts = (1.0 - far, whole.budget), (1.0, type_a(_source(effect, whole.name), -whole.number * u))
-    words = f"less the {100.0 * far:.3g} % of the inertia that are beyond a coupling ({effect})"
+    percent = f"{100.0 * far:.3g} ± {100.0 * u:.2g} %"
+    words = f"less the {percent} of the inertia that are beyond a coupling ({effect})"
     note = "; ".join(part for part in (words, whole.note) if part)
     return replace(whole, value=(1.0 - far) * whole.number, budget=propagate(parts), note=note)
 

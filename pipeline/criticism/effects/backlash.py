@@ -1,4 +1,8 @@
-"""A coupling with a gap that opens whenever the torque changes sign."""
+"""A coupling with a gap that opens whenever the torque changes sign.
+
+The gap is crossed at once. A real one takes its time, which depends on what is beyond it: without a
+torque in the coupling, rows know the product of share and gap, and nothing of the share.
+"""
 
 from __future__ import annotations
 
@@ -34,6 +38,7 @@ EFFECT = Effect(
     headline="play of {gap_rad} between rotor and load",
     touches={"j_rotor_kgm2": "is of all that turns, not of the rotor alone"},
     far_inertia="share",
+    far_by_torque=True,
     reference="Nordin & Gutman, Automatica 38 (2002), controlling systems with backlash",
     parameters=(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),

@@ -107,8 +107,19 @@ def test_the_inertia_of_the_rotor_is_less_what_is_beyond_a_coupling() -> None:
     near = separated({"j_rotor_kgm2": whole}, model)["j_rotor_kgm2"]
     assert near.number == pytest.approx(2e-4)
     assert near.u == pytest.approx(math.hypot(2e-6, 1e-5))
-    assert "80 % of the inertia" in near.note
+    assert "80 ± 1 % of the inertia" in near.note
     assert ModelVerdict.of(model.document()) == model
+
+
+@pytest.mark.parametrize("logged", [True, False])
+def test_without_a_torque_nothing_shows_the_share_beyond_a_gap(logged) -> None:
+    """A gap of 3.6 mrad before two thirds of the inertia was one of 10.3 mrad before a quarter, and
+    the rotor's inertia 2.3 times too large at 96 u.
+    """
+    size = {"share": ReportedParameter(0.25, 0.01, "1")}
+    drive = SimpleNamespace(test="drive", recorded={"torque_shaft_nm": ()} if logged else {})
+    far = _far_inertia({"backlash": size}, effects(None), [drive])["backlash"]
+    assert far == (size["share"] if logged else (0.5, pytest.approx(1.0 / math.sqrt(12.0)), "1"))
 
 
 @pytest.mark.parametrize(
