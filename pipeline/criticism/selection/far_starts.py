@@ -55,7 +55,7 @@ class _End:
     descent: Descent
 
 
-def with_starts(
+def with_far_starts(
     wide: LinearSystem,
     offered: Sequence[Candidate],
     scores: Sequence[Score],

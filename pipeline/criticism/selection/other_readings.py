@@ -142,11 +142,12 @@ def _has_held_vectors(segment: Segment, slower_share: float) -> bool:
 
 
 def _may_hold_means(segment: Segment, slower_share: float) -> bool:
-    """Whether the rows of a segment may be means of a drive's own current, which no metadata state:
-    those of a log that is slower than its PWM.
+    """Whether the rows of a segment may be means up to their instant: those of a log that is slower
+    than its PWM, but where a sample is stated to be the mean about its instant.
     """
-    pwm_s = segment.fixed.get("pwm_s", 0.0)
-    return 0.0 < pwm_s < slower_share * segment.ts_s and "iq_a" in segment.recorded
+    pwm_s, centred = segment.fixed.get("pwm_s", 0.0), segment.instrument.timing == "centred"
+    slow = 0.0 < pwm_s < slower_share * segment.ts_s
+    return slow and not centred and "iq_a" in segment.recorded
 
 
 def _in_other_frame(segment: Segment) -> Segment:

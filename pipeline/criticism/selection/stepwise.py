@@ -17,7 +17,7 @@ from pipeline.criticism.selection.best_candidate import best_candidate
 from pipeline.criticism.selection.candidates import candidates, widened
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
-from pipeline.criticism.selection.far_starts import with_starts
+from pipeline.criticism.selection.far_starts import with_far_starts
 from pipeline.criticism.selection.free_shares import with_changing_friction, with_free_shares
 from pipeline.criticism.selection.other_readings import by_best_readings
 from pipeline.criticism.selection.pairs import best_pair
@@ -215,7 +215,7 @@ def scored(
     significant = significant_groups(wide)
     scores = score_all(wide, offered, significant)
     scores = with_nuisances(wide, offered, scores)
-    scores = with_starts(wide, offered, scores, significant)
+    scores = with_far_starts(wide, offered, scores, significant)
     scores = with_linear_start(wide, offered, scores, significant)
     scores = with_round_rotor_start(wide, offered, scores, significant)
     return wide, with_log_start(wide, offered, scores, significant)

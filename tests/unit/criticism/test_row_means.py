@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
+from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.selection.other_readings import _may_hold_means
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -76,3 +81,23 @@ def test_samples_are_read_as_samples(late_s: float, missing: tuple[str, ...]) ->
     diagnosis = found(means=False, late_s=late_s)
     assert diagnosis.missing == missing
     assert not any("means over the row" in note for note in diagnosis.notes)
+
+
+@pytest.mark.parametrize(
+    ("timing", "pwm_s", "may"),
+    [
+        ("instant", 1e-4, True),
+        ("held", 1e-4, True),
+        ("centred", 1e-4, False),
+        ("instant", ROW_S, False),
+    ],
+)
+def test_a_stated_mean_about_its_instant_is_not_read_as_one_before_it(timing, pwm_s, may) -> None:
+    """Nor are rows as fast as the PWM."""
+    segment = SimpleNamespace(
+        fixed={"pwm_s": pwm_s},
+        ts_s=ROW_S,
+        instrument=SimpleNamespace(timing=timing),
+        recorded={"iq_a": ()},
+    )
+    assert _may_hold_means(cast(Segment, segment), 0.5) is may
