@@ -12,6 +12,32 @@ Array = NDArray[np.float64]
 REST = 11.0 / 720.0
 # A lost row makes a step twice as long as usual; jitter makes none half as long again.
 GAP = 1.5
+# Between rows farther apart a speed is no straight line: a pause, stated or not.
+PAUSE = 10.0
+
+
+def longest_step_s(t_s: Array, pause_s: float | None = None) -> float:
+    """The longest step of a clock over which a speed is integrated.
+
+    Parameters
+    ----------
+    t_s
+        Times [n, s], rising; two or more.
+    pause_s
+        What is stated: a longer step is a pause of the recorder [s].
+
+    Returns
+    -------
+    float
+        `pause_s`, or ten median steps where nothing is stated [s].
+
+    Examples
+    --------
+    >>> longest_step_s(np.array([0.0, 0.5, 1.0, 9.0]))
+    5.0
+
+    """
+    return PAUSE * float(np.median(np.diff(t_s))) if pause_s is None else pause_s
 
 
 def trapezoid(t_s: Array, y: Array) -> Array:

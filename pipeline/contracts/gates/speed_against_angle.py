@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.waveform import Array, noise_of
-from pipeline.numerics.integrals import trapezoid
+from pipeline.numerics.integrals import longest_step_s, trapezoid
 from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
@@ -117,9 +117,7 @@ def speed_over_angle(capture: Capture, turns: float) -> tuple[float, float] | No
 
 def _without_pauses(t_s: Array, theta: Array, pause_s: float | None) -> tuple[Array, Array]:
     """Time and angle [n] that stand still while the recorder paused."""
-    if pause_s is None:
-        return t_s, theta
-    on = np.diff(t_s) <= pause_s
+    on = np.diff(t_s) <= longest_step_s(t_s, pause_s)
     steps = (np.concatenate([[0.0], np.cumsum(np.diff(one) * on)]) for one in (t_s, theta))
     closed_s, closed = steps
     return closed_s, closed

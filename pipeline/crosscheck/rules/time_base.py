@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
+from pipeline.numerics.integrals import longest_step_s
 from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
@@ -116,15 +117,14 @@ def pace(capture: Capture, turns: float) -> Pace | None:
 
 def _increments(rows: Array, pause_s: float | None = None) -> Array:
     """Increments [K, 4] of the integrated speed [rad], the angle [rad], the speed [rad/s] and the
-    acceleration [rad/s²], over blocks of rows [n, 3]: time, angle, speed. What happened in pauses
-    of the recorder is in none.
+    acceleration [rad/s²], over blocks of rows [n, 3]: time, angle, speed. What happened while rows
+    are missing is in none.
     """
     t_s, theta, omega = rows.T
     turned = 0.5 * (omega[1:] + omega[:-1]) * np.diff(t_s)
     rates = np.gradient(omega, t_s)
     steps = np.column_stack([turned, np.diff(theta), np.diff(omega), np.diff(rates)])
-    if pause_s is not None:
-        steps[np.diff(t_s) > pause_s] = 0.0
+    steps[np.diff(t_s) > longest_step_s(t_s, pause_s)] = 0.0
     along = np.vstack([np.zeros(4), np.cumsum(steps, axis=0)])
     edges = np.linspace(0, t_s.size - 1, BLOCKS + 1).round().astype(np.int64)
     return np.diff(along[edges], axis=0)

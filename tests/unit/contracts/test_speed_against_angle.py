@@ -117,3 +117,13 @@ def test_a_shaft_that_swings_scatters_about_its_ratio(
     )
     options = speed_against_angle.GATE.options
     assert len(speed_against_angle.check(made, options).findings) == warned
+
+
+def test_a_pause_that_nobody_states_is_not_integrated_over() -> None:
+    """The speed of a swinging shaft is no straight line over the rows that are missing."""
+    t = np.linspace(0.0, 4.0, 4001)
+    t = t[(t < 1.0) | (t > 2.5)]
+    w = 2.0 * np.pi * 0.5
+    made = capture("drive", t_s=t, theta_mech_rad=30.0 * np.sin(w * t) / w,
+                   omega_mech_rad_s=30.0 * np.cos(w * t))  # fmt: skip
+    assert said("speed_against_angle", made) == ""
