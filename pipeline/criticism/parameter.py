@@ -107,6 +107,10 @@ def alone() -> Parameter:
 
 UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
 """Nuisance that stands for a temperature where a test that warms the machine did not record it."""
+TRANSDUCER = "gain_torque"
+"""Nuisance of a torque transducer: its gain. A station has one."""
+THERMOMETER = "offset_temp_k"
+"""Nuisance of the thermometers of a station: their common offset."""
 WARMING = {"temp_winding_degc": "warming_winding_k", "temp_magnet_degc": "warming_magnet_k"}
 """Nuisance of what such a temperature rises by from the begin to the end of one capture."""
 BENDING = {"temp_winding_degc": "bending_winding_k"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
+from pipeline.criticism.parameter import THERMOMETER, TRANSDUCER
 from pipeline.records.capture import Capture, CaptureMeta
 
 _AXES_A = ("id_a", "iq_a")
@@ -14,6 +15,8 @@ _FLUXES = ("psi_d_wb", "psi_q_wb")
 _AT_REST = "gain_current_rest"
 _METERS = ("gain_current", "gain_current_bench", _AT_REST, "gain_voltage", "gain_commanded")
 """Gains of which a station may have several instruments; the first of a kind has its name."""
+_OF_STATION = {TRANSDUCER: "u_rel_torque", THERMOMETER: "u_temp_degc"}
+"""Kinds of which a station has one, with the key of its uncertainty."""
 
 
 def gains_of(captures: Iterable[Capture]) -> dict[str, dict[str, str]]:
@@ -31,19 +34,21 @@ def gains_of(captures: Iterable[Capture]) -> dict[str, dict[str, str]]:
 
     Notes
     -----
-    Captures that state the same uncertainty of the same kind have the same instrument: a scope of
-    1.5 % is not the multimeter of 0.3 % beside it. The best of a kind has the name of the kind,
-    others a number. What feeds and measures a rotor at rest, as in a heat run, may be the bench's
-    supply or an analyser: its ammeter is neither.
+    Captures of one station that state the same uncertainty of the same kind have the same
+    instrument: a scope of 1.5 % is not the multimeter of 0.3 % beside it, nor is anything of
+    another station. The best of a kind has the name of the kind, others a number. What feeds and
+    measures a rotor at rest, as in a heat run, may be the bench's supply or an analyser: its
+    ammeter is neither.
 
     """
+    captures = tuple(captures)
     used = {capture.path: _used(capture) for capture in captures}
     named = {}
-    for kind in _METERS:
-        stated = {kinds[kind] for kinds in used.values() if kind in kinds}
-        for n, u in enumerate(sorted(stated, key=lambda u: math.inf if u is None else u), 1):
-            named[kind, u] = kind if n == 1 and kind != _AT_REST else f"{kind}_{n}"
-    return {p: {kind: named[kind, u] for kind, u in kinds.items()} for p, kinds in used.items()}
+    for kind in (*_METERS, *_OF_STATION):
+        known = {kinds[kind] for kinds in used.values() if kind in kinds}
+        for n, one in enumerate(sorted(known), 1):
+            named[kind, one] = kind if n == 1 and kind != _AT_REST else f"{kind}_{n}"
+    return {p: {kind: named[kind, one] for kind, one in kinds.items()} for p, kinds in used.items()}
 
 
 def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
@@ -62,17 +67,19 @@ def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
 
     """
     captures = tuple(captures)
-    gains, stated = gains_of(captures), {}
+    gains = gains_of(captures)
+    stated: dict[str, float] = {}
     for capture in captures:
         meta, used = capture.meta, _used(capture)
         for kind, name in gains[capture.path].items():
-            u = used[kind]
-            if u is not None or name != kind:
-                # a further instrument is known by its number here, so its gain is always stated
-                stated[name] = meta.instrument_u("u_rel_current") if u is None else u
+            key = _OF_STATION.get(kind)
+            u = used[kind][0] if key is None else getattr(meta, key) or math.inf
+            if math.isinf(u) and name != kind:
+                # a further instrument is known by its number here, so it always states something
+                u = meta.instrument_u(key or "u_rel_current")
+            if not math.isinf(u):
+                stated[name] = u if key is None else max(stated.get(name, 0.0), u)
         for name, one in (
-            ("gain_torque", meta.u_rel_torque),
-            ("offset_temp_k", meta.u_temp_degc),
             ("gain_lcr", _u_lcr(meta)),
             ("phase_lcr_rad", _u_lcr(meta)),
             ("gain_clock", meta.u_rel_clock),
@@ -82,19 +89,28 @@ def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
     return stated
 
 
-def _used(capture: Capture) -> Mapping[str, float | None]:
-    """The kinds of gain that a capture's columns have, with the uncertainty that it states."""
+def _used(capture: Capture) -> Mapping[str, tuple[float, str]]:
+    """The kinds of instrument that a capture's columns have: the uncertainty that it states,
+    infinite where it states none, and the station. A station has one transducer, whatever its
+    captures state.
+    """
     meta, used = capture.meta, {}
+    at = meta.station or ""
+    amps, volts = ((u or math.inf, at) for u in (meta.u_rel_current, meta.u_rel_voltage))
+    if any(name.startswith("temp_") for name in capture.columns):
+        used[THERMOMETER] = 0.0, at
+    if capture.has("torque_shaft_nm"):
+        used[TRANSDUCER] = 0.0, at
     if meta.test == "lcr":
-        return {}
+        return used
     if any(capture.has(name) for name in _AXES_A):
         at_rest = meta.test == "heat_run" and meta.voltage_kind == "measured"
-        used[_AT_REST if at_rest else "gain_current"] = meta.u_rel_current or None
+        used[_AT_REST if at_rest else "gain_current"] = amps
     elif any(capture.has(name) for name in _LINES_A):
-        used["gain_current_bench"] = meta.u_rel_current or None
+        used["gain_current_bench"] = amps
     if any(capture.has(name) for name in (*_VOLTS, *_FLUXES)):
         commanded = meta.voltage_kind == "commanded"
-        used["gain_commanded" if commanded else "gain_voltage"] = meta.u_rel_voltage or None
+        used["gain_commanded" if commanded else "gain_voltage"] = volts
     return used
 
 

@@ -99,8 +99,10 @@ class Instrument:
         `drive` or `bench`.
     timing
         How its voltages were sampled: `instant`, `held` or `centred`.
-    meter, ammeter
-        Nuisances that are the gains of voltmeter and current sensors.
+    meter, ammeter, transducer
+        Nuisances that are the gains of voltmeter, current sensors and torque transducer.
+    thermometer
+        Nuisance that is the offset of its thermometers.
     frame
         How long before the middle of its hold the rotor frame of a logged voltage vector is taken
         [holds]: 0 or 0.5.
@@ -123,12 +125,19 @@ class Instrument:
     timing: str
     meter: str = "gain_voltage"
     ammeter: str = "gain_current"
+    transducer: str = "gain_torque"
+    thermometer: str = "offset_temp_k"
     frame: float = 0.0
     stator: bool = False
     points: int = 1
     snapshots: bool = False
     waves: bool = True
     behind: float = 0.0
+
+    @property
+    def commanded(self) -> bool:
+        """Whether its voltage is what a drive commands."""
+        return self.meter.startswith("gain_commanded")
 
 
 @dataclass(frozen=True, slots=True)

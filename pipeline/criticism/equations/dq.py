@@ -171,7 +171,7 @@ def _hold_ends(
     """When the vector that a snapshot shows begins and ends, and the current then
     (`Supply.hold_ends`). A commanded one acts later (`command_lead`).
     """
-    lead = values["command_lead"] if segment.instrument.meter == "gain_commanded" else 0.0
+    lead = values["command_lead"] if segment.instrument.commanded else 0.0
     begin, end = (segment.instrument.frame + lead + part for part in (-0.5, 0.5))
     parts = (begin * x.supply.hold_s / segment.ts_s, end * x.supply.hold_s / segment.ts_s)
     both = current_between(segment, current, model, parts, HOLD_ENDS)
@@ -270,7 +270,7 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     mean: Complex = factor * voltage
     if segment.instrument.frame:
         mean = mean * np.exp(1j * segment.instrument.frame * turn)
-    commanded = segment.instrument.meter == "gain_commanded"
+    commanded = segment.instrument.commanded
     if commanded and (lag := values["frame_lag_s"]):
         mean = mean * x.once(
             x.theta_rad, ("behind", lag), lambda: np.exp(1j * lag * _frame_lag(segment, x))

@@ -119,7 +119,7 @@ def predicted(
     if share := values[UNSAMPLED]:
         change = share * central(pieces.psi_wb, segment.ts_s)
         voltage = voltage + unresolved(segment.recorded["iq_a"]) * change
-    commanded = segment.instrument.meter == "gain_commanded"
+    commanded = segment.instrument.commanded
     if commanded and segment.instrument.timing != "centred" and (lead := values["command_lead"]):
         lead_s = lead * hold_s(segment, x.omega_rad_s, x.machine)
         voltage = voltage + lead_s / segment.ts_s * np.gradient(voltage)

@@ -85,7 +85,9 @@ def measured(_: Segment, signals: Signals, __: Model, ___: Values) -> Array:
     return signals[TORQUE][None]
 
 
-def predicted(_: Segment, x: Operating, pieces: Pieces, model: Model, values: Values) -> Array:
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
     """The torque that the transducer shows [1, n, N·m].
 
     Notes
@@ -97,7 +99,7 @@ def predicted(_: Segment, x: Operating, pieces: Pieces, model: Model, values: Va
     IEEE Std 1812-2014 (tests of permanent magnet machines: torque of a blocked rotor).
 
     """
-    return as_sensed(net_torque(x, pieces, values), model, values)[None]
+    return as_sensed(segment, net_torque(x, pieces, values), model, values)[None]
 
 
 def _parts(current: Array, policy: Tables) -> Indices | None:

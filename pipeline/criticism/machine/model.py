@@ -29,7 +29,7 @@ from pipeline.criticism.machine.coenergy import (
 )
 from pipeline.criticism.machine.sample_period import mean_current
 from pipeline.criticism.operating import Array, Complex, Noted, Operating, Values
-from pipeline.criticism.parameter import BENDING, WARMING, Machine, Parameter
+from pipeline.criticism.parameter import BENDING, THERMOMETER, WARMING, Machine, Parameter
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.priors import Priors
 
@@ -174,6 +174,13 @@ PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 """The base's constants of the station, and of the motor; the others are nuisances of a log."""
 
 
+def _of_further_instrument(name: str) -> Constant:
+    """The nuisance of an instrument beside the first of its kind."""
+    if name.startswith(THERMOMETER):
+        return replace(next(c for c in BASE if c.name == THERMOMETER), name=name)
+    return _gain(name, words="gain of a further instrument")
+
+
 def base_of(machine: Machine) -> tuple[Constant, ...]:
     """The constants of the base model, gains of further instruments that the station has, friction
     that changes with time where it is left free, and temperatures that single captures do not
@@ -188,7 +195,7 @@ def base_of(machine: Machine) -> tuple[Constant, ...]:
     early = tuple(constant for constant in _EARLY if constant.name in machine.stated_u)
     known = {constant.name for constant in (*BASE, *early)}
     further = sorted(set(machine.stated_u) - known)
-    gains = (_gain(name, words="gain of a further instrument") for name in further)
+    gains = (_of_further_instrument(name) for name in further)
     warmth = (
         _unlogged(name, words=f"{column} of {path} over that of others, or its course there")
         for name, (column, path) in machine.unlogged.items()

@@ -283,7 +283,7 @@ class Sampler:
             drag = np.zeros_like(self.start)
             place = self.segment.channels.index(self.equation.torque_in)
             dry, _ = drag_course(self.x, self.values)
-            gain = 1.0 + self.values["gain_torque"]
+            gain = 1.0 + self.values[self.segment.instrument.transducer]
             drag[place] = dry * change.drag_nm * gain / column.step
             return drag if np.any(drag) else None
         model = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))

@@ -59,11 +59,11 @@ def constants_in(segment: Segment, machine: Machine) -> frozenset[str]:
     """
     instrument = segment.instrument
     of_sensors = {
-        "gain_torque": observes_sensor(segment, "load"),
+        instrument.transducer: observes_sensor(segment, "load"),
         LATE_TORQUE: observes_sensor(segment, "load"),
         "gain_lcr": observes_sensor(segment, "lcr"),
         PHASE_LCR: observes_sensor(segment, "lcr"),
-        "offset_temp_k": any(name.startswith("temp_") for name in segment.recorded),
+        instrument.thermometer: any(name.startswith("temp_") for name in segment.recorded),
         "gain_clock": observes_sensor(segment, "clock"),
         instrument.meter: observes_sensor(segment, "voltage"),
         instrument.ammeter: observes_sensor(segment, "current"),

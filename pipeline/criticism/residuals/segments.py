@@ -22,7 +22,7 @@ from pipeline.criticism.machine.model import (
     OPEN_FLUX,
     UNLOGGED_AT_REST,
 )
-from pipeline.criticism.parameter import UNLOGGED, Machine
+from pipeline.criticism.parameter import THERMOMETER, TRANSDUCER, UNLOGGED, Machine
 from pipeline.criticism.residuals.observability import hooks_in
 from pipeline.numerics.coast_setups import Limits, Setup, coast_setups
 from pipeline.records.capture import Campaign, Capture
@@ -180,11 +180,18 @@ def _late_speed(segment: Segment, capture: Capture) -> dict[str, float]:
 
 
 def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:
-    """The segment with the gains of the instruments that recorded it, by kind."""
+    """The segment with the errors of the instruments that recorded it, by kind."""
     volts = gains.get("gain_commanded") or gains.get("gain_voltage", "gain_voltage")
     ammeters = [name for kind, name in gains.items() if kind.startswith("gain_current")]
     amps = ammeters[0] if ammeters else "gain_current"
-    return replace(segment, instrument=replace(segment.instrument, meter=volts, ammeter=amps))
+    instrument = replace(
+        segment.instrument,
+        meter=volts,
+        ammeter=amps,
+        transducer=gains.get(TRANSDUCER, TRANSDUCER),
+        thermometer=gains.get(THERMOMETER, THERMOMETER),
+    )
+    return replace(segment, instrument=instrument)
 
 
 def _by_encoder(segment: Segment, machine: Machine) -> Segment:

@@ -70,7 +70,8 @@ def _full_log(segment: Segment, model: Model, fit: Fit) -> FullLog:
         torque, drag = averaged(x.torque_nm, finer), averaged(drag, finer)
         x = x.at(finer * np.arange(full.size))
         x.torque_em_nm = torque
-    shaft = _true_torque(measured(full, signals, model, values)[-1], model, values)
+    recorded = measured(full, signals, model, values)[-1]
+    shaft = _true_torque(full, recorded, model, values)
     kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
     noise = segment.sensors.noise
     axes = [noise[name] for name in ("id_a", "iq_a") if name in noise]
@@ -79,9 +80,9 @@ def _full_log(segment: Segment, model: Model, fit: Fit) -> FullLog:
     return FullLog(x, drag, shaft, good, noise["theta_mech_rad"], u_shaft, u_air_gap)
 
 
-def _true_torque(recorded: Array, model: Model, values: Values) -> Array:
+def _true_torque(full: Segment, recorded: Array, model: Model, values: Values) -> Array:
     """True shaft torque [n] behind a recorded one: gain and offset of the transducer taken out."""
-    torque = recorded / (1.0 + values["gain_torque"])
+    torque = recorded / (1.0 + values[full.instrument.transducer])
     for shaft, q in reversed(list(model.hooks("shaft", values))):
         offset, at_one = shaft(np.array([0.0, 1.0]), q)
         torque = (torque - offset) / (at_one - offset)

@@ -136,7 +136,7 @@ def _has_held_vectors(segment: Segment, slower_share: float) -> bool:
     A PWM period below `slower_share` of the sample period is one of many in a sample.
     """
     timing, pwm_s = segment.instrument.timing, segment.fixed.get("pwm_s", 0.0)
-    commanded = segment.instrument.meter == "gain_commanded" and pwm_s > 0.0
+    commanded = segment.instrument.commanded and pwm_s > 0.0
     is_open = commanded and (timing == "instant" or pwm_s < slower_share * segment.ts_s)
     return "vd_v" in segment.channels and (timing == "held" or is_open)
 

@@ -253,7 +253,7 @@ def sensed_torque(
     if not segment.instrument.stator and not segment.sensors.held_speed:
         acceleration = second_difference(x.theta_rad[::finer], segment.ts_s)
         torque = torque - values["j_kgm2"] * acceleration
-    return as_sensed(torque, model, values)
+    return as_sensed(segment, torque, model, values)
 
 
 def _of_held(segment: Segment, torque_nm: Array, finer: int) -> Array:
@@ -266,11 +266,13 @@ def _of_held(segment: Segment, torque_nm: Array, finer: int) -> Array:
     return row_means(points[::finer], points, torque_nm)
 
 
-def as_sensed(torque_nm: Array, model: Model, values: Values) -> Array:
+def as_sensed(segment: Segment, torque_nm: Array, model: Model, values: Values) -> Array:
     """A true torque [n, N·m] of the shaft as its transducer shows it.
 
     Parameters
     ----------
+    segment
+        Whose transducer it is.
     torque_nm
         True torque [n].
     model
@@ -286,7 +288,7 @@ def as_sensed(torque_nm: Array, model: Model, values: Values) -> Array:
     """
     for shaft, q in model.hooks("shaft", values):
         torque_nm = shaft(torque_nm, q)
-    return torque_nm * (1.0 + values["gain_torque"])
+    return torque_nm * (1.0 + values[segment.instrument.transducer])
 
 
 def true_load(

@@ -394,7 +394,7 @@ def _warmth(segment: Segment, signals: Signals, name: str, size: int, values: Va
         )
         at = np.linspace(-0.5, 0.5, size)
         return segment.fixed["ambient_k"] + warmed + rise * at + bend * (1.0 - 12.0 * at**2)
-    warm = signals[name] - 25.0 - values["offset_temp_k"]
+    warm = signals[name] - 25.0 - values[segment.instrument.thermometer]
     return _held(warm, size)
 
 

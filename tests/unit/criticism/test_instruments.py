@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
 
 from pipeline.criticism.data.instruments import gains_of, stated_u
 from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.data.segment import Instrument
 from pipeline.criticism.machine.model import Model, base_of
 from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
 from pipeline.criticism.residuals.segments import segments
@@ -110,3 +113,55 @@ def test_what_measures_a_rotor_at_rest_has_an_ammeter_of_its_own(kind, name):
     assert gains["torque_map"]["gain_current"] == "gain_current"
     assert name in gains["heat_run"].values()
     assert stated_u(captures)[name] == 0.001
+
+
+def test_what_another_station_recorded_is_by_other_instruments():
+    """Both state the same uncertainties, and share nothing but the motor."""
+    dq = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_winding_degc")
+    kinds = {"u_rel_torque": 0.003, "u_temp_degc": 1.0, "voltage_kind": "commanded"}
+    captures = tuple(
+        replace(other("torque_map", 0.004, 0.003, *dq, station=at, **kinds), path=at)
+        for at in ("lab", "line")
+    )
+    gains = gains_of(captures)
+    assert gains["lab"] == {kind: kind for kind in gains["lab"]}
+    assert gains["line"] == {kind: f"{kind}_2" for kind in gains["lab"]}
+    assert set(gains["lab"]) == {"gain_current", "gain_commanded", "gain_torque", "offset_temp_k"}
+    u = stated_u(captures)
+    assert u["gain_torque_2"] == u["gain_torque"] == 0.003
+    assert u["offset_temp_k_2"] == u["offset_temp_k"] == 1.0
+    assert u["gain_current_2"] == 0.004 and u["gain_commanded_2"] == 0.003
+
+
+def test_two_stations_may_disagree_by_what_each_states():
+    """With one ammeter for both, R stood between the two at many times their noise."""
+    off = 0.006
+    captures = tuple(
+        replace(one, meta=replace(one.meta, station=one.path))
+        for one in (
+            two_terminals("lab", 0.003, 0.0005, seed=1),
+            two_terminals("line", 0.003, 0.0005, 1.0 + off, seed=2),
+        )
+    )
+    found = machine_of(Campaign("m", captures), Constants())
+    rows = segments(Campaign("m", captures), found)
+    system = first_fit(rough_fit(rows, Model(found, ())))
+    assert system.reduced_chi2(system.residual).max() < 1.3
+    apart = system.fit.values["gain_current_bench_2"] - system.fit.values["gain_current_bench"]
+    assert apart == pytest.approx(off, rel=0.05)
+
+
+def test_a_second_drives_voltage_is_commanded_as_well():
+    assert Instrument("drive", "instant", "gain_commanded_2").commanded
+    assert not Instrument("drive", "instant", "gain_voltage_2").commanded
+
+
+def test_thermometers_of_another_station_have_an_offset_in_kelvin():
+    dq = ("id_a", "iq_a", "vd_v", "vq_v", "temp_winding_degc")
+    stations = (
+        replace(other("torque_map", 0.004, 0.003, *dq, station=at, pole_pairs=3), path=at)
+        for at in ("lab", "line")
+    )
+    found = machine_of(Campaign("m", tuple(stations)), Constants())
+    second = next(c for c in base_of(found) if c.name == "offset_temp_k_2")
+    assert (second.unit, second.curved) == ("K", True)
