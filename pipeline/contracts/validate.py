@@ -15,6 +15,7 @@ from pipeline.contracts.protocol import warning, with_time
 from pipeline.contracts.registry import gates
 from pipeline.contracts.rotor_frame import in_rotor_frame
 from pipeline.contracts.schemas import check_columns, check_metadata, check_tables
+from pipeline.contracts.settled_points import as_settled_points
 from pipeline.numerics.alike import same_but_for_noise
 from pipeline.records.capture import Capture, Mask
 from pipeline.records.errors import CaptureError, merged
@@ -42,6 +43,7 @@ def validate(
     -------
     capture
         With the masks of the gates, with dq columns that the electrical angle makes of the phases',
+        as a `torque_table` where a `torque_map` is one,
         without columns that hold no value, and without a torque that is the current in other units;
         slow streams that were written into a fast table have a table of their own.
     findings
@@ -62,6 +64,7 @@ def validate(
     """
     check_metadata(capture.meta)
     capture, turned = in_rotor_frame(capture)
+    capture, settled = as_settled_points(capture)
     check_columns(capture)
     masks: list[Mask] = []
     capture, unfilled = _filled_rows(capture)
@@ -70,7 +73,7 @@ def validate(
     capture, held = held_apart(capture)
     capture, findings = _without_blanks(capture)
     capture, computed = _without_computed_torque(capture)
-    findings = [*turned, *unfilled, *twice, *held, *findings, *computed]
+    findings = [*turned, *settled, *unfilled, *twice, *held, *findings, *computed]
     refusals: dict[str, CaptureError] = {}
     broken: list[CaptureError] = []
     for gate in gates():

@@ -15,6 +15,7 @@ from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
 CODE = "current_coverage"
+NOISE_MULTIPLE = 10.0
 _PARTS = 100
 """Of a torque map, each with a mean: a ripple averages out in it, and a level does not."""
 
@@ -79,11 +80,24 @@ def _step(capture: Capture, options: Mapping[str, float]) -> Passed:
     )
 
 
-def _torque_map(capture: Capture, options: Mapping[str, float]) -> Passed:
-    current = _finite(capture, "iq_a")["iq_a"]
+def holds_levels(current: Array, times: float = NOISE_MULTIPLE) -> bool:
+    """Whether a current has levels that its scatter from row to row does not hide.
+
+    Parameters
+    ----------
+    current
+        [n, A], finite.
+    times
+        Over the white noise of a mean of a hundredth of the rows [1].
+
+    """
     size = max(current.size // _PARTS, 1)
-    levels = block_means(current, size)
-    if np.ptp(levels) > 2.0 * options["noise_multiple"] * noise_of(current) / np.sqrt(size):
+    reach = float(np.ptp(block_means(current, size)))
+    return reach > 2.0 * times * noise_of(current) / np.sqrt(size)
+
+
+def _torque_map(capture: Capture, options: Mapping[str, float]) -> Passed:
+    if holds_levels(_finite(capture, "iq_a")["iq_a"], options["noise_multiple"]):
         return Passed()
     raise CaptureError(
         CODE,
@@ -150,7 +164,7 @@ GATE = Gate(
     check,
     {
         # Over white noise: the largest of a million samples is 5 sigma; twice that is a signal.
-        "noise_multiple": 10.0,
+        "noise_multiple": NOISE_MULTIPLE,
         # At 0.39 %/K a rise of 5 K moves R by 2 %: ten times what a good meter leaves open.
         "rise_k": 5.0,
     },

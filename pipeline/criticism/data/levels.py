@@ -44,6 +44,32 @@ def set_levels(current: Array, policy: Tables) -> Indices:
     return np.zeros(current.size, dtype=np.int64)
 
 
+def parts_of(current: Array, policy: Tables) -> Indices | None:
+    """Parts of a table that are held out one by one.
+
+    Parameters
+    ----------
+    current
+        [n, A]
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    array [n] or None
+        Number of the level, of a sweep without levels that of its part; None of too few levels.
+
+    """
+    levels = levels_of(current)
+    if levels.max(initial=0) + 1 >= policy.levels:
+        return levels
+    reach = float(np.ptp(current)) if current.size else 0.0
+    if levels.max(initial=0) > 0 or reach == 0.0:
+        return None
+    place = (current - current.min()) / reach * policy.parts
+    return np.minimum(place.astype(np.int64), policy.parts - 1)
+
+
 def levels_of(current: Array, least: float = 0.0) -> Indices:
     """The level that each current is at; levels are separated by a gap between them.
 

@@ -7,19 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.levels import levels_of
+from pipeline.criticism.data.levels import levels_of, parts_of
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
-from pipeline.criticism.operating import Array, Indices, Operating, Signals, Values
+from pipeline.criticism.operating import Array, Operating, Signals, Values
 from pipeline.criticism.parameter import Machine
-from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.signals.shaft import as_sensed, net_torque
 from pipeline.criticism.signals.true_current import table_current
 from pipeline.criticism.signals.true_state import Motion, operating
 from pipeline.records.capture import Capture
 
-TORQUE = "torque_shaft_nm"
+TORQUE, SPEED = "torque_shaft_nm", "omega_mech_rad_s"
 _BESIDE = ("id_a", "theta_mech_rad", "temp_magnet_degc")
 """Columns that are used where they are there."""
 
@@ -37,8 +36,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     Returns
     -------
     Segment or None
-        None with too few levels of current or too few rows; levels, or parts of a sweep, are held
-        out one by one.
+        None with too few levels of current or too few rows, and of a shaft that turns
+        (`steady_points`); levels, or parts of a sweep, are held out one by one.
 
     Notes
     -----
@@ -51,7 +50,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     names = ("iq_a", TORQUE, *(name for name in _BESIDE if capture.has(name)))
     columns = capture.finite(*names)
     policy = machine.policy.tables
-    torque, parts = columns[TORQUE], _parts(columns["iq_a"], policy)
+    if capture.has(SPEED) and np.any(np.nan_to_num(capture.arrays(SPEED)[SPEED])):
+        return None
+    torque, parts = columns[TORQUE], parts_of(columns["iq_a"], policy)
     noise = None if parts is None else _noise(columns, policy.reading)
     if noise is None:
         return None
@@ -100,18 +101,6 @@ def predicted(
 
     """
     return as_sensed(segment, net_torque(x, pieces, values), model, values)[None]
-
-
-def _parts(current: Array, policy: Tables) -> Indices | None:
-    """Number of the level [n], of a sweep without levels that of its part; None of too few."""
-    levels = levels_of(current)
-    if levels.max(initial=0) + 1 >= policy.levels:
-        return levels
-    reach = float(np.ptp(current)) if current.size else 0.0
-    if levels.max(initial=0) > 0 or reach == 0.0:
-        return None
-    place = (current - current.min()) / reach * policy.parts
-    return np.minimum(place.astype(np.int64), policy.parts - 1)
 
 
 def _noise(columns: Signals, reading: float) -> float | None:

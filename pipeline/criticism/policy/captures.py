@@ -347,6 +347,10 @@ class Tables:
     order_sectors : 1
         fewest sectors by which orders are found
         chosen: their scatter is known well enough
+    turn_points : 1
+        angles of a turn by which a row of a turning shaft's table is predicted
+        chosen: what has an order of the shaft's turn is in its mean by a tenth at the most, and has
+        another phase in each row
 
     """
 
@@ -367,3 +371,4 @@ class Tables:
     orders: int = 12
     order_u: float = 3.0
     order_sectors: int = 6
+    turn_points: int = 16

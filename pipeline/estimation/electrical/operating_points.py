@@ -16,12 +16,13 @@ from pipeline.estimation.uncertainty.instruments import current_source, torque_s
 from pipeline.estimation.uncertainty.instruments import voltage_source as source_of_voltage
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import find_plateaus, white_noise_sigma
-from pipeline.records.capture import Array, Capture
+from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 
 MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
 TURN_RAD = 2.0 * np.pi
+SPEED = "omega_mech_rad_s"
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +149,19 @@ class PointTable:
         """
         return np.array([getattr(point, name) for point in self.points], dtype=np.float64)
 
+    def beside(self, other: PointTable) -> PointTable:
+        """These points and others, those of one speed in one group.
+
+        Parameters
+        ----------
+        other
+            Of further captures.
+
+        """
+        points = tuple(_numbered([*self.points, *other.points]))
+        settled = self.settled_rows + other.settled_rows
+        return PointTable(points, settled, self.rows + other.rows)
+
     def note(self) -> str:
         """The mask, counted."""
         dropped = self.rows - self.settled_rows
@@ -196,6 +210,88 @@ def operating_points(
             points.append(replace(point, ripple_nm=ripple, u_ripple_nm=u))
     numbered = _numbered(points)
     return PointTable(tuple(numbered), sum(p.rows for p in numbered), total)
+
+
+def turning_tables(campaign: Campaign) -> list[Capture]:
+    """Tables of settled points of a shaft that turns.
+
+    Parameters
+    ----------
+    campaign
+        Captures of one motor.
+
+    Returns
+    -------
+    list of Capture
+        Those of `torque_table` with a speed; without one the shaft was clamped.
+
+    """
+    return [c for c in campaign.of("torque_table") if is_turning(c)]
+
+
+def is_turning(capture: Capture) -> bool:
+    """Whether a table has a speed that is not zero.
+
+    Parameters
+    ----------
+    capture
+        A `torque_table`.
+
+    """
+    speed = capture.arrays(SPEED)[SPEED] if capture.has(SPEED) else np.zeros(0)
+    return bool(np.any(np.abs(speed[np.isfinite(speed)]) > 0.0))
+
+
+def table_points(captures: Sequence[Capture]) -> PointTable:
+    """The rows of tables as settled points, each the mean of one.
+
+    Parameters
+    ----------
+    captures
+        `turning_tables`.
+
+    Returns
+    -------
+    PointTable
+        Every row that holds speed, q current and torque.
+
+    """
+    points = []
+    for capture in captures:
+        names = (SPEED, "iq_a", "torque_shaft_nm")
+        beside = ("id_a", "vd_v", "vq_v", "temp_magnet_degc")
+        there = (name for name in beside if capture.has(name))
+        columns = capture.finite(*names, *there, needed=names)
+        size = columns["iq_a"].size
+        usual = {"id_a": 0.0, "temp_magnet_degc": assumed_temperature(capture)}
+        columns = {n: np.full(size, usual.get(n, np.nan)) for n in beside} | columns
+        for name, value in usual.items():
+            columns[name] = np.where(np.isfinite(columns[name]), columns[name], value)
+        points += [
+            _row_point(capture, {n: float(c[k]) for n, c in columns.items()}) for k in range(size)
+        ]
+    numbered = _numbered(points)
+    return PointTable(tuple(numbered), len(numbered), len(numbered))
+
+
+def _row_point(capture: Capture, row: Mapping[str, float]) -> Point:
+    return Point(
+        group=0,
+        rows=1,
+        omega_mech_rad_s=row[SPEED],
+        id_a=row["id_a"],
+        iq_a=row["iq_a"],
+        vd_v=row["vd_v"],
+        vq_v=row["vq_v"],
+        torque_nm=row["torque_shaft_nm"],
+        u_vd_v=float("nan"),
+        u_vq_v=float("nan"),
+        temp_magnet_degc=row["temp_magnet_degc"],
+        cos_turn=0.0,
+        sin_turn=0.0,
+        period_s=float("nan"),
+        capture=capture,
+    )
 
 
 def _numbered(points: Sequence[Point]) -> list[Point]:

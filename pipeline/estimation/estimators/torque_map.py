@@ -14,6 +14,8 @@ from pipeline.estimation.electrical.operating_points import (
     PointTable,
     operating_points,
     pole_pairs_of,
+    table_points,
+    turning_tables,
 )
 from pipeline.estimation.electrical.ripple_torque import RIPPLE
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, angle_doubt, standstill_words
@@ -100,6 +102,10 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "torque_shaft_nm")]
     pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
     table = operating_points(captures, pairs, known.best("r_phase_ohm"))
+    tables = turning_tables(campaign)
+    if tables:
+        table = table.beside(table_points(tables))
+        captures += tables
     points = [
         p for p in table.points if np.isfinite(p.torque_nm) and np.isfinite(p.temp_magnet_degc)
     ]
@@ -432,7 +438,7 @@ def _column(points: Sequence[Point], name: str) -> Array:
 ESTIMATOR = Estimator(
     name=METHOD.name,
     gives=GIVES,
-    tests=("torque_map",),
+    tests=("torque_map", "torque_table"),
     experiment=EXPERIMENT,
     fit=fit,
     uses=("pole_pairs", "temp_coeff_magnet_1_k", "lq_h", "r_phase_ohm", *HARMONICS),
