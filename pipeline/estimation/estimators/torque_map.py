@@ -159,8 +159,8 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
         Columns that enter where a test asks for them: saturation (odd powers of i_q, even and odd
         ones of i_d), a frame that is turned (i_d, i_q² - i_d²), the more the faster where currents
         are late (the same times ω), or wobbles (an eccentric encoder: i_d cos θ, i_d sin θ),
-        friction in proportion to torque, and the acceleration of a shaft that the dynamometer lets
-        give way, whose coefficient is -J.
+        friction in proportion to torque, of the magnet and of reluctance, and the acceleration of a
+        shaft that the dynamometer lets give way, whose coefficient is -J.
 
     Notes
     -----
@@ -190,6 +190,7 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
             "id sense": i_d * sense,
             "id cos": i_d * _column(points, "cos_turn"),
             "id sin": i_d * _column(points, "sin_turn"),
+            "|iq| id sense": np.abs(i_q) * i_d * sense,
             "id^2 iq": i_d**2 * i_q,
             "id iq^3": i_d * i_q**3,
             "id^3 iq": i_d**3 * i_q,

@@ -111,6 +111,7 @@ def test_columns_of_the_torque() -> None:
     assert base["id iq"].tolist() == [-2.0, -12.0]
     expected = {
         "iq^3": [8.0, -64.0], "iq^5": [32.0, -1024.0], "|iq| sense": [-2.0, 4.0],
+        "|iq| id sense": [2.0, 12.0],
         "id": [-1.0, 3.0], "id sense": [1.0, 3.0], "id cos": [-0.5, 0.0], "id sin": [0.25, 0.0],
         "id^2 iq": [2.0, -36.0], "id iq^3": [-8.0, -192.0], "id^3 iq": [-2.0, -108.0],
         "id^2 iq^3": [8.0, -576.0], "iq^2 - id^2": [3.0, 7.0],
