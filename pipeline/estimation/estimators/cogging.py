@@ -70,7 +70,10 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     counting = of_still_shaft(counting, captures, known.best("j_rotor_kgm2"))
     by_cause = *part_orders(counting, known, campaign), unexplained
     estimates = _cogging(captures, spec, by_cause, known, campaign, options)
-    estimates += (_friction(captures, turns, spec, known),)
+    friction = _friction(captures, turns, spec, known)
+    top, parted = _top_speed_rad_s(campaign), _parted(known)
+    creep = mean_speed_rad_s(captures)
+    estimates += (friction if parted else _with_viscous_doubt(friction, creep, top),)
     return Fit(estimates, _evidence(turns, spec, by_cause[0]))
 
 
@@ -229,10 +232,36 @@ def _friction(
     return torque if speed is None else replace(torque, at={"omega_mech_rad_s": speed})
 
 
+def _with_viscous_doubt(friction: Estimate, creep: float | None, top: float) -> Estimate:
+    """Dry friction at a creep speed [rad/s] with an allowance for the viscous part.
+
+    Viscous drag at the highest speed `top` [rad/s] is between nothing and `viscous_at_top` times
+    the dry one, and in proportion to speed below.
+    """
+    if not friction.known or creep is None or top <= creep:
+        return friction
+    most = policy().cogging.viscous_at_top * creep / top * friction.number
+    part = Contribution("assumed:viscous_share", most / np.sqrt(3.0), "B")
+    return replace(friction, budget=(*friction.budget, part))
+
+
+def _top_speed_rad_s(campaign: Campaign) -> float:
+    """Highest speed that captures of a campaign have; 0 of none."""
+    name = "omega_mech_rad_s"
+    speeds = [capture.arrays(name)[name] for capture in campaign.captures if capture.has(name)]
+    return max((float(np.nanmax(np.abs(s))) for s in speeds if np.isfinite(s).any()), default=0.0)
+
+
+def _parted(known: Constants) -> bool:
+    """Whether a coast parts viscous from dry friction."""
+    coulomb, viscous = known.best("coast_coulomb_rad_s2"), known.best("coast_viscous_1_s")
+    return coulomb is not None and viscous is not None and coulomb.number > 0.0
+
+
 def _viscous_share(speed_rad_s: float | None, known: Constants) -> tuple[float, str]:
     """Share of the drag at this speed that is viscous, by the coast-down's ratio B/T_c."""
     coulomb, viscous = known.best("coast_coulomb_rad_s2"), known.best("coast_viscous_1_s")
-    if speed_rad_s is None or coulomb is None or viscous is None or coulomb.number <= 0.0:
+    if speed_rad_s is None or coulomb is None or viscous is None or not _parted(known):
         return 0.0, " and the viscous part"
     slope = max(viscous.number, 0.0) * speed_rad_s
     return slope / (coulomb.number + slope), ", the viscous part taken off by the coast-down"

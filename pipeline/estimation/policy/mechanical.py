@@ -329,6 +329,9 @@ class Cogging:
     friction_level : 1
         chance of turns' means to scatter beyond the noise
         derived: beyond the 99 % interval
+    viscous_at_top : 1
+        viscous drag at the highest speed over dry friction, at the most
+        chosen: of rolling bearings with grease the two are alike; a part of twice as much is rare
     sectors : 1
         sectors of a turn, half of which are held out
         derived: a prime, of whose squares the pattern has a flat spectrum (Schroeder, Number Theory
@@ -343,5 +346,6 @@ class Cogging:
     level: float = 0.01
     stranger_level: float = 1e-6
     friction_level: float = 0.01
+    viscous_at_top: float = 2.0
     sectors: int = 61
     replicates: int = 200

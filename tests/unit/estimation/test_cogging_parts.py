@@ -75,6 +75,19 @@ def test_the_viscous_part_is_taken_off_by_the_coast_down() -> None:
     assert found.u_a == pytest.approx(plain.u_a * 30.0 / 32.0)
 
 
+def test_without_a_coast_a_viscous_part_is_in_doubt_by_how_fast_the_creep_is() -> None:
+    """A fortieth of the top speed: viscous drag of twice the dry one there is 5 % at the creep."""
+    spin = capture("open_circuit", "spin", t_s=np.arange(3.0), omega_mech_rad_s=np.full(3, -20.0))
+    top = cogging._top_speed_rad_s(Campaign("m", (creeping(), spin)))
+    assert top == 20.0 and cogging._top_speed_rad_s(Campaign("m", (creeping(),))) == 0.0
+    friction = cogging._friction([creeping()], [], spectrum_of([-1.0], [1.0]), Constants())
+    found = cogging._with_viscous_doubt(friction, 0.5, top)
+    (part,) = set(found.budget) - set(friction.budget)
+    assert part.u == pytest.approx(0.05 * friction.number / math.sqrt(3.0))
+    assert cogging._with_viscous_doubt(friction, 0.5, 0.0) is friction
+    assert cogging._with_viscous_doubt(friction, None, top) is friction
+
+
 def test_a_torque_that_drives_the_motion_is_no_friction() -> None:
     spec = spectrum_of([1.0, 1.01], [-1.0, -1.01])
     assert "sign of torque_shaft_nm" in cogging._friction([creeping()], [], spec, Constants()).note
