@@ -79,7 +79,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if not turning and capture.meta.test != "heat_run":
         return None
     angle = not ANGLES.isdisjoint(names)
-    held = not angle and capture.meta.test == "torque_map"
+    held = not angle and capture.meta.test != "heat_run"
     torque = capture.has("torque_shaft_nm") and turning and (angle or held)
     names += ["torque_shaft_nm"] if torque else []
     policy = machine.policy.cutting

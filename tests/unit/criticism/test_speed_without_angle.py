@@ -141,9 +141,10 @@ def held_map(test: str, sag_rad_s: float = 0.0) -> Capture:
     return Capture("map.csv", "1", "verified", CaptureMeta("m", test, pole_pairs=7), (table,))
 
 
-def test_a_torque_beside_a_speed_that_is_held_counts_without_inertia() -> None:
+@pytest.mark.parametrize("test", ["torque_map", "drive"])
+def test_a_torque_beside_a_speed_that_is_held_counts_without_inertia(test: str) -> None:
     """Where the speed changes is left out; the noise of a speed times J would be a torque."""
-    segment = cut(held_map("torque_map"), machine())
+    segment = cut(held_map(test), machine())
     assert segment is not None and segment.weak is not None
     assert "torque_shaft_nm" in segment.channels
     middle = segment.recorded["t_s"][segment.weak.starts + segment.weak.length // 2]
@@ -159,9 +160,9 @@ def test_a_torque_beside_a_speed_that_is_held_counts_without_inertia() -> None:
     assert np.array_equal(*missed)
 
 
-@pytest.mark.parametrize(("test", "sag_rad_s"), [("drive", 0.0), ("torque_map", 2.0)])
-def test_a_torque_beside_a_speed_that_moves_needs_the_angle(test: str, sag_rad_s: float) -> None:
-    segment = cut(held_map(test, sag_rad_s), machine())
+@pytest.mark.parametrize("test", ["torque_map", "drive"])
+def test_a_torque_beside_a_speed_that_moves_needs_the_angle(test: str) -> None:
+    segment = cut(held_map(test, 2.0), machine())
     assert segment is not None and segment.weak is not None
     assert "torque_shaft_nm" not in segment.channels
     assert segment.weak.starts.size
