@@ -13,7 +13,7 @@ from pipeline.contracts.protocol import warning
 from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES, PHASE_VOLTAGES
 from pipeline.numerics.turning_voltage import magnet_angle, speed_of, turning_voltage
 from pipeline.physics.frames import Array, Complex, vector_of_lines, vector_of_phases
-from pipeline.records.capture import Capture
+from pipeline.records.capture import U_ZERO, Capture
 from pipeline.records.finding import Finding
 
 TESTS = ("drive", "torque_map")
@@ -29,11 +29,12 @@ _CURRENTS, _VOLTAGES = ("id_a", "iq_a"), ("vd_v", "vq_v")
 
 class Frame(NamedTuple):
     """The electrical angle of a table's rows [rad], None where there is none; on what it rests, or
-    why there is none.
+    why there is none; and the standard uncertainty of its zero [rad].
     """
 
     angle_rad: Array | None
     words: str
+    u_rad: float = 0.0
 
 
 def in_rotor_frame(capture: Capture) -> tuple[Capture, list[Finding]]:
@@ -49,7 +50,8 @@ def in_rotor_frame(capture: Capture) -> tuple[Capture, list[Finding]]:
     capture
         With `id_a`, `iq_a` in every table of two line currents and an electrical angle, and `vd_v`,
         `vq_v` where two voltages of phases or lines are there too and none of the drive's own; as
-        it was where some table has dq currents, or in tests that are not of a turning machine.
+        it was where some table has dq currents, or in tests that are not of a turning machine. The
+        standard uncertainty of a zero that the back-EMF shows is in its metadata (`U_ZERO`).
     findings
         One that says so.
 
@@ -76,7 +78,10 @@ def in_rotor_frame(capture: Capture) -> tuple[Capture, list[Finding]]:
     basis = next(frame.words for frame in frames if frame.angle_rad is not None)
     words = f"{', '.join(added)} are made of the phases by {basis}"
     remedy = "log dq currents of the drive, or see that the angle is 0 with the magnet on phase a"
-    return replace(capture, tables=tables), [warning(capture, "rotor_frame", words, remedy)]
+    u_rad = max(frame.u_rad for frame in frames)
+    extra = {**capture.meta.extra, **({U_ZERO: repr(u_rad)} if u_rad else {})}
+    capture = replace(capture, tables=tables, meta=replace(capture.meta, extra=extra))
+    return capture, [warning(capture, "rotor_frame", words, remedy)]
 
 
 def rotor_frame(table: pl.DataFrame, pole_pairs: int | None) -> Frame:
@@ -132,7 +137,7 @@ def _by_back_emf(
         return Frame(None, words)
     angle = pairs * theta_rad + zero.offset_rad
     basis = f"{pairs} {SHAFT} {zero.offset_rad:+.4f} ± {zero.u_rad:.1g} rad"
-    return Frame(angle, f"{basis}, by the back-EMF in their voltages")
+    return Frame(angle, f"{basis}, by the back-EMF in their voltages", float(zero.u_rad))
 
 
 def stator_voltage(table: pl.DataFrame) -> Complex | None:

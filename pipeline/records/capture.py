@@ -29,6 +29,8 @@ _ALTERNATING = frozenset(
 """Columns that go through zero twice an electrical turn."""
 
 
+U_ZERO = "u_zero_angle_rad"
+"""Key of the standard uncertainty of a rotor frame's zero [rad] that voltages show."""
 # Standard uncertainty (k=1) of an instrument that states none, by metadata key: a gain [1] of a
 # percent, a thermometer [K] of two kelvin, a time base of 100 ppm: crystals are cut to 20 to 50 ppm
 # at 25 degC and drift as much again over temperature and age (Vig, Quartz Crystal Resonators and

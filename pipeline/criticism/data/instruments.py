@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 
 from pipeline.criticism.parameter import THERMOMETER, TRANSDUCER
-from pipeline.records.capture import Capture, CaptureMeta
+from pipeline.records.capture import U_ZERO, Capture, CaptureMeta
 
 _AXES_A = ("id_a", "iq_a")
 _LINES_A = ("ia_a", "ib_a", "ic_a")
@@ -83,6 +83,7 @@ def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
             ("gain_lcr", _u_lcr(meta)),
             ("phase_lcr_rad", _u_lcr(meta)),
             ("gain_clock", meta.u_rel_clock),
+            ("zero_angle_rad", meta.stated_u_rel(U_ZERO)),
         ):
             if one:
                 stated[name] = max(stated.get(name, 0.0), one)

@@ -145,6 +145,8 @@ _NOTHING = 1e-6
 """Share of its usual size that a nuisance keeps beside an effect that names it."""
 PHASE_LCR = "phase_lcr_rad"
 """Nuisance of an LCR meter, whose resistance it makes unsure by as much as Q times its gain."""
+ENCODER_ZERO = "zero_angle_rad"
+"""Nuisance of a drive's encoder, which another mount changes."""
 LATE_TORQUE = "late_torque_s"
 """Nuisance of every transducer: its filter."""
 LATE_SPEED = "late_speed_s"
@@ -266,6 +268,8 @@ class Model:
             for c, u in base
             if u is not None
         }
+        center, least = priors[ENCODER_ZERO]
+        priors[ENCODER_ZERO] = center, max(least, self.policy.priors.zero_angle_rad)
         center, least = priors["lead_ohm"]
         switches = self.policy.priors.lead_share * sizes.get("impedance_ohm", 0.0)
         priors["lead_ohm"] = center, stated.get("lead_ohm", max(least, switches))

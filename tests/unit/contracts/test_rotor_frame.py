@@ -11,8 +11,11 @@ import polars as pl
 import pytest
 
 from pipeline.contracts.validate import validate
-from pipeline.records.capture import Capture, CaptureMeta
+from pipeline.criticism.data.instruments import stated_u
+from pipeline.criticism.machine.model import Model
+from pipeline.records.capture import U_ZERO, Capture, CaptureMeta
 from pipeline.records.errors import CaptureError
+from tests.unit.criticism.machines import machine
 
 THIRD = 2.0 * math.pi / 3.0
 N = 4000
@@ -166,3 +169,20 @@ def test_one_speed_does_not_show_the_angle() -> None:
     """The current's voltage and a delay's are not parted from the magnet's."""
     with pytest.raises(CaptureError, match="turn in both senses, at changing speed"):
         validate(motor(lambda t: 60.0 + 0.0 * t)[0], {})
+
+
+def test_the_doubt_of_a_zero_that_the_back_emf_shows_goes_with_the_capture() -> None:
+    """Few milliradians, which an alignment of one does not cover."""
+    shown, _ = validate(motor(both_ways, pole_pairs=PAIRS)[0], {})
+    u_rad = float(shown.meta.extra[U_ZERO])
+    assert 1e-5 < u_rad < 0.02
+    assert stated_u((shown,))["zero_angle_rad"] == u_rad
+    logged, _ = validate(log(), {})
+    assert U_ZERO not in logged.meta.extra
+    assert "zero_angle_rad" not in stated_u((logged,))
+
+
+@pytest.mark.parametrize(("u_rad", "prior"), [(6e-3, 6e-3), (1e-4, 1e-3)])
+def test_a_zero_is_known_as_well_as_the_voltages_show_it_and_no_better_than_a_drives(u_rad, prior):
+    stated = replace(machine(), stated_u={"zero_angle_rad": u_rad})
+    assert Model(stated, ()).priors()["zero_angle_rad"] == (0.0, prior)
