@@ -17,7 +17,7 @@ from itertools import compress
 
 import numpy as np
 
-from pipeline.criticism.machine.model import BASE, PHYSICAL
+from pipeline.criticism.machine.model import BASE, ENCODER_ZERO, PHYSICAL
 from pipeline.criticism.operating import Array
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
@@ -105,8 +105,11 @@ def changed_constant(system: LinearSystem) -> Change | None:
 
 def _refitted(system: LinearSystem, change: Change) -> Change:
     """The change by a fit of either part of the captures: a large one is not of first order, as the
-    residual of a free shaft goes with 1/J. As it was, where a part alone does not determine it.
+    residual of a free shaft goes with 1/J. As it was, where a part alone does not determine it, and
+    of an encoder's zero: its prior, of a drive's own alignment, holds it in a fit.
     """
+    if change.name == ENCODER_ZERO:
+        return change
     fit, values, u = system.fit, [], []
     for inside in (False, True):
         part = [(segment.capture in change.captures) == inside for segment in fit.segments]
@@ -155,10 +158,12 @@ def _changes(system: LinearSystem) -> Iterator[Change]:
 
 
 def may_change(system: LinearSystem, name: str) -> bool:
-    """Constants of the machine, and amplitudes without a usual value."""
+    """Constants of the machine, the zero of the drive's encoder, and amplitudes without a usual
+    value.
+    """
     known = system.fit.model.parameters()
     if name not in known:
-        return name in PHYSICAL
+        return name in PHYSICAL or name == ENCODER_ZERO
     _, parameter = known[name]
     return parameter.amplitude and parameter.usual is None
 

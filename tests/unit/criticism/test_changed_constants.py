@@ -65,6 +65,23 @@ def test_the_constant_its_size_and_the_captures_are_told(name, share, changed):
     assert ("higher" if share > 0.0 else "lower") in found.words
 
 
+def test_an_encoder_that_was_mounted_again_has_another_zero():
+    """Currents and voltages are then turned by it: no constant of the machine says that."""
+    segments = list(captures(()))
+    for n in (1, 4):
+        turned = dict(segments[n].recorded)
+        for kind, unit in (("i", "a"), ("v", "v")):
+            names = f"{kind}d_{unit}", f"{kind}q_{unit}"
+            vector = (turned[names[0]] + 1j * turned[names[1]]) * np.exp(-0.03j)
+            turned |= dict(zip(names, (vector.real, vector.imag), strict=True))
+        segments[n] = replace(segments[n], recorded=turned)
+    found = change(tuple(segments))
+    assert found is not None
+    assert found.name == "zero_angle_rad"
+    assert found.captures == ("log_1", "log_4")
+    assert found.difference == pytest.approx(0.03, rel=0.05)
+
+
 def test_a_large_change_is_that_of_a_fit_of_either_part():
     """A disc that doubles the inertia was told as half of it: acceleration goes with 1/J."""
     sound = replace(design("servo-ipm"), effects={})
