@@ -33,23 +33,22 @@ def as_settled_points(capture: Capture) -> tuple[Capture, list[Finding]]:
     Returns
     -------
     capture
-        The same, unless it is a torque map without a clock, or one whose current changes from row
-        to row while the torque follows it row by row: logs hold a level for some rows, or pass from
-        one to the next, and what an inductance or an inertia takes while they do parts torque and
-        voltage from the current. Efficiency maps and tables of a dynamometer are such.
+        The same, unless it is a torque map whose current changes from row to row while the torque
+        follows it row by row, with a clock or without: a log holds a level for some rows, or passes
+        from one to the next. Efficiency maps and tables of a dynamometer are such.
     findings
         The warning.
 
     """
     if capture.meta.test != "torque_map" or not {CURRENT, TORQUE, SPEED} <= capture.columns:
         return capture, []
-    if CLOCK in capture.columns:
-        if len(capture.tables) > 1 or not _are_points(capture):
-            return capture, []
-        words = "current changes from row to row, and torque follows it row by row"
-    else:
-        words = "no t_s"
-    words += ": every row counts as a settled point, as in a torque_table"
+    if len(capture.tables) > 1 or not _are_points(capture):
+        return capture, []
+    clock = "" if CLOCK in capture.columns else "there is no t_s, "
+    words = (
+        f"{clock}current changes from row to row, and torque follows it row by row: every row "
+        "counts as a settled point, as in a torque_table"
+    )
     remedy = "state test: torque_table; of a log, hold each level for longer or log faster"
     return (
         replace(capture, meta=replace(capture.meta, test="torque_table")),

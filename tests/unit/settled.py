@@ -20,6 +20,7 @@ def settled(
     load_share: float = 0.0,
     windage: float = 0.0,
     knee_a: float = 0.0,
+    volts: float = 5e-3,
     seed: int = 1,
     **meta,
 ) -> Capture:
@@ -40,8 +41,8 @@ def settled(
         "omega_mech_rad_s": w,
         "id_a": i_d,
         "iq_a": i_q,
-        "vd_v": R_OHM * i_d - PAIRS * w * psi_q + 5e-3 * noise[0],
-        "vq_v": R_OHM * i_q + PAIRS * w * psi_d + 5e-3 * noise[1],
+        "vd_v": R_OHM * i_d - PAIRS * w * psi_q + volts * noise[0],
+        "vq_v": R_OHM * i_q + PAIRS * w * psi_d + volts * noise[1],
         "torque_shaft_nm": torque + 1e-3 * noise[2],
         "temp_winding_degc": np.full(w.size, 25.0),
         "temp_magnet_degc": np.full(w.size, 25.0),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -145,6 +146,7 @@ def steady_voltage(rows: _Rows, magnet_1_k: float) -> tuple[Array, dict[str, Arr
     return base, candidates
 
 
+FIRST_BENDS = ("iq^3", "id^2")
 BENDING = ("iq^3", "iq^5", "id^2", "id^3", "id iq^2", "id^2 iq^2")
 
 
@@ -154,7 +156,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     Notes
     -----
     A row is a settled point, so no derivative is in it. Saturation and errors of the frame join
-    where the data demand them; what the last term of saturation moves is in u, half of it.
+    where the data demand them. What the last term of saturation moves is in u, half of it, and what
+    the first one would, where none is demanded (rectangular, GUM 4.3.7).
 
     """
     tables = [c for c in turning_tables(campaign) if c.has(*COLUMNS)]
@@ -165,7 +168,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     alpha, alpha_budget = magnet_coefficient(known)
     chosen = _chosen(rows, alpha, options["level"])
     found = _solved(rows, alpha, chosen)
-    used = _solved_without(rows, alpha, chosen)
+    shorter, longer = _solved_without(rows, alpha, chosen), _solved_beside(rows, alpha, chosen)
     parts = _instruments(rows, alpha, chosen)
     slope = (_solved(rows, alpha + STEP_1_K, chosen).coefficients - found.coefficients) / STEP_1_K
     notes = ["settled points", allowed_for(chosen), unlogged_note(tables)]
@@ -176,10 +179,12 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         if not np.isfinite(u) or not _apart(rows, alpha, chosen, place):
             estimates.append(METHOD.missing(name, EXPERIMENT))
             continue
-        form = 0.5 * max((abs(float(c[place]) - value) for c in used), default=0.0)
+        form = 0.5 * max((abs(float(c[place]) - value) for c in shorter), default=0.0)
+        moved = (math.hypot(float(f.coefficients[place]) - value, f.u(place)) for f in longer)
+        unseen = max(moved, default=0.0) / math.sqrt(3.0)
         budget = [
             METHOD.scatter(name, u, found.dof),
-            Contribution("assumed:saturation_form", form, "B"),
+            Contribution("assumed:saturation_form", math.hypot(form, unseen), "B"),
             *propagate([(float(slope[place]), alpha_budget)]),
             *parts[place],
         ]
@@ -248,6 +253,15 @@ def _solved_without(rows: _Rows, alpha: float, chosen: Sequence[str]) -> list[Ar
     bent = [name for name in chosen if name in BENDING][-2:]
     shorter = ([name for name in chosen if name != omitted] for omitted in bent)
     return [_solved(rows, alpha, names).coefficients for names in shorter]
+
+
+def _solved_beside(rows: _Rows, alpha: float, chosen: Sequence[str]) -> list[LinearFit]:
+    """The fits with the first term of saturation of each axis that no test asks for: noise
+    may hide it, and it is in the slope of a straight line all the same.
+    """
+    straight = [name for name in FIRST_BENDS if name not in chosen]
+    ends = (_solved(rows, alpha, [*chosen, name]) for name in straight)
+    return [end for end in ends if end.full_rank]
 
 
 def _instruments(rows: _Rows, alpha: float, chosen: Sequence[str]) -> list[list[Contribution]]:

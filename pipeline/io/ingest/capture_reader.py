@@ -77,7 +77,8 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
     else:
         raw, source, verified = _read_csv(content, entry)
     starts = common_starts(raw, source)
-    timed = meta.test not in TESTS_WITHOUT_CLOCK
+    # a torque map may be a table of settled points, which its rows show
+    timed = meta.test not in {*TESTS_WITHOUT_CLOCK, "torque_map"}
     framed = (to_frame(table, source, meta.pole_pairs, starts, timed=timed) for table in raw)
     frames = [frame for frame in framed if frame is not None]
     if source is not None:

@@ -11,6 +11,7 @@ import pytest
 from pipeline.contracts.registry import gates
 from pipeline.contracts.settled_points import as_settled_points
 from pipeline.contracts.validate import validate
+from pipeline.records.errors import CaptureError
 from tests.unit.settled import settled
 
 
@@ -20,6 +21,15 @@ def test_a_map_of_settled_points_is_read_as_a_table(clock):
     capture, findings = validate(settled("torque_map", clock=clock), {})
     assert capture.meta.test == "torque_table"
     assert [f.code for f in findings].count("settled_points") == 1
+
+
+def test_levels_that_are_held_need_a_clock():
+    """A log without a clock may be anything: its rows are no settled points."""
+    made = settled("torque_map")
+    (table,) = made.tables
+    held = table[np.repeat(np.arange(table.height), 40)]
+    with pytest.raises(CaptureError, match="t_s"):
+        validate(replace(made, tables=(held,)), {})
 
 
 def test_a_sorted_one_as_well():

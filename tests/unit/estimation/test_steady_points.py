@@ -44,6 +44,13 @@ def test_iron_that_saturates_bends_the_flux_of_q_and_not_its_slope_at_no_current
     assert_right(found, TRUE, 0.05)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_bend_that_noise_hides_is_in_doubt(seed):
+    """It is in the slope of a straight line: L_q was too small at up to 11 u."""
+    found = fitted(steady_points, settled(knee_a=24.0, volts=0.5, seed=seed))
+    assert abs(found["lq_h"].number - LQ_H) < 3.0 * found["lq_h"].u
+
+
 def test_one_sense_of_rotation_and_one_of_torque_are_enough():
     found = fitted(steady_points, settled(speeds=(60.0, 150.0)))
     assert_right(found, TRUE)

@@ -341,12 +341,14 @@ def test_blocks_without_t_s_are_refused_unless_a_map_states_the_increment(tmp_pa
     assert table["omega_mech_rad_s"].to_list() == [0, 1, 2, 3, 4, 5]
 
 
-def test_blocks_of_a_test_without_a_clock_need_no_t_s(tmp_path: Path) -> None:
+@pytest.mark.parametrize("test", ["lcr", "torque_map"])
+def test_blocks_of_a_test_without_a_clock_need_no_t_s(tmp_path: Path, test: str) -> None:
+    """A torque map may be a table of settled points."""
     rows = [
         ("/s", START_NS + n, json.dumps({"theta_elec_deg": [30 * n, 15], "lab_h": [2, 3]}).encode())
         for n in range(2)
     ]
-    found = fill(tmp_path, a__mcap=mcap_file(rows, metadata=META | {"test": "lcr"}))
+    found = fill(tmp_path, a__mcap=mcap_file(rows, metadata=META | {"test": test}))
     (table,) = captures(tmp_path, found)[0].tables
     assert table["theta_elec_deg"].to_list() == [0.0, 15.0, 30.0, 15.0]
     assert "t_s" not in table.columns
