@@ -71,9 +71,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     by_cause = *part_orders(counting, known, campaign), unexplained
     estimates = _cogging(captures, spec, by_cause, known, campaign, options)
     friction = _friction(captures, turns, spec, known)
-    top, parted = _top_speed_rad_s(campaign), _parted(known)
+    top, by_coast = _top_speed_rad_s(campaign), _coast_known(known)
     creep = mean_speed_rad_s(captures)
-    estimates += (friction if parted else _with_viscous_doubt(friction, creep, top),)
+    estimates += (friction if by_coast else _with_viscous_doubt(friction, creep, top),)
     return Fit(estimates, _evidence(turns, spec, by_cause[0]))
 
 
@@ -252,7 +252,7 @@ def _top_speed_rad_s(campaign: Campaign) -> float:
     return max((float(np.nanmax(np.abs(s))) for s in speeds if np.isfinite(s).any()), default=0.0)
 
 
-def _parted(known: Constants) -> bool:
+def _coast_known(known: Constants) -> bool:
     """Whether a coast parts viscous from dry friction."""
     coulomb, viscous = known.best("coast_coulomb_rad_s2"), known.best("coast_viscous_1_s")
     return coulomb is not None and viscous is not None and coulomb.number > 0.0
@@ -261,7 +261,7 @@ def _parted(known: Constants) -> bool:
 def _viscous_share(speed_rad_s: float | None, known: Constants) -> tuple[float, str]:
     """Share of the drag at this speed that is viscous, by the coast-down's ratio B/T_c."""
     coulomb, viscous = known.best("coast_coulomb_rad_s2"), known.best("coast_viscous_1_s")
-    if speed_rad_s is None or coulomb is None or viscous is None or not _parted(known):
+    if speed_rad_s is None or coulomb is None or viscous is None or not _coast_known(known):
         return 0.0, " and the viscous part"
     slope = max(viscous.number, 0.0) * speed_rad_s
     return slope / (coulomb.number + slope), ", the viscous part taken off by the coast-down"
