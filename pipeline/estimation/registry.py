@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.estimation.policy import changed, under
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.uncertainty.agreement import SAME, reconciled
+from pipeline.estimation.uncertainty.agreement import SAME, outranked, reconciled
 from pipeline.estimation.uncertainty.instruments import with_clock
 from pipeline.numerics.identifiability import within
 from pipeline.physics.glossary import CONSTANTS, Term
@@ -178,14 +178,16 @@ def _fit_all(
 
 def _preferred(fits: Sequence[tuple[int, int, Fit]]) -> tuple[Estimate, ...]:
     """All estimates by rank, then as they were fitted; of one constant and equal rank the one that
-    is known best comes first.
+    is known best comes first. What another method knows far better (`agreement.outranked`) comes
+    last.
     """
     ranked = sorted(fits, key=lambda item: item[:2])
     alike: dict[tuple[int, str], list[Estimate]] = {}
     for rank, _, fit in ranked:
         for estimate in fit.estimates:
             alike.setdefault((rank, estimate.name), []).append(estimate)
-    return tuple(e for same in alike.values() for e in sorted(same, key=lambda e: e.u))
+    ordered = [e for same in alike.values() for e in sorted(same, key=lambda e: e.u)]
+    return tuple(sorted(ordered, key=lambda e: outranked(e, ordered)))
 
 
 def _fitted(

@@ -57,6 +57,9 @@ class Agreement:
         chance at which a rougher method than that excludes a value
         chosen: four standard uncertainties; of ten pairs of methods a motor has, one motor in a
         thousand is widened though it is sound
+    outranked : 1
+        ratio of uncertainties beyond which the better known of two methods comes first
+        chosen: beyond it the assumptions that the order of methods goes by are the lesser doubt
     speed_ratio : 1
         ratio of speeds beyond which two drags are two quantities
         chosen: drag at creep speed and at full speed differ where friction bends
@@ -66,6 +69,7 @@ class Agreement:
     level: float = 0.01
     precise: float = 3.0
     contradiction: float = 1e-4
+    outranked: float = 10.0
     speed_ratio: float = 10.0
 
 

@@ -7,7 +7,7 @@ generalised chi-square, and what goes beyond chance belongs to the uncertainty o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,6 +46,29 @@ def reconciled(constants: Constants) -> Constants:
         for e in constants.estimates
     ]
     return Constants(tuple(_by_transducer(e, judged) if _measured(e) else e for e in judged))
+
+
+def outranked(estimate: Estimate, others: Iterable[Estimate]) -> bool:
+    """Whether another method knows the same constant so much better that it comes first.
+
+    Parameters
+    ----------
+    estimate
+        Of any constant.
+    others
+        Estimates, itself among them.
+
+    Returns
+    -------
+    bool
+        The order of methods is that of their assumptions, as long as they say something.
+
+    """
+    if not _measured(estimate):
+        return False
+    least = estimate.u / policy().agreement.outranked
+    same = (e for e in others if e.name == estimate.name and _measured(e))
+    return any(0.0 < e.u < least and _alike(e, estimate) for e in same)
 
 
 def _measured(estimate: Estimate) -> bool:

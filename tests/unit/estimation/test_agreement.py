@@ -8,8 +8,9 @@ from dataclasses import replace
 import pytest
 
 from pipeline.crosscheck.judge import ratio_of
-from pipeline.estimation.registry import fit_all
-from pipeline.estimation.uncertainty.agreement import judges, reconciled
+from pipeline.estimation.protocol import Fit
+from pipeline.estimation.registry import _preferred, fit_all
+from pipeline.estimation.uncertainty.agreement import judges, outranked, reconciled
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import METHODS, propagate, type_a, type_b
@@ -145,3 +146,22 @@ def test_the_odd_one_of_three_is_in_doubt_by_what_parts_it_from_the_nearest() ->
     found = {e.method: e for e in reconciled(Constants((odd, *others))).estimates}
     assert part(found["torque_map"]) == pytest.approx(0.00135 / math.sqrt(2.0), rel=0.05)
     assert part(found["inertia"]) < part(found["torque_map"])
+
+
+def test_a_method_that_knows_a_constant_ten_times_better_comes_first() -> None:
+    """Of a spin of one cycle psi was 0.084 ± 0.037 Wb, though a table said 0.1321 ± 0.0004."""
+    rough, best = of("spin", 1.0, 0.9), of("table", 1.5, 0.002)
+    fits = [(0, 0, Fit((rough,))), (6, 1, Fit((best,)))]
+    assert [e.method for e in _preferred(fits)] == ["table", "spin"]
+    fair = of("spin", 1.4, 0.1)
+    assert [e.method for e in _preferred([(0, 0, Fit((fair,))), (6, 1, Fit((best,)))])] == [
+        "spin",
+        "table",
+    ]
+
+
+def test_a_drag_at_creep_speed_does_not_come_before_one_at_speed() -> None:
+    """They are two quantities where friction bends, however well the one is known."""
+    fast = of("coast", 1.0, 0.9, "torque_coulomb_nm", omega_mech_rad_s=100.0)
+    slow = of("creep", 1.5, 0.002, "torque_coulomb_nm", omega_mech_rad_s=0.5)
+    assert not outranked(fast, (fast, slow))
