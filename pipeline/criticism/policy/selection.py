@@ -83,10 +83,6 @@ class Selection:
     floor_ratio : 1
         ratio of some noise floor, new over old, that calls for a fit by the new ones
         chosen: a floor is known to some 6 %; one that is off by half moves what is over it
-    coupling_floors : noise floors
-        miss of a torque from which on a soft coupling is fitted from a start of its own
-        chosen: a base that is a little wrong misses by a few; an inertia behind a soft shaft by
-        tens
     inertia_ratio : 1
         ratio of a fit's inertia and a rough fit's from which on a fit begins anew
         chosen: most rough fits are a tenth off; a spoiled inertia came in tens of times
@@ -157,7 +153,6 @@ class Selection:
     least_u: float = 2.0
     most_penalties: float = 4.0
     floor_ratio: float = 1.5
-    coupling_floors: float = 20.0
     inertia_ratio: float = 2.0
     tangent_penalties: float = 20.0
     choice_falls: float = 2.0

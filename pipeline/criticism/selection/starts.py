@@ -106,8 +106,7 @@ def with_linear_start(
     scores
         Scores by the tangent.
     significant
-        Groups [G] over their floor; a form is tried where its signal is among them and misses by
-        `policy.selection.coupling_floors`.
+        Groups [G] over their floor; a form is tried where its signal is among them.
 
     Returns
     -------
@@ -185,13 +184,8 @@ def with_better(
 
 
 def _exceeds_floor(wide: LinearSystem, significant: Flags, channel: str) -> bool:
-    """Whether some plain signal misses its floor by so much that the base may be wrong."""
-    least = wide.policy.selection.coupling_floors**2
-    q = wide.reduced_chi2(wide.residual)
-    groups = zip(wide.labels, q, significant, strict=True)
-    return any(
-        over and q > least for (_, name, order), q, over in groups if (name, order) == (channel, 0)
-    )
+    """Whether a plain signal is over its floor."""
+    return any(group[1:] == (channel, 0) for group in compress(wide.labels, significant))
 
 
 def scored(wide: LinearSystem, candidate: Candidate, begun: Fit) -> Score:

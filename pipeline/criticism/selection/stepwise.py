@@ -148,8 +148,8 @@ def _instead_of_effect(
     where there is nothing of that kind.
     """
     tie = wide.policy.selection.tie
-    reread = by_best_readings(wide)
-    unnamed = [with_free_shares(wide), None if reread is wide else reread]
+    reread, rechosen = by_best_readings(wide), reconsidered(wide, at_floor=True)
+    unnamed = [with_free_shares(wide), *(end for end in (reread, rechosen) if end is not wide)]
     instead = min(filter(None, unnamed), key=lambda end: end.deviance, default=None)
     changing = with_changing_friction(wide)
     least = math.inf if chosen is None else _with_full_logs(chosen)
@@ -161,7 +161,6 @@ def _instead_of_effect(
     if instead is None:
         is_reading = _is_reading(chosen, wide, reread, library, base, unsure)
         return reread if is_reading else None
-    rechosen = reconsidered(wide, at_floor=True)
     return instead if rechosen is wide or rechosen.deviance > instead.deviance + tie else rechosen
 
 
@@ -187,6 +186,12 @@ def _with_pair(
         if both is None or place + 2 >= policy.most_steps:
             continue
         first, second = (effect.name for effect in both.fit.model.effects[-2:])
+        for name in (first, second):
+            # a choice that was made before both stands for one of them
+            without = gauss_newton(both.fit.without(name), before=both)
+            rechosen = reconsidered(without, at_floor=True)
+            if rechosen.deviance < both.deviance + policy.tie:
+                return rechosen
         alone = _refloored(gauss_newton(both.fit.without(second), before=both), base)
         steps[place + 1 :] = [
             LadderStep((*step.added, first), *scored(alone, library, step.system))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,7 @@ from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from tests.unit.criticism.coasts import Shaft
+from tests.unit.criticism.test_slow_turn import slow_turn
 from tests.unit.estimation.signals import capture
 
 SHAFT = Shaft(
@@ -87,3 +89,26 @@ def test_a_pair_that_explains_less_than_what_is_named_does_not_join(
     found = diagnose(two_drags(), ModelSpec(), Constants())
     assert sorted(found.missing) != ["stribeck", "windage"]
     assert not fits
+
+
+def test_a_choice_that_was_made_before_a_pair_is_no_second_effect() -> None:
+    """Before the friction at low speed was known, the load seemed to act beyond the transducer.
+    What was then lacking in the slow turns was named `torque_offset`, as large as the load.
+    """
+    j_kgm2, load = 1.1e-4, 100.0
+    shaft = replace(SHAFT, excess=200.0, slow_rad_s=20.0, viscous=0.2, windage=0.0)
+    shaft = replace(shaft, top_rad_s=300.0, end_rad_s=3.0)
+    coasts = [
+        capture("spin_down", f"coast{s}", **replace(shaft, dry=shaft.dry + s * load).coast(s))
+        for s in (1.0, -1.0)
+    ]
+    turns = [
+        slow_turn(f"{s}.csv", 0.0, sense=s, noise_nm=1e-5, dry_nm=j_kgm2 * (400.0 + s * load))
+        for s in (1, -1)
+    ]
+    found = diagnose(Campaign("m", (*coasts, *turns)), ModelSpec(), Constants())
+    assert sorted(found.missing) == ["constant_load", "stribeck"]
+    assert found.ladder[-1].parameters["constant_load.inside"].value == 1.0
+    assert found.ladder[-1].parameters["constant_load.torque_nm"].value == pytest.approx(
+        j_kgm2 * load, rel=0.02
+    )
