@@ -262,26 +262,28 @@ def spoils(tried: LinearSystem, before: Array, after: Array, relief: float = 0.0
         `least_share`, since any refit moves an error of another cause a little.
 
     """
-    acts = acts_in(tried)
+    acts = acts_in(tried, tried.fit.model.effects[-1])
     change = np.maximum(after, 1.0) - np.maximum(before, 1.0)
     counts = acts & (np.abs(change) > tried.policy.selection.least_share * np.maximum(before, 1.0))
     return float((tried.counts * change)[counts].sum()) > relief
 
 
-def acts_in(system: LinearSystem) -> Flags:
-    """The groups in which the newest effect acts.
+def acts_in(system: LinearSystem, effect: Effect) -> Flags:
+    """The groups in which an effect acts.
 
     Parameters
     ----------
     system
-        The fit with it.
+        With the columns of the effect, fitted or offered.
+    effect
+        The effect.
 
     Returns
     -------
     array [G] of bool
 
     """
-    name = f"{system.fit.model.effects[-1].name}."
+    name = f"{effect.name}."
     columns = [n for n, column in enumerate(system.columns) if column.name.startswith(name)]
     moved = np.any(system.matrix[:, columns], axis=1)
     return np.bincount(system.group, moved, len(system.labels)) > 0

@@ -80,7 +80,7 @@ def _chosen(
             finished = gauss_newton(with_all_terms(best.fit), before=best)
             finished = reshaped(trimmed(finished, named))
             cost = finished.deviance + math.log(wide.size) * finished.model_columns.size
-            acts = acts_in(finished)
+            acts = acts_in(finished, finished.fit.model.effects[-1])
             if any(cost > least + policy.tie and np.any(acts & where) for least, where in doubtful):
                 return None
             at_end = linear_system(finished.fit)
@@ -95,17 +95,25 @@ def _refit_best(
     wide: LinearSystem, passing: Sequence[Score], added: Sequence[Effect]
 ) -> LinearSystem | None:
     """Refits candidates that may be the best one by a refit, which may fall by 1/`close_share` of a
-    score, their penalty paid; the best one that passes. Where none does and something is over its
-    floor, the best of the others may.
+    score, their penalty paid; the best one that passes. Where none does, the best of the others
+    may, if something is over its floor or they act where none of the former does.
     """
     usual, left = Baseline.of(wide, added), list(passing)
     best: LinearSystem | None = None
+    failed = np.zeros(len(wide.labels), dtype=bool)
     while left and best is None:
         most = max(s.fall - s.penalty for s in left)
         share = wide.policy.selection.close_share
         close = [s for s in left if s.fall / share - s.penalty >= most]
         best = _best_that_passes(usual, close)
-        left = [s for s in left if s not in close and usual.significant.any()]
+        for score in close:
+            failed |= acts_in(wide, score.candidate.effect)
+        left = [
+            s
+            for s in left
+            if s not in close
+            and (usual.significant.any() or not np.any(failed & acts_in(wide, s.candidate.effect)))
+        ]
     return best
 
 

@@ -14,6 +14,7 @@ from pipeline.criticism.regression.gauss_newton import (
     floors_changed,
     gauss_newton,
     rough_anew,
+    summed_error,
 )
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
@@ -142,10 +143,11 @@ def floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
     -----
     The tolerance for its form is new, so it is refitted in any case: the next effect is judged
     against this deviance. If some floor changes by half, or something is left over them, and a
-    rough fit finds another inertia, a fit is begun there as well and the better one stays. Undoing
-    a sensor's lag adds noise, so does a twist derived from an angle, and so do the edges of a dead
-    time. An encoder off its centre drives J to next to nothing, an unbalance to six times what it
-    is, and the floors were made with that J.
+    rough fit finds another inertia, a fit is begun there as well, and the one that misses less
+    stays, every equation counted once. Their floors differ, so their deviances do not compare.
+    Undoing a sensor's lag adds noise, so does a twist derived from an angle, and so do the edges of
+    a dead time. An encoder off its centre drives J to next to nothing, an unbalance to six times
+    what it is, and the floors were made with that J.
 
     """
     changed = floors_changed(fit)
@@ -158,7 +160,7 @@ def floored_anew(fit: Fit, before: LinearSystem | None = None) -> Fit:
     rough = rough_anew(fit)
     if not _other_inertia(rough, fit):
         return anew.fit
-    return min(anew, first_fit(rough), key=lambda end: end.deviance).fit
+    return min(anew, first_fit(rough), key=summed_error).fit
 
 
 def _other_inertia(rough: Fit, fit: Fit) -> bool:

@@ -203,17 +203,21 @@ def test_candidates_are_tried_by_what_they_are_worth(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("fall", "first_matters", "over_floor", "both"),
+    ("fall", "first_matters", "over_floor", "apart", "both"),
     [
-        (176.0, True, True, True),
-        (165.0, True, True, False),
-        (165.0, False, True, True),
-        (165.0, False, False, False),
+        (176.0, True, True, False, True),
+        (165.0, True, True, False, False),
+        (165.0, False, True, False, True),
+        (165.0, False, False, False, False),
+        (165.0, False, False, True, True),
     ],
 )
-def test_who_may_be_best_by_a_refit_is_refitted(monkeypatch, fall, first_matters, over_floor, both):
+def test_who_may_be_best_by_a_refit_is_refitted(
+    monkeypatch, fall, first_matters, over_floor, apart, both
+):
     """Cogging of ten terms has the larger fall, and the friction of a coast less to pay. A coupling
-    too small to matter kept an angle off by 18 noise floors from being tried.
+    too small to matter kept an angle off by 18 noise floors from being tried, and a skin effect in
+    current steps the windage of coasts.
     """
     tried = []
     wide = linear_system(fitted((log(noise=1.0),)))
@@ -233,6 +237,12 @@ def test_who_may_be_best_by_a_refit_is_refitted(monkeypatch, fall, first_matters
     monkeypatch.setattr(best_candidate.Baseline, "is_improved_by", lambda *_: True)
     significant = "pipeline.criticism.selection.acceptance.significant_groups"
     monkeypatch.setattr(significant, lambda _: np.array([over_floor]))
+
+    def acts(system, effect):
+        first = np.arange(len(system.labels)) == 0
+        return ~first if apart and effect.name == "stribeck" else first
+
+    monkeypatch.setattr(best_candidate, "acts_in", acts)
 
     def score(name, fall, penalty):
         of = wide.policy.selection
@@ -409,8 +419,8 @@ def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkey
 def test_an_explanation_of_unsure_size_does_not_speak_where_it_does_not_act(monkeypatch):
     """As a field inside the conductors, in current steps, beside the windage of coasts."""
 
-    def acts(system):
-        unsure = system.fit.model.effects[-1].name == "windage"
+    def acts(system, effect):
+        unsure = effect.name == "windage"
         return np.full(len(system.labels), unsure) ^ (np.arange(len(system.labels)) > 0)
 
     def sure(system, _):
