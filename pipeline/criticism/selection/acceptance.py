@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.operating import Array, Flags
 from pipeline.criticism.parameter import Parameter
+from pipeline.criticism.regression.columns import Column
 from pipeline.criticism.regression.cross_validation import (
     HeldOut,
     in_common,
@@ -262,28 +263,31 @@ def spoils(tried: LinearSystem, before: Array, after: Array, relief: float = 0.0
         `least_share`, since any refit moves an error of another cause a little.
 
     """
-    acts = acts_in(tried, tried.fit.model.effects[-1])
+    acts = acts_in(tried)
     change = np.maximum(after, 1.0) - np.maximum(before, 1.0)
     counts = acts & (np.abs(change) > tried.policy.selection.least_share * np.maximum(before, 1.0))
     return float((tried.counts * change)[counts].sum()) > relief
 
 
-def acts_in(system: LinearSystem, effect: Effect) -> Flags:
+def acts_in(system: LinearSystem, columns: Sequence[Column] = ()) -> Flags:
     """The groups in which an effect acts.
 
     Parameters
     ----------
     system
-        With the columns of the effect, fitted or offered.
-    effect
-        The effect.
+        With the columns of the effect.
+    columns
+        They; without any, those of the newest effect of the model.
 
     Returns
     -------
     array [G] of bool
 
     """
-    name = f"{effect.name}."
-    columns = [n for n, column in enumerate(system.columns) if column.name.startswith(name)]
-    moved = np.any(system.matrix[:, columns], axis=1)
+    if not columns:
+        name = f"{system.fit.model.effects[-1].name}."
+        columns = [column for column in system.columns if column.name.startswith(name)]
+    keys = {column.key for column in columns}
+    places = [n for n, column in enumerate(system.columns) if column.key in keys]
+    moved = np.any(system.matrix[:, places], axis=1)
     return np.bincount(system.group, moved, len(system.labels)) > 0

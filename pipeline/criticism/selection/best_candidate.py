@@ -80,7 +80,7 @@ def _chosen(
             finished = gauss_newton(with_all_terms(best.fit), before=best)
             finished = reshaped(trimmed(finished, named))
             cost = finished.deviance + math.log(wide.size) * finished.model_columns.size
-            acts = acts_in(finished, finished.fit.model.effects[-1])
+            acts = acts_in(finished)
             if any(cost > least + policy.tie and np.any(acts & where) for least, where in doubtful):
                 return None
             at_end = linear_system(finished.fit)
@@ -107,12 +107,12 @@ def _refit_best(
         close = [s for s in left if s.fall / share - s.penalty >= most]
         best = _best_that_passes(usual, close)
         for score in close:
-            failed |= acts_in(wide, score.candidate.effect)
+            failed |= acts_in(wide, score.candidate.columns)
         left = [
             s
             for s in left
             if s not in close
-            and (usual.significant.any() or not np.any(failed & acts_in(wide, s.candidate.effect)))
+            and (usual.significant.any() or not np.any(failed & acts_in(wide, s.candidate.columns)))
         ]
     return best
 

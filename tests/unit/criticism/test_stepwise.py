@@ -238,15 +238,16 @@ def test_who_may_be_best_by_a_refit_is_refitted(
     significant = "pipeline.criticism.selection.acceptance.significant_groups"
     monkeypatch.setattr(significant, lambda _: np.array([over_floor]))
 
-    def acts(system, effect):
+    def acts(system, columns):
         first = np.arange(len(system.labels)) == 0
-        return ~first if apart and effect.name == "stribeck" else first
+        return ~first if apart and columns == ("stribeck",) else first
 
     monkeypatch.setattr(best_candidate, "acts_in", acts)
 
     def score(name, fall, penalty):
         of = wide.policy.selection
-        return Score(Candidate(effects()[name], ()), fall, penalty, {}, {}, 1.0, 2.0, policy=of)
+        named = Candidate(effects()[name], (name,))
+        return Score(named, fall, penalty, {}, {}, 1.0, 2.0, policy=of)
 
     passing = [score("cogging", 290.0, 73.0), score("stribeck", fall, 26.7)]
     found = best_candidate._refit_best(wide, passing, ())
@@ -419,8 +420,8 @@ def test_nothing_is_named_in_place_of_a_better_explanation_of_unsure_size(monkey
 def test_an_explanation_of_unsure_size_does_not_speak_where_it_does_not_act(monkeypatch):
     """As a field inside the conductors, in current steps, beside the windage of coasts."""
 
-    def acts(system, effect):
-        unsure = effect.name == "windage"
+    def acts(system, columns=()):
+        unsure = not columns and system.fit.model.effects[-1].name == "windage"
         return np.full(len(system.labels), unsure) ^ (np.arange(len(system.labels)) > 0)
 
     def sure(system, _):
