@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 
 from pipeline.criticism.parameter import THERMOMETER, TRANSDUCER
-from pipeline.records.capture import U_ZERO, Capture, CaptureMeta
+from pipeline.records.capture import Capture, CaptureMeta
 
 _AXES_A = ("id_a", "iq_a")
 _LINES_A = ("ia_a", "ib_a", "ic_a")
@@ -15,8 +15,8 @@ _FLUXES = ("psi_d_wb", "psi_q_wb")
 _AT_REST = "gain_current_rest"
 _METERS = ("gain_current", "gain_current_bench", _AT_REST, "gain_voltage", "gain_commanded")
 """Gains of which a station may have several instruments; the first of a kind has its name."""
-_OF_STATION = {TRANSDUCER: "u_rel_torque", THERMOMETER: "u_temp_degc"}
-"""Kinds of which a station has one, with the key of its uncertainty."""
+_OF_STATION = (TRANSDUCER, THERMOMETER)
+"""Kinds of which a station has one."""
 
 
 def gains_of(captures: Iterable[Capture]) -> dict[str, dict[str, str]]:
@@ -72,22 +72,36 @@ def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
     for capture in captures:
         meta, used = capture.meta, _used(capture)
         for kind, name in gains[capture.path].items():
-            key = _OF_STATION.get(kind)
-            u = used[kind][0] if key is None else getattr(meta, key) or math.inf
+            u = used[kind][0] if kind in _METERS else _of_station(meta)[kind]
             if math.isinf(u) and name != kind:
                 # a further instrument is known by its number here, so it always states something
-                u = meta.instrument_u(key or "u_rel_current")
+                u = _assumed(meta).get(kind, meta.instrument_u("u_rel_current"))
             if not math.isinf(u):
-                stated[name] = u if key is None else max(stated.get(name, 0.0), u)
+                stated[name] = u if kind in _METERS else max(stated.get(name, 0.0), u)
         for name, one in (
             ("gain_lcr", _u_lcr(meta)),
             ("phase_lcr_rad", _u_lcr(meta)),
             ("gain_clock", meta.u_rel_clock),
-            ("zero_angle_rad", meta.stated_u_rel(U_ZERO)),
+            ("zero_angle_rad", meta.stated_u_rel("u_zero_angle_rad")),
         ):
             if one:
                 stated[name] = max(stated.get(name, 0.0), one)
     return stated
+
+
+def _of_station(meta: CaptureMeta) -> dict[str, float]:
+    """What a capture states of the instruments of which its station has one; infinite where
+    nothing.
+    """
+    return {TRANSDUCER: meta.u_rel_torque or math.inf, THERMOMETER: meta.u_temp_degc or math.inf}
+
+
+def _assumed(meta: CaptureMeta) -> dict[str, float]:
+    """What they are known to where nothing is stated."""
+    return {
+        TRANSDUCER: meta.instrument_u("u_rel_torque"),
+        THERMOMETER: meta.instrument_u("u_temp_degc"),
+    }
 
 
 def _used(capture: Capture) -> Mapping[str, tuple[float, str]]:

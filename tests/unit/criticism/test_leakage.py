@@ -14,11 +14,11 @@ READS = {
     *("test", "pole_pairs", "slots", "ambient_degc", "pair", "theta_elec_deg", "voltage_timing"),
     # what the station states of its own instruments
     *("voltage_kind", "u_rel_current", "u_rel_voltage", "u_rel_torque", "u_temp_degc"),
-    *("u_rel_clock", "stated_u_rel"),
+    *("u_rel_clock", "stated_u_rel", "station"),
     # what it states of its inverter
     *("vdc_v", "pwm_hz"),
 }
-EXTRA = {"u_rel_lcr"}
+EXTRA = {"u_rel_lcr", "u_zero_angle_rad"}
 """Keys beyond the contract, each asked for by name: `meta.extra[KEY]`, `meta.stated_u_rel(KEY)`."""
 
 

@@ -16,7 +16,7 @@ def after_refit(acts):
     effects = [SimpleNamespace(name="windage")]
     return SimpleNamespace(
         fit=SimpleNamespace(model=SimpleNamespace(effects=effects)),
-        columns=[SimpleNamespace(name="r_ohm"), SimpleNamespace(name="windage.drag_nm")],
+        columns=[SimpleNamespace(name=n, key=n) for n in ("r_ohm", "windage.drag_nm")],
         matrix=np.column_stack([np.ones(30), np.isin(group, acts).astype(float)]),
         group=group,
         labels=range(3),
