@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.selection import pairs, stepwise
 from pipeline.criticism.selection.pairs import Pair
 from pipeline.records.capture import Campaign
@@ -112,3 +113,36 @@ def test_a_choice_that_was_made_before_a_pair_is_no_second_effect() -> None:
     assert found.ladder[-1].parameters["constant_load.torque_nm"].value == pytest.approx(
         j_kgm2 * load, rel=0.02
     )
+
+
+@pytest.mark.parametrize(("second_is_needed", "steps"), [(True, 2), (False, 1)])
+def test_of_a_pair_one_goes_whose_place_another_choice_takes(
+    monkeypatch: pytest.MonkeyPatch, second_is_needed: bool, steps: int
+) -> None:
+    """A load of MuJoCo's hinge: by the other side of the transducer the offset explains nothing."""
+
+    def fitted(deviance: float, *names: str) -> SimpleNamespace:
+        effects = tuple(SimpleNamespace(name=name) for name in names)
+        model = SimpleNamespace(effects=effects)
+        fit = SimpleNamespace(model=model, policy=DEFAULT, without=lambda name: name)
+        return SimpleNamespace(deviance=deviance, fit=fit)
+
+    both = fitted(-605.0, "stribeck", "torque_offset")
+    rechosen = {"stribeck": fitted(-450.0), "torque_offset": fitted(-607.0, "stribeck")}
+    if second_is_needed:
+        rechosen["torque_offset"] = fitted(-580.0, "stribeck")
+    given = {
+        "significant_groups": lambda _: np.array([True]),
+        "candidates": lambda *_: (),
+        "best_pair": lambda *_: both,
+        "gauss_newton": lambda name, **_: name,
+        "reconsidered": lambda name, **_: rechosen[name],
+        "scored": lambda *_: (fitted(-500.0, "stribeck"), ()),
+        "_refloored": lambda *_: None,
+    }
+    for name, answer in given.items():
+        monkeypatch.setattr(stepwise, name, answer)
+    ladder = [stepwise.LadderStep((), fitted(-450.0), ())]  # type: ignore[arg-type]
+    found = stepwise._with_pair(ladder, {}, 0, frozenset())
+    assert found is (both if second_is_needed else rechosen["torque_offset"])
+    assert len(ladder) == steps
