@@ -216,7 +216,8 @@ def out_of_step(
     -------
     array [n] of bool
         `keep` without those where the counts of a row are within one a window of a whole number,
-        but for zero; all of it where that is most of them, and where rows are means.
+        but for zero; all of it where that is most of them or leaves no window, and where rows are
+        means.
 
     Notes
     -----
@@ -230,7 +231,9 @@ def out_of_step(
     counts = turned / machine.encoder_rad
     whole = np.rint(counts)
     apart = keep & ((whole == 0.0) | (np.abs(counts - whole) >= 1.0 / window))
-    return apart if 2 * np.count_nonzero(apart) > keep.size else keep
+    inside = np.cumsum(np.concatenate([[0], apart]))
+    leaves_windows = np.any(inside[window:] - inside[:-window] == window)
+    return apart if leaves_windows and 2 * inside[-1] > keep.size else keep
 
 
 def whole_log(columns: Mapping[str, Array], period: float, policy: Cutting) -> dict[str, Array]:

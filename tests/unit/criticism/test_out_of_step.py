@@ -16,10 +16,15 @@ STEP_RAD, WINDOW, ROWS = 2.0 * np.pi / 4096, 40, 1000
 
 
 def kept(
-    counts: tuple[float, ...], timing: str = "instant", step_rad: float = STEP_RAD
+    counts: tuple[float, ...], timing: str = "instant", step_rad: float = STEP_RAD, wave: float = 0
 ) -> list[float]:
-    """Share of the rows that are kept at each speed [counts a row], away from where it changes."""
-    turned = STEP_RAD * np.cumsum(np.repeat(counts, ROWS))
+    """Share of the rows that are kept at each speed [counts a row], away from where it changes; the
+    angle of an encoder off its centre has a `wave` of so many rows.
+    """
+    paces = np.repeat(counts, ROWS)
+    if wave:
+        paces += 0.3 * np.sin(2.0 * np.pi * np.arange(paces.size) / wave)
+    turned = STEP_RAD * np.cumsum(paces)
     theta = STEP_RAD * np.floor(turned / STEP_RAD)
     meta = CaptureMeta("m", "drive", voltage_timing=timing)
     capture = Capture("log.csv", "0", "verified", meta, (pl.DataFrame({"theta_mech_rad": theta}),))
@@ -40,3 +45,10 @@ def test_rows_that_are_means_or_of_no_known_encoder_are_kept():
 
 def test_of_a_log_that_is_mostly_in_step_all_rows_are_kept():
     assert kept((27.0, 12.0, 30.5)) == [1.0, 1.0, 1.0]
+
+
+def test_where_rows_in_step_would_leave_no_window_all_are_kept():
+    """A fiftieth of the rows of a torque map, none of them far from the next, took all of it."""
+    assert kept((27.0,), wave=2 * WINDOW - 5) == [1.0]
+    (share,) = kept((27.0,), wave=8 * WINDOW)
+    assert 0.7 < share < 0.99
