@@ -74,6 +74,7 @@ def coupling(system: LinearSystem) -> Score | None:
     return next(iter(with_linear_start(wide, offered, (), significant_groups(wide))), None)
 
 
+@pytest.mark.slow
 def test_the_motion_of_a_free_shaft_shows_share_and_stiffness():
     score = coupling(base(coupled=True))
     assert score is not None
@@ -249,6 +250,7 @@ def test_telemetry_without_a_transducer_names_a_spring_and_nothing_else(name, sp
     assert found.missing == (() if spring is None else ("compliance",))
 
 
+@pytest.mark.slow
 def test_a_coupling_that_is_asked_for_is_fitted_as_a_search_fits_it() -> None:
     """Its step in a search leaves 5 of 463 noise floors. Asked for, it stayed at 69; and of a motor
     of the second bench at 159, where a search comes to 0.7.
@@ -260,7 +262,7 @@ def test_a_coupling_that_is_asked_for_is_fitted_as_a_search_fits_it() -> None:
     assert asked.parameters["compliance.share"].value == pytest.approx(0.35, abs=0.05)
 
 
-@pytest.mark.parametrize("floors", [2.0, 8.0])
+@pytest.mark.parametrize("floors", [2.0, pytest.param(8.0, marks=pytest.mark.slow)])
 def test_a_start_is_tried_wherever_the_torque_is_over_its_floor(floors):
     """A log of 1 kHz missed by 5 floors, and one of 4 kHz by 1.2: under a limit of 20 no start was
     tried, and a coupling of 80 Hz was `unknown`.

@@ -92,6 +92,7 @@ def test_a_pair_that_explains_less_than_what_is_named_does_not_join(
     assert not fits
 
 
+@pytest.mark.slow
 def test_a_choice_that_was_made_before_a_pair_is_no_second_effect() -> None:
     """Before the friction at low speed was known, the load seemed to act beyond the transducer.
     What was then lacking in the slow turns was named `torque_offset`, as large as the load.
