@@ -212,6 +212,12 @@ class Capture:
         """Every column that some table holds."""
         return frozenset(name for table in self.tables for name in table.columns)
 
+    @property
+    def turning(self) -> bool:
+        """Whether a speed is logged that is not zero."""
+        speed = "omega_mech_rad_s"
+        return self.has(speed) and bool(np.any(np.nan_to_num(self.arrays(speed)[speed])))
+
     def has(self, *names: str) -> bool:
         """Whether every one of some columns is in some table.
 

@@ -55,7 +55,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     columns = capture.finite(*needed, *beside, needed=needed)
     policy = machine.policy.tables
     parts = parts_of(columns["iq_a"], policy)
-    if parts is None or not np.any(columns[SPEED]):
+    if parts is None or not capture.turning:
         return None
     surface = _surface(columns)
     if surface is None:

@@ -18,7 +18,7 @@ from pipeline.criticism.signals.true_current import table_current
 from pipeline.criticism.signals.true_state import Motion, operating
 from pipeline.records.capture import Capture
 
-TORQUE, SPEED = "torque_shaft_nm", "omega_mech_rad_s"
+TORQUE = "torque_shaft_nm"
 _BESIDE = ("id_a", "theta_mech_rad", "temp_magnet_degc")
 """Columns that are used where they are there."""
 
@@ -50,7 +50,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     names = ("iq_a", TORQUE, *(name for name in _BESIDE if capture.has(name)))
     columns = capture.finite(*names)
     policy = machine.policy.tables
-    if capture.has(SPEED) and np.any(np.nan_to_num(capture.arrays(SPEED)[SPEED])):
+    if capture.turning:
         return None
     torque, parts = columns[TORQUE], parts_of(columns["iq_a"], policy)
     noise = None if parts is None else _noise(columns, policy.reading)

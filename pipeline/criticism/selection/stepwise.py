@@ -186,15 +186,17 @@ def _with_pair(
         if both is None or place + 2 >= policy.most_steps:
             continue
         first, second = (effect.name for effect in both.fit.model.effects[-2:])
-        for name in (first, second):
+        without = {
+            name: gauss_newton(both.fit.without(name), before=both) for name in (first, second)
+        }
+        for alone in without.values():
             # a choice that was made before both stands for one of them
-            without = gauss_newton(both.fit.without(name), before=both)
-            rechosen = reconsidered(without, at_floor=True)
+            rechosen = reconsidered(alone, at_floor=True)
             if rechosen.deviance < both.deviance + policy.tie:
                 return rechosen
-        alone = _refloored(gauss_newton(both.fit.without(second), before=both), base)
+        begun = _refloored(without[second], base)
         steps[place + 1 :] = [
-            LadderStep((*step.added, first), *scored(alone, library, step.system))
+            LadderStep((*step.added, first), *scored(begun, library, step.system))
         ]
         return both
     return None

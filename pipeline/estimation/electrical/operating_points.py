@@ -226,20 +226,7 @@ def turning_tables(campaign: Campaign) -> list[Capture]:
         Those of `torque_table` with a speed; without one the shaft was clamped.
 
     """
-    return [c for c in campaign.of("torque_table") if is_turning(c)]
-
-
-def is_turning(capture: Capture) -> bool:
-    """Whether a table has a speed that is not zero.
-
-    Parameters
-    ----------
-    capture
-        A `torque_table`.
-
-    """
-    speed = capture.arrays(SPEED)[SPEED] if capture.has(SPEED) else np.zeros(0)
-    return bool(np.any(np.abs(speed[np.isfinite(speed)]) > 0.0))
+    return [c for c in campaign.of("torque_table") if c.turning]
 
 
 def table_points(captures: Sequence[Capture]) -> PointTable:

@@ -13,7 +13,7 @@ from pipeline.estimation.electrical.magnet_temperature import (
     magnet_uncertainties,
     unlogged_note,
 )
-from pipeline.estimation.electrical.operating_points import is_turning, pole_pairs_of
+from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, RIPPLES, SOURCE, ripple_share
 from pipeline.estimation.mechanical.other_current import not_along_q, unlogged_share
 from pipeline.estimation.method import Method, over_x
@@ -94,7 +94,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     torque ripple of that angle (`locked_rotor`).
     """
     tables = [c for c in campaign.of(METHOD.name) if c.has("iq_a", "torque_shaft_nm")]
-    captures = [c for c in tables if not is_turning(c)]
+    captures = [c for c in tables if not c.turning]
     if not captures:
         return METHOD.nothing(GIVES, f"no table of current and torque; {EXPERIMENT}")
     rows = _Rows.of(captures)
