@@ -211,7 +211,7 @@ def _notes(
         *unlogged_temperatures(last.fit),
         *against_stated(last, ladder.held_out[-1]),
         *hum_notes(ladder.base.hum),
-        *reading_notes(last.segments),
+        *reading_notes(last.fit),
         *end.notes,
         *_temperature_note(end),
         *_combination_notes(combinations, ladder.steps[-1].added),

@@ -18,12 +18,13 @@ captures are better explained by straight lines between rows, it has none.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
@@ -46,6 +47,10 @@ _SAMPLED = (
     "voltages of {} captures are taken in the rotor frame of the sampling instant, which explains "
     "them better than that of the middle of their PWM period; a sample_delay of half a period "
     "would look the same"
+)
+_DELAYED = (
+    "voltages of {} captures may be in the rotor frame of the sampling instant; sample_delay is "
+    "less by half a PWM period then"
 )
 
 
@@ -79,13 +84,42 @@ def by_best_readings(system: LinearSystem) -> LinearSystem:
         system = best
 
 
-def reading_notes(segments: Sequence[Segment]) -> tuple[str, ...]:
-    """Notes on columns that are not read as is usual.
+def with_usual_readings(system: LinearSystem) -> LinearSystem:
+    """The fit by the usual reading of each column that explains as much as the one of the fit.
 
     Parameters
     ----------
-    segments
-        The segments of a fit.
+    system
+        A fit by either reading of each column.
+
+    Returns
+    -------
+    LinearSystem
+        `system` itself where every reading is usual, or explains more by `policy.selection.tie`.
+
+    Notes
+    -----
+    A reading that was taken before an effect was in may have stood for a part of it: a delay of one
+    PWM period in the usual frame is half a period in that of the sampling instant.
+
+    """
+    for is_usual, usual in _USUAL:
+        if all(map(is_usual, system.segments)):
+            continue
+        back = tuple(s if is_usual(s) else usual(s) for s in system.segments)
+        tried = gauss_newton(replace(system.fit, segments=back), before=system)
+        if tried.deviance < system.deviance + system.policy.selection.tie:
+            system = tried
+    return system
+
+
+def reading_notes(fit: Fit) -> tuple[str, ...]:
+    """Notes on columns that are not read as is usual, or of which an effect takes the place.
+
+    Parameters
+    ----------
+    fit
+        The fit.
 
     Returns
     -------
@@ -93,11 +127,20 @@ def reading_notes(segments: Sequence[Segment]) -> tuple[str, ...]:
         Empty where there are none.
 
     """
-    sampled = {segment.capture for segment in segments if segment.instrument.frame}
-    stator = {segment.capture for segment in segments if segment.instrument.stator}
-    means = {segment.capture for segment in segments if segment.instrument.behind}
-    captures = ((_SAMPLED, sampled), (_MEANS, means), (_STATOR, stator))
-    return tuple(note.format(len(names)) for note, names in captures if names)
+    delayed = any(effect.name == "sample_delay" for effect in fit.model.effects)
+    share = fit.policy.cutting.slower_share
+    notes = {_SAMPLED: set[str](), _MEANS: set[str](), _STATOR: set[str](), _DELAYED: set[str]()}
+    for segment in fit.segments:
+        is_sampled = segment.instrument.frame != 0.0
+        for note, applies in (
+            (_SAMPLED, is_sampled),
+            (_MEANS, segment.instrument.behind != 0.0),
+            (_STATOR, segment.instrument.stator),
+            (_DELAYED, delayed and not is_sampled and _has_held_vectors(segment, share)),
+        ):
+            if applies:
+                notes[note].add(segment.capture)
+    return tuple(note.format(len(names)) for note, names in notes.items() if names)
 
 
 def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
@@ -172,3 +215,10 @@ def _reads_torque(segment: Segment) -> bool:
 def _at_other_place(segment: Segment) -> Segment:
     instrument = segment.instrument
     return replace(segment, instrument=replace(instrument, stator=not instrument.stator))
+
+
+_USUAL: tuple[tuple[Callable[[Segment], bool], Callable[[Segment], Segment]], ...] = (
+    (lambda segment: segment.instrument.frame == 0.0, _in_other_frame),
+    (lambda segment: segment.instrument.behind == 0.0, _of_other_rows),
+)
+"""Whether a reading is usual that an effect may stand for, and how it becomes so."""

@@ -19,7 +19,7 @@ from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_far_starts
 from pipeline.criticism.selection.free_shares import with_changing_friction, with_free_shares
-from pipeline.criticism.selection.other_readings import by_best_readings
+from pipeline.criticism.selection.other_readings import by_best_readings, with_usual_readings
 from pipeline.criticism.selection.pairs import best_pair
 from pipeline.criticism.selection.pruning import reshaped, unsure_effect, without_superfluous
 from pipeline.criticism.selection.refit import begin_from, floored_anew
@@ -82,7 +82,8 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
     for it. Friction that changes with time is taken where it explains more by a `tie`: in one coast
     it looks as friction that changes with speed, which is commoner. Choices inside effects are made
     again then: they may have been right by the former reading alone. One that explains as much by
-    itself is taken instead.
+    itself is taken instead. With an effect in, a reading goes back to what is usual where that
+    explains as much.
 
     An effect of the last step whose size may be zero, now that all others are in, goes with every
     step that has it, unless it takes most of an error; the search goes on without it.
@@ -131,7 +132,8 @@ def _steps_from(
         chosen = renamed(chosen, chosen.fit.model.effects[-1].name, library)
         if chosen.fit.model.effects[-1].name in unsure:
             break
-        fit = _refloored(reshaped(reconsidered(without_superfluous(chosen, base))), base)
+        chosen = with_usual_readings(reconsidered(without_superfluous(chosen, base)))
+        fit = _refloored(reshaped(chosen), base)
         if tuple(e.name for e in fit.model.effects[base:]) in {r.added for r in steps}:
             break
     return steps

@@ -91,7 +91,7 @@ def test_the_frame_of_held_voltages_is_the_one_that_explains_them(frame: float) 
     system = by_best_readings(fit_of([held(frame, log(noise=1.0))], Model(machine(), ())).system)
     (segment,) = system.segments
     assert segment.instrument.frame == frame
-    assert bool(reading_notes(system.segments)) == bool(frame)
+    assert bool(reading_notes(system.fit)) == bool(frame)
     assert system.fit.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
 
 
