@@ -222,7 +222,9 @@ def _improves_held_out(
     """Whether a candidate helps where captures are predicted from all the others.
 
     Their deviance must fall by the first of `least`. A share of some signal's power must go too,
-    or the deviance of signals below their floor must fall by the second of `least`. `before` and
+    or of what the priors cost, or the deviance of signals below their floor must fall by the second
+    of `least`. Constants that differ are no evidence where no model fits: a share of the priors'
+    cost counts where some signal in which the candidate acts is left at its floor. `before` and
     `after` are χ²/n [G] without and with the candidate. They are multiplied by the first of the
     `doubts` [G]; below the floor, the smaller fall with and without the second counts.
     """
@@ -235,10 +237,19 @@ def _improves_held_out(
         - tried.deviance_of(same_hook * after)
         - after_cost
     )
-    priors = cost > policy.excess and after_cost < (1.0 - policy.least_share) * cost
+    relieved = cost > policy.excess and after_cost < (1.0 - policy.least_share) * cost
+    priors = relieved and _leaves_a_signal_at_its_floor(tried)
     helps = priors or power_share(wide, same_hook * before, same_hook * after) >= policy.least_share
     below_floor = min(fall_below_floor(wide, k * before, k * after) for k in (1.0, below))
     return fall > least[0] and (helps or below_floor > least[1])
+
+
+def _leaves_a_signal_at_its_floor(tried: LinearSystem) -> bool:
+    """Whether of the signals in which the newest effect acts one has no group over its floor."""
+    acts, over = acts_in(tried), significant_groups(tried)
+    signals = [channel for _, channel, _ in tried.labels]
+    acted, missed = ({signals[n] for n in np.flatnonzero(where)} for where in (acts, acts & over))
+    return bool(acted - missed)
 
 
 def spoils(tried: LinearSystem, before: Array, after: Array, relief: float = 0.0) -> bool:
