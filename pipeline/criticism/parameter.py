@@ -82,6 +82,11 @@ class Parameter:
         """Whether the effect vanishes with this parameter."""
         return not self.scan
 
+    @property
+    def refines(self) -> bool:
+        """Whether it refines a form that is looked for without it: a shape of one trial value."""
+        return len(self.scan) == 1 and not self.choice and self.negligible == 0.0
+
 
 def choice(name: str, values: tuple[float, ...], words: str = "") -> Parameter:
     """A parameter that takes one of a few values and is never fitted.

@@ -308,6 +308,7 @@ class LinearSystem:
             matrix=matrix,
             prior_precision=prior_precision,
             prior_gradient=prior_gradient,
+            model_column_count=int(np.count_nonzero(places < self.model_column_count)),
         )
 
     def after(self, places: Indices, step: Array) -> Array:

@@ -170,8 +170,18 @@ def sure_amplitudes(system: LinearSystem, held_out: HeldOut, effect: Effect) -> 
         As `is_determined` asks it of them, each as one of several; none of a coupling without a
         twist that is sure, nor of one that full logs exclude.
 
+    Notes
+    -----
+    Shapes that refine a form stay as they are fitted: a bump of drag at low speed is there whatever
+    its exponent is, though the exponent makes its height at standstill unsure.
+
     """
     parameters = effect.parameters_of(system.fit.machine)
+    refining = {f"{effect.name}.{p.name}" for p in parameters if p.refines}
+    kept = [n for n, column in enumerate(system.columns) if column.name not in refining]
+    if len(kept) < len(system.columns):
+        system = system.only(np.array(kept, dtype=int))
+        held_out = leave_out(system)
     least, discrimination = system.policy.selection.least_u, discriminate(system.fit, effect)
     amplitudes = [p for p in parameters if p.amplitude and p.negligible > 0.0]
     sure = significantly_nonzero(system, held_out, least_of_several(least, len(amplitudes)))
