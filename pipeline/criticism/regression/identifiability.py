@@ -247,6 +247,37 @@ def together_nonzero(
     return fit.excludes_zero(float(gradient[at] @ values), gradient, least)
 
 
+def product_nonzero(
+    system: LinearSystem, held_out: HeldOut, names: tuple[str, str], least: float
+) -> bool:
+    """Whether the product of two parameters differs significantly from zero, so that neither is.
+
+    Parameters
+    ----------
+    system
+        Around a fit.
+    held_out
+        What leaving out captures moves.
+    names
+        The parameters.
+    least
+        Standard uncertainties that it must be away from zero.
+
+    Returns
+    -------
+    bool
+        Far below its resonance a spring shows share and twist of its inertia as a product only.
+
+    """
+    parameters = [column.name for column in system.columns[: system.model_columns.size]]
+    if not set(names) <= set(parameters):
+        return False
+    one, other = (system.fit.values[name] for name in names)
+    gradient = np.zeros(len(parameters))
+    gradient[[parameters.index(name) for name in names]] = other, one
+    return known(system, held_out).excludes_zero(one * other, gradient, least, bent=True)
+
+
 def least_of_several(least: float, count: int) -> float:
     """How far the largest of several numbers must be from zero to be no more likely by chance than
     one number alone.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from pipeline.criticism.regression.cross_validation import (
 from pipeline.criticism.regression.goodness import floor_factors, significant_groups
 from pipeline.criticism.regression.identifiability import (
     least_of_several,
+    product_nonzero,
     significantly_nonzero,
     together_nonzero,
 )
@@ -185,16 +187,20 @@ def sure_amplitudes(system: LinearSystem, held_out: HeldOut, effect: Effect) -> 
     least, discrimination = system.policy.selection.least_u, discriminate(system.fit, effect)
     amplitudes = [p for p in parameters if p.amplitude and p.negligible > 0.0]
     sure = significantly_nonzero(system, held_out, least_of_several(least, len(amplitudes)))
+    twists = [p for p in parameters if p.negligible > 0 and not p.amplitude]
+    for pair in product(amplitudes, twists):
+        names = f"{effect.name}.{pair[0].name}", f"{effect.name}.{pair[1].name}"
+        sure |= set(names) if product_nonzero(system, held_out, names, least) else set()
     excluded = discrimination is not None and discrimination.name is None
     logged = {p.name: (system.fit.size(effect, p), p.u) for p in parameters if p.u > 0.0}
     logged |= discrimination.values if discrimination is not None else {}
     by_logs = {name for name, (size, u) in logged.items() if size > least * u}
     nonzero = [p for p in parameters if f"{effect.name}.{p.name}" in sure or p.name in by_logs]
-    twists = [p for p in parameters if p.negligible > 0 and not p.amplitude]
     coupled = effect.discriminator is None or not twists or any(p in nonzero for p in twists)
-    names = [f"{effect.name}.{p.name}" for p in amplitudes]
     present = [p for p in amplitudes if p in nonzero]
-    if not present and together_nonzero(system, held_out, names, least):
+    if not present and together_nonzero(
+        system, held_out, [f"{effect.name}.{p.name}" for p in amplitudes], least
+    ):
         present = amplitudes
     return present if coupled and not excluded else []
 
