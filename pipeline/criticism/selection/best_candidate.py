@@ -13,6 +13,7 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.acceptance import Baseline, acts_in, is_determined, matters
+from pipeline.criticism.selection.improvement import deviance_with_full_logs
 from pipeline.criticism.selection.pruning import reshaped, trimmed, with_all_terms
 from pipeline.criticism.selection.refit import refitted, reweighted
 from pipeline.criticism.selection.score_test import Score
@@ -129,6 +130,9 @@ def _best_that_passes(usual: Baseline, close: Sequence[Score]) -> LinearSystem |
     4. evidence below the floor does so even if any form found is wrong, and beside an effect of the
        same hook by `same_hook_penalties`, since what a form leaves there is of that size;
     5. so predicted, what it mends is more than what it spoils where it acts.
+
+    The best is that of the least deviance, its penalty paid; what full logs show of a coupling
+    counts for it.
     """
     wide, added = usual.wide, usual.added
     tests = {segment.test for segment in wide.segments}
@@ -143,9 +147,11 @@ def _best_that_passes(usual: Baseline, close: Sequence[Score]) -> LinearSystem |
         # of two that tie, the one that benches have and that some capture here was made to show
         far = is_rare(effect, tried.fit) or set(effect.tests).isdisjoint(tests)
         unsought = wide.policy.selection.tie if far else 0.0
-        cost = tried.deviance - base.deviance + score.penalty + unsought
+        unpaid = score.penalty + unsought - base.deviance
+        cost = deviance_with_full_logs(tried) + unpaid
         if (
             matters(tried, base, baseline.significant)
+            and tried.deviance + unpaid < 0.0
             and cost < least
             and baseline.is_improved_by(tried, score)
         ):

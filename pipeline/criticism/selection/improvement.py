@@ -173,3 +173,23 @@ def _pools(system: LinearSystem, reduced_chi2: Array) -> tuple[Indices, Flags]:
     nats = np.bincount(pool, system.counts * np.log(np.maximum(reduced_chi2, 1.0)))
     policy = system.policy.selection
     return pool, nats > np.minimum(policy.excess, policy.excess_a_sample * count)
+
+
+def deviance_with_full_logs(system: LinearSystem) -> float:
+    """The deviance of a fit, less what full logs say of its newest effect, which is in no row: the
+    square of a twist or gap over its uncertainty.
+
+    Parameters
+    ----------
+    system
+        The fit.
+
+    """
+    fit = system.fit
+    significance = [
+        (fit.size(effect, p) / p.u) ** 2
+        for effect in fit.model.effects[-1:]
+        for p in effect.parameters_of(fit.machine)
+        if p.u > 0.0 and not p.amplitude
+    ]
+    return system.deviance - max(significance, default=0.0)

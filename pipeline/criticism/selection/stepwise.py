@@ -19,6 +19,7 @@ from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_far_starts
 from pipeline.criticism.selection.free_shares import with_changing_friction, with_free_shares
+from pipeline.criticism.selection.improvement import deviance_with_full_logs
 from pipeline.criticism.selection.other_readings import by_best_readings, with_usual_readings
 from pipeline.criticism.selection.pairs import best_pair
 from pipeline.criticism.selection.pruning import reshaped, unsure_effect, without_superfluous
@@ -154,7 +155,7 @@ def _instead_of_effect(
     unnamed = [with_free_shares(wide), *(end for end in (reread, rechosen) if end is not wide)]
     instead = min(filter(None, unnamed), key=lambda end: end.deviance, default=None)
     changing = with_changing_friction(wide)
-    least = math.inf if chosen is None else _with_full_logs(chosen)
+    least = math.inf if chosen is None else deviance_with_full_logs(chosen)
     if instead is not None and instead.deviance >= least + tie:
         instead = None
     if changing is not None and changing.deviance < least - tie:
@@ -271,7 +272,7 @@ def _may_be_there(wide: LinearSystem, score: Score) -> bool:
 
 def _cost(system: LinearSystem) -> float:
     """The deviance of a fit with the penalty of its parameters."""
-    return _with_full_logs(system) + math.log(system.size) * system.model_columns.size
+    return deviance_with_full_logs(system) + math.log(system.size) * system.model_columns.size
 
 
 def _refloored(system: LinearSystem, base: int) -> Fit:
@@ -279,13 +280,3 @@ def _refloored(system: LinearSystem, base: int) -> Fit:
     fit, effects = system.fit, system.fit.model.effects[base:]
     fit = replace(fit, tolerance=tolerances(fit, effects))
     return floored_anew(fit, system) if effects else fit
-
-
-def _with_full_logs(system: LinearSystem) -> float:
-    """The deviance of a fit, less what full logs say of its newest effect, which is in no row: the
-    square of a twist or gap over its uncertainty.
-    """
-    effect = system.fit.model.effects[-1]
-    shapes = [p for p in effect.parameters_of(system.fit.machine) if p.u > 0.0 and not p.amplitude]
-    significance = [(system.fit.size(effect, p) / p.u) ** 2 for p in shapes]
-    return system.deviance - max(significance, default=0.0)
