@@ -12,6 +12,7 @@ from pipeline.estimation.electrical.magnet_temperature import (
     magnet_uncertainties,
     unlogged_note,
 )
+from pipeline.estimation.mechanical.shaft_nuisances import LOAD_BETWEEN
 from pipeline.estimation.mechanical.shaft_regimes import shaft_partitions
 from pipeline.estimation.mechanical.shaft_rows import (
     ACCELERATION_NOISE,
@@ -48,8 +49,8 @@ EXPERIMENT = (
     "steps at several speeds of both senses"
 )
 NUISANCES = (
-    "offset", "d q current", "q current cubed", "load lag", "current lag", "load friction",
-    "windage",
+    "offset", "d q current", "q current cubed", "load lag", LOAD_BETWEEN, "current lag",
+    "load friction", "windage",
 )  # fmt: skip
 STEP_1_K = 1e-5
 

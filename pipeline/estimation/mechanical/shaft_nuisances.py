@@ -10,14 +10,16 @@ CURRENT_LAG, JUMPS = "current lag", "current jumps"
 """A current that is late, and one that jumps between its samples."""
 CURVATURE = "curvature of the current"
 """Second derivative of the q current: what a lag leaves of a late current, to second order."""
+LOAD_BETWEEN = "load between its samples"
+"""What the current does between the samples of a load that is slower than it."""
 TIMING = frozenset({CURRENT_LAG, JUMPS})
 """What is not known of a current's instant."""
 SAMPLED = "sampled current"
 """A current that is sampled off the middle of its pulse: by a dead time pulses are late, and the
 back-EMF moves the current on in proportion to speed."""
 NUISANCES = (
-    OFFSET, "load friction", "load lag", *sorted(TIMING), "d current", "d current cos",
-    "d current sin", "q current cubed", "d squared q current", "d q current cubed",
+    OFFSET, "load friction", "load lag", LOAD_BETWEEN, *sorted(TIMING), "d current",
+    "d current cos", "d current sin", "q current cubed", "d squared q current", "d q current cubed",
     "eccentric cos", "eccentric sin", "unbalance cos", "unbalance sin",
 )  # fmt: skip
 """What may join any fit."""

@@ -22,6 +22,7 @@ from pipeline.estimation.mechanical.shaft_nuisances import (
     CURRENT_LAG,
     CURVATURE,
     JUMPS,
+    LOAD_BETWEEN,
     OFFSET,
     RELUCTANCE,
     SAMPLED,
@@ -34,6 +35,7 @@ from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.shaft_log import SPEED, motion_column
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.records.capture import Array, Capture, Flags, Indices
+from pipeline.records.row_means import slower_rows
 
 DRIVE, COAST = 0, 1
 ACCELERATION_NOISE, CURRENT_NOISE = "acceleration noise", "current noise"
@@ -137,6 +139,7 @@ class _Part:
     direct: Array
     warm: Array
     load: Array
+    between: Array
     ripple: tuple[Array, Array]
     hidden: Flags
 
@@ -223,9 +226,33 @@ def _part(capture: Capture, winding: Winding | None) -> _Part | None:
     return _Part(
         capture, kind, weak, theta, speed, current, columns.get("id_a", current * 0.0),
         columns.get("temp_magnet_degc", current * 0.0 + 25.0) - 25.0,
-        columns.get("torque_shaft_nm", current * 0.0),
+        columns.get("torque_shaft_nm", current * 0.0), between_samples(capture, t, current),
         _ripple(capture, winding, weak.integral(theta, 1)), _hidden(weak, theta, kind),
     )  # fmt: skip
+
+
+def between_samples(capture: Capture, t_s: Array, current_a: Array) -> Array:
+    """Current [n, A] beside the straight line between the instants of a slower load; else 0.
+
+    Parameters
+    ----------
+    capture
+        Of a drive.
+    t_s, current_a
+        Instants [n, s] of the current's rows, and the current [n, A].
+
+    Notes
+    -----
+    A load that follows the current is off a straight line between its own samples as the current
+    is. Of one that is sampled less than twice a period of the current nothing else is known there.
+
+    """
+    if not capture.has("torque_shaft_nm"):
+        return np.zeros(t_s.size)
+    at = capture.tables[capture.table_of("torque_shaft_nm")]["t_s"].to_numpy()
+    if not slower_rows(at, t_s):
+        return np.zeros(t_s.size)
+    return current_a - np.interp(t_s, at, np.interp(at, t_s, current_a))
 
 
 def _hidden(weak: WeakRows, theta: Array, kind: int) -> Flags:
@@ -373,6 +400,7 @@ def _nuisances(part: _Part) -> dict[str, Array]:
         "d squared q current": weak.integral(part.direct**2 * part.current),
         "d q current cubed": weak.integral(part.direct * part.current**3),
         "load lag": weak.integral(part.load, 1) * driven,
+        LOAD_BETWEEN: weak.integral(part.between),
         CURRENT_LAG: weak.integral(part.current, 1) * driven,
         CURVATURE: weak.integral(part.current, 2) * driven,
         "eccentric cos": weak.integral(turning.real, 2),

@@ -1,0 +1,56 @@
+"""A torque that is sampled more slowly than the current that makes it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.contracts.clocks import held_apart
+from pipeline.estimation.registry import fit_all
+from pipeline.numerics.integrals import trapezoid
+from pipeline.records.capture import Campaign, Capture
+from tests.unit.estimation.signals import capture
+
+KT_NM_A, J_KGM2, COULOMB_NM, VISCOUS = 0.4, 1.4e-5, 0.02, 7e-5
+TRUE = {"kt_peak_nm_a": KT_NM_A, "j_rotor_kgm2": J_KGM2}
+
+
+def log(seed: int, rows: int) -> Capture:
+    """Two machines back to back, the other one six times as heavy: current of 0.5 to 60 Hz in rows
+    of 0.5 ms, and a torque that is new in each of `rows`.
+    """
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(0.0, 5.0, 5e-4)
+    phase = 2.0 * np.pi * np.outer(t_s, np.geomspace(0.5, 60.0, 20)) + rng.uniform(0.0, 6.28, 20)
+    current = 0.3 * np.sin(phase).sum(axis=1)
+    slow = 250.0 + 45.0 * np.sin(2.5 * t_s)
+    gain = np.gradient(slow, t_s) + KT_NM_A * current / (7.0 * J_KGM2)
+    omega = slow[0] + trapezoid(t_s, gain)
+    load = KT_NM_A * current - COULOMB_NM - VISCOUS * omega - J_KGM2 * gain
+    load = load + 4e-4 * rng.normal(size=t_s.size)
+    step = 2.0 * np.pi / 65536
+    return held_apart(
+        capture(
+            "drive",
+            f"d{seed}",
+            t_s=t_s,
+            iq_a=current + 1e-3 * rng.normal(size=t_s.size),
+            id_a=0.0 * t_s,
+            theta_mech_rad=np.round(trapezoid(t_s, omega) / step) * step,
+            torque_shaft_nm=load[np.arange(t_s.size) // rows * rows],
+            temp_magnet_degc=np.full(t_s.size, 25.0),
+        )
+    )[0]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("rows", [10, 20])
+def test_a_torque_of_100_or_200_hz_beside_a_current_of_60_hz(seed: int, rows: int) -> None:
+    """Between two of its samples a load that follows the current is no straight line."""
+    known = fit_all(Campaign("m", (log(seed, rows),)), {})[0]
+    for name, true in TRUE.items():
+        one = known.best(name)
+        assert one is None or abs(one.number - true) < 3.0 * one.u, name
+    kt = known.best("kt_peak_nm_a")
+    assert kt is not None
+    assert kt.u < 0.03 * KT_NM_A
