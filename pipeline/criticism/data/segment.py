@@ -69,6 +69,9 @@ class Sensors:
     phase_samples
         Samples over which an angle is smoothed that is the phase of the line voltages, whose noise
         it then has; 0 of any other.
+    torque_s
+        Instants of a torque that is sampled more slowly than the log [s, from its first row], which
+        is on straight lines between them; None of any other.
 
     """
 
@@ -82,6 +85,7 @@ class Sensors:
     speed: SpeedSensor | None = None
     held_speed: bool = False
     phase_samples: int = 0
+    torque_s: Array | None = None
 
     @property
     def rounded(self) -> bool:

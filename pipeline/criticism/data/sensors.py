@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.sensors import SensorNoise
+from pipeline.records.capture import Capture
+from pipeline.records.row_means import slower_rows
 
 TEMPERATURES = ("temp_winding_degc", "temp_magnet_degc")
 
@@ -60,6 +63,67 @@ def prepared(
     if "torque_shaft_nm" in columns:
         columns["behind_nm"] = play_lag(columns["torque_shaft_nm"], policy.cutting.play_share)
     return Sensors(noise, steps, runs, speed=speed)
+
+
+def with_slow_torque(
+    capture: Capture, columns: Mapping[str, Array], sensors: Sensors, period: float, policy: Policy
+) -> tuple[Sensors, int]:
+    """The sensors of a log whose torque may be sampled more slowly than its rows.
+
+    Parameters
+    ----------
+    capture
+        The log.
+    columns
+        Its columns [n] on an even clock, with `torque_shaft_nm` on straight lines.
+    sensors
+        As `prepared` made them.
+    period
+        Of that clock [s].
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    sensors : Sensors
+        With the instants of a slower torque, and white noise of the rows that is as loud in means
+        as that of its samples.
+    rows : int
+        Rows from one sample of such a torque to the next; 0 of any other.
+
+    """
+    if "torque_shaft_nm" not in columns:
+        return sensors, 0
+    rows = capture.arrays("t_s", *(set(columns) & set(capture.columns)), masked=False)["t_s"]
+    torque = capture.finite("t_s", "torque_shaft_nm")
+    if not slower_rows(torque["t_s"], rows):
+        return sensors, 0
+    every = max(round(float(np.median(np.diff(torque["t_s"]))) / period), 1)
+    at_s = (torque["t_s"] - rows[0]) / period
+    direct, quadrature = (
+        np.interp(at_s, np.arange(columns["iq_a"].size), columns.get(name, 0.0 * columns["iq_a"]))
+        for name in ("id_a", "iq_a")
+    )
+    driving = np.column_stack([quadrature, direct, direct * quadrature])
+    beside = beside_columns(torque["torque_shaft_nm"], driving)
+    sigma = sensor_noise(beside, policy.sensor_noise) * math.sqrt(every)
+    noise = {**sensors.noise, "torque_shaft_nm": sigma}
+    return replace(sensors, noise=noise, torque_s=torque["t_s"] - rows[0]), every
+
+
+def beside_columns(signal: Array, columns: Array) -> Array:
+    """What is quick in a signal [n] and no sum of columns [n, k], by its third differences.
+
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit].
+    columns
+        What makes it change as fast as its noise does [n, k].
+
+    """
+    shares, *_ = np.linalg.lstsq(np.diff(columns, 3, axis=0), np.diff(signal, 3), rcond=None)
+    return signal - columns @ shares
 
 
 def noise_and_steps(

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
-from pipeline.criticism.data.sensors import TEMPERATURES, prepared
+from pipeline.criticism.data.sensors import TEMPERATURES, prepared, with_slow_torque
 from pipeline.criticism.data.shaft_angle import (
     ANGLES,
     held_speed,
@@ -20,7 +20,7 @@ from pipeline.criticism.data.shaft_angle import (
     with_angle,
     with_smooth_angle,
 )
-from pipeline.criticism.data.traces import even_clock, thinned, window_between_gaps
+from pipeline.criticism.data.traces import PAD, even_clock, thinned, window_between_gaps
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
@@ -91,6 +91,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     orders = machine.electrical_orders if angle and turned > policy.turning_rad else ()
     sensors = prepared(columns, period, machine.policy, speed, machine.ripple_orders)
     sensors = with_smooth_angle(capture, columns, sensors, machine, window)
+    sensors, every = with_slow_torque(capture, columns, sensors, period, machine.policy)
     keep = out_of_step(capture, columns["theta_mech_rad"], keep, machine, window)
     if held and torque:
         # a noisy speed that is differenced, times J, would be a torque
@@ -109,7 +110,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     logged = capture.meta.test == "drive" and len(channels) > 2
     full = {**columns, "good": keep.astype(float)} if logged else None
     log = whole_log(columns, period, policy)
-    columns, starts = thinned(columns, keep, window, most)
+    columns, starts = thinned(columns, keep, window, most, PAD + 2 * every)
     if not starts.size:
         return None
     weak = projection(columns["theta_mech_rad"], starts, window, orders)
