@@ -2,7 +2,8 @@
 
 Speed and amplitude both come from the voltages, v = j omega psi e^{j theta}: flux is amplitude
 over the rate of the voltage's own phase, so an eccentric, quantised or lagging angle sensor does
-not enter. The angle, where there, only counts pole pairs and gives the offset to the d axis.
+not enter. The angle, where there, counts pole pairs and gives the offset to the d axis; of a speed
+that is not steady it is the better clock where it leaves less.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ import numpy as np
 from pipeline.estimation.electrical.spin import Complex, Spin
 from pipeline.estimation.electrical.steady_speed import Stretch
 from pipeline.numerics.least_squares import autocorrelation_time
+from pipeline.numerics.weak_rows import smooth_speed
+from pipeline.physics.pole_pairs import pole_pairs_from
 from pipeline.records.capture import Array
 
 
@@ -185,6 +188,41 @@ def electrical_per_mechanical(spin: Spin, stretches: Sequence[Stretch]) -> tuple
             mechanical += abs(speed) * stretch.rows.size
     ratio = electrical / mechanical if mechanical > 0.0 else math.nan
     return ratio, spin.theta_rad is not None
+
+
+def by_angle(spin: Spin, stretch: Stretch, ratio: float) -> Stretch | None:
+    """The same rows by the shaft's angle in place of the voltage's own phase.
+
+    Parameters
+    ----------
+    spin
+        The voltages of one capture, with angle where there.
+    stretch
+        Rows by the voltage's own phase.
+    ratio
+        Electrical over mechanical speed, signed (`electrical_per_mechanical`) [1].
+
+    Returns
+    -------
+    Stretch or None
+        None without an angle, or where the ratio is no number of pole pairs.
+
+    Notes
+    -----
+    The voltage's phase is smoothed over a cycle, so a speed that changes within one, as by hand, is
+    not in it: of the wave that it times a part is then lost.
+
+    """
+    if spin.theta_rad is None or pole_pairs_from(abs(ratio), 1.0).number is None:
+        return None
+    angle, times = spin.theta_rad[stretch.rows], spin.t_s[stretch.rows]
+    if not np.isfinite(angle).all():
+        return None
+    phase = round(ratio) * angle
+    offset = np.angle(np.exp(1j * (stretch.phase_rad - phase)).sum())
+    width_s = max(0.005, 10.0 * float(np.median(np.diff(times))))
+    rate = round(ratio) * smooth_speed(times, angle, width_s)
+    return Stretch(stretch.rows, phase + offset, rate)
 
 
 def _measured_phase(vector: Complex, stretch: Stretch) -> Array:

@@ -51,6 +51,11 @@ class Stretch:
         ends = self.omega_elec_rad_s[-quarter:].mean() - self.omega_elec_rad_s[:quarter].mean()
         return abs(float(ends) / self.speed_rad_s)
 
+    @property
+    def change(self) -> float:
+        """Relative change from the lowest to the highest speed."""
+        return abs(float(np.ptp(self.omega_elec_rad_s)) / self.speed_rad_s)
+
 
 def steady_stretches(spin: Spin, change: float) -> list[Stretch]:
     """Stretches of at least three cycles in which the speed stays within `change`, relative.

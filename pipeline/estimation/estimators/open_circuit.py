@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.special import fdtrc
 
-from pipeline.estimation.electrical.back_emf import flux_of
+from pipeline.estimation.electrical.back_emf import by_angle, electrical_per_mechanical, flux_of
 from pipeline.estimation.electrical.magnet_temperature import (
     assumed_temperature,
     magnet_column,
@@ -148,8 +148,12 @@ def _groups(
         if not stretches:
             least = policy().back_emf.least_cycles
             notes.append(f"{capture.path}: no steady stretch of {least} electrical cycles found")
+        ratio = electrical_per_mechanical(spin, stretches)[0]
         for stretch in stretches:
             flux = flux_of(spin, stretch, ORDERS)
+            other = by_angle(spin, stretch, ratio)
+            if other is not None and stretch.change > options["speed_change"]:
+                flux = min(flux, flux_of(spin, other, ORDERS), key=lambda one: one.u_psi_wb)
             temp = fallback if flux.temp_degc is None else flux.temp_degc
             groups.append(Group(capture, spin, stretch, flux, temp))
     return groups, notes
