@@ -98,8 +98,8 @@ def share_of_no_torque(rows: ShaftRows, drag: DragFit) -> float:
         return 0.0
     drives = rows.kind == DRIVE
     others = [k for k, name in enumerate(drag.names) if not is_of_current(name)]
-    without = linear_fit(drag.design[drives][:, others], drag.target[drives])
-    costs = [float(np.sum(r**2)) for r in (drag.residuals[drives], without.residuals)]
+    without = linear_fit(drag.design[:, others], drag.target, drag.sigma)
+    costs = [float(np.sum(r[drives] ** 2)) for r in (drag.residuals, without.residuals)]
     if drag.by_current:
         costs[0] = max(costs[0] - float(np.sum(drag.sigma[drives] ** 2)), 0.0)
     return min(costs[0] / costs[1], 1.0) if costs[1] > 0.0 else 1.0
