@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records.parse import number
-from pipeline.records.row_means import row_means, slower_rows
+from pipeline.records.row_means import curve_between, row_means, slower_rows
 
 if TYPE_CHECKING:
     import polars as pl
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 
+_DQ_CURRENTS = ("id_a", "iq_a")
 _ALTERNATING = frozenset(
     name for line in ("a", "b", "c", "ab", "bc", "ca") for name in (f"v{line}_v", f"i{line}_a")
 )
@@ -304,10 +305,11 @@ class Capture:
         -------
         dict of array [n]
             Each column in its unit. The clock is that of `table_of`; columns of other tables are
-            interpolated linearly onto it, from their own unmasked, finite samples, and are NaN
-            outside their own span. Beside slower rows that are means (`voltage_timing`) they are
-            means over the row as well, but for angles, which have one value at an instant: an
-            oscillation that the rows average out is no noise of the other column.
+            interpolated onto it, slower dq currents as `curve_between` does and others linearly,
+            from their own unmasked, finite samples, and are NaN outside their own span. Beside
+            slower rows that are means (`voltage_timing`) they are means over the row as well, but
+            for angles, which have one value at an instant: an oscillation that the rows average out
+            is no noise of the other column.
 
         Raises
         ------
@@ -353,6 +355,8 @@ class Capture:
                 means = self.meta.voltage_timing == "centred" and not name.startswith("theta_")
                 if means and slower_rows(row_s, sample_s):
                     return row_means(row_s, sample_s, samples)
+                if name in _DQ_CURRENTS:
+                    return curve_between(row_s, sample_s, samples)
                 return np.interp(row_s, sample_s, samples, left=np.nan, right=np.nan)
         raise KeyError(f"{self.path} holds no column {name}")
 

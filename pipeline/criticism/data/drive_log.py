@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.criticism.data.segment import Sensors
-from pipeline.criticism.data.sensors import TEMPERATURES, prepared
+from pipeline.criticism.data.sensors import TEMPERATURES, prepared, with_slow_columns
 from pipeline.criticism.data.shaft_angle import shaft_angle
 from pipeline.criticism.data.traces import even_clock
 from pipeline.criticism.operating import Array, Flags, Indices
@@ -79,6 +79,7 @@ def drive_log(capture: Capture, machine: Machine) -> DriveLog | None:
     if speed is not None:
         columns["omega_mech_rad_s"] = speed
     sensors = prepared(columns, period, machine.policy, sensor, machine.ripple_orders)
+    sensors, _ = with_slow_columns(capture, columns, sensors, period, machine.policy)
     angle = any("theta" in name for name in moving)
     return DriveLog(period, columns, keep, sensors, speed is not None, angle)
 

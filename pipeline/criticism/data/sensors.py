@@ -20,6 +20,7 @@ from pipeline.records.capture import Capture
 from pipeline.records.row_means import slower_rows
 
 TEMPERATURES = ("temp_winding_degc", "temp_magnet_degc")
+CURRENTS, TORQUE = ("id_a", "iq_a"), "torque_shaft_nm"
 
 
 def prepared(
@@ -65,17 +66,17 @@ def prepared(
     return Sensors(noise, steps, runs, speed=speed)
 
 
-def with_slow_torque(
+def with_slow_columns(
     capture: Capture, columns: Mapping[str, Array], sensors: Sensors, period: float, policy: Policy
 ) -> tuple[Sensors, int]:
-    """The sensors of a log whose torque may be sampled more slowly than its rows.
+    """The sensors of a log whose currents or torque may be sampled more slowly than its rows.
 
     Parameters
     ----------
     capture
         The log.
     columns
-        Its columns [n] on an even clock, with `torque_shaft_nm` on straight lines.
+        Its columns [n] on an even clock; slower ones are on straight lines.
     sensors
         As `prepared` made them.
     period
@@ -86,29 +87,39 @@ def with_slow_torque(
     Returns
     -------
     sensors : Sensors
-        With the instants of a slower torque, and white noise of the rows that is as loud in means
-        as that of its samples.
+        With white noise of the rows that is as loud in means as that of a slower column's samples,
+        for a current with what straight lines miss of it; and the instants of a slower torque.
     rows : int
         Rows from one sample of such a torque to the next; 0 of any other.
 
+    Notes
+    -----
+    Straight lines miss u (1 − u)/2 of a second difference d at a part u of the way: in the mean
+    square d²/120. Nothing is known of what a current does faster than its samples.
+
     """
-    if "torque_shaft_nm" not in columns:
-        return sensors, 0
-    rows = capture.arrays("t_s", *(set(columns) & set(capture.columns)), masked=False)["t_s"]
-    torque = capture.finite("t_s", "torque_shaft_nm")
-    if not slower_rows(torque["t_s"], rows):
-        return sensors, 0
-    every = max(round(float(np.median(np.diff(torque["t_s"]))) / period), 1)
-    at_s = (torque["t_s"] - rows[0]) / period
-    direct, quadrature = (
-        np.interp(at_s, np.arange(columns["iq_a"].size), columns.get(name, 0.0 * columns["iq_a"]))
-        for name in ("id_a", "iq_a")
-    )
-    driving = np.column_stack([quadrature, direct, direct * quadrature])
-    beside = beside_columns(torque["torque_shaft_nm"], driving)
-    sigma = sensor_noise(beside, policy.sensor_noise) * math.sqrt(every)
-    noise = {**sensors.noise, "torque_shaft_nm": sigma}
-    return replace(sensors, noise=noise, torque_s=torque["t_s"] - rows[0]), every
+    rows = capture.arrays("t_s", *(set(columns) & capture.columns), masked=False)["t_s"]
+    noise, every = dict(sensors.noise), 0
+    for name in {*CURRENTS, TORQUE} & set(columns) & capture.columns:
+        slow = capture.finite("t_s", name)
+        if not slower_rows(slow["t_s"], rows):
+            continue
+        count = max(round(float(np.median(np.diff(slow["t_s"]))) / period), 1)
+        missed = float(np.std(np.diff(slow[name], 2))) / math.sqrt(120.0)
+        if name == TORQUE:
+            every, missed = count, 0.0
+            sensors = replace(sensors, torque_s=slow["t_s"] - rows[0])
+            at = (slow["t_s"] - rows[0]) / period
+            driving = [
+                np.interp(at, np.arange(columns[n].size), columns[n])
+                for n in CURRENTS
+                if n in columns
+            ]
+            driving = [*driving, np.prod(driving, axis=0)]
+            slow[name] = beside_columns(slow[name], np.column_stack(driving))
+        sigma = math.hypot(sensor_noise(slow[name], policy.sensor_noise), missed)
+        noise[name] = sigma * math.sqrt(count)
+    return replace(sensors, noise=noise), every
 
 
 def beside_columns(signal: Array, columns: Array) -> Array:

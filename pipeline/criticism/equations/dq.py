@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
-from pipeline.criticism.data.sensors import TEMPERATURES, prepared, with_slow_torque
+from pipeline.criticism.data.sensors import TEMPERATURES, prepared, with_slow_columns
 from pipeline.criticism.data.shaft_angle import (
     ANGLES,
     held_speed,
@@ -91,7 +91,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     orders = machine.electrical_orders if angle and turned > policy.turning_rad else ()
     sensors = prepared(columns, period, machine.policy, speed, machine.ripple_orders)
     sensors = with_smooth_angle(capture, columns, sensors, machine, window)
-    sensors, every = with_slow_torque(capture, columns, sensors, period, machine.policy)
+    sensors, every = with_slow_columns(capture, columns, sensors, period, machine.policy)
     keep = out_of_step(capture, columns["theta_mech_rad"], keep, machine, window)
     if held and torque:
         # a noisy speed that is differenced, times J, would be a torque

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import in_time
 from pipeline.criticism.data.segment import Segment, segment_of
-from pipeline.criticism.data.sensors import TEMPERATURES, prepared, with_slow_torque
+from pipeline.criticism.data.sensors import TEMPERATURES, prepared, with_slow_columns
 from pipeline.criticism.data.shaft_angle import shaft_angle, with_angle, with_smooth_angle
 from pipeline.criticism.data.traces import PAD, even_clock, thinned, window_between_gaps
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
@@ -52,7 +52,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     window = window_between_gaps(period, keep, policy)
     sensors = prepared(columns, period, machine.policy, speed, machine.ripple_orders)
     sensors = with_smooth_angle(capture, columns, sensors, machine, window)
-    sensors, every = with_slow_torque(capture, columns, sensors, period, machine.policy)
+    sensors, every = with_slow_columns(capture, columns, sensors, period, machine.policy)
     columns["t_s"] = period * np.arange(size, dtype=np.float64)
     cut_out, starts = thinned(columns, keep, window, policy.windows, PAD + 2 * every)
     by_angle = "omega_mech_rad_s" not in angle

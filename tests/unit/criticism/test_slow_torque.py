@@ -69,3 +69,43 @@ def test_what_a_load_does_between_its_samples_has_no_name(seed: int) -> None:
 def test_a_drag_shows_in_such_a_torque() -> None:
     found = run(log(3, windage=8e-6))
     assert found.missing == ("windage",)
+
+
+def of_slow_currents(seed: int, windage: float = 0.0) -> Campaign:
+    """A free shaft whose angle and voltages are new in every row of 0.5 ms, and whose currents, of
+    up to 40 Hz, come by a bus of 200 Hz.
+    """
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(0.0, 8.0, PERIOD_S)
+    rates = 2.0 * np.pi * np.geomspace(0.4, 40.0, 16)
+    angle = np.outer(t_s, rates) + rng.uniform(0.0, 6.28, rates.size)
+    torque = 0.3 * np.sin(angle).sum(axis=1)
+    w = np.zeros(t_s.size)
+    for k in range(t_s.size - 1):
+        dry = 0.08 * np.tanh(w[k] / 0.3) + 4e-4 * w[k] + windage * w[k] * abs(w[k])
+        w[k + 1] = w[k] + PERIOD_S * (torque[k] - dry) / J_KGM2 / 4.0
+    i_q = torque / (1.5 * PAIRS * PSI_WB)
+    noise = rng.normal(size=(4, t_s.size))
+    held = np.arange(t_s.size) // 10 * 10
+    step = 2.0 * np.pi / 65536
+    columns = {
+        "t_s": t_s,
+        "theta_mech_rad": np.round(trapezoid(t_s, w) / step) * step,
+        "id_a": (3e-3 * noise[0])[held],
+        "iq_a": (i_q + 3e-3 * noise[1])[held],
+        "vd_v": -PAIRS * w * LQ_H * i_q + 1e-2 * noise[2],
+        "vq_v": R_OHM * i_q + LQ_H * np.gradient(i_q, t_s) + PAIRS * w * PSI_WB + 1e-2 * noise[3],
+        "temp_winding_degc": np.full(t_s.size, 25.0),
+        "temp_magnet_degc": np.full(t_s.size, 25.0),
+    }
+    meta = CaptureMeta("m", "drive", pole_pairs=PAIRS, voltage_kind="measured")
+    capture = Capture(f"{seed}.csv", "0", "verified", meta, (pl.DataFrame(columns),))
+    return Campaign("m", (held_apart(capture)[0],))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_straight_lines_miss_of_a_slow_current_is_noise(seed: int) -> None:
+    """The noise of a row was that of straight lines, which is none."""
+    found = run(of_slow_currents(seed))
+    assert found.missing == ()
+    assert found.verdict != "unknown"

@@ -54,3 +54,33 @@ def test_a_torque_of_100_or_200_hz_beside_a_current_of_60_hz(seed: int, rows: in
     kt = known.best("kt_peak_nm_a")
     assert kt is not None
     assert kt.u < 0.03 * KT_NM_A
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_current_of_200_hz_beside_an_angle_of_2_khz(seed: int) -> None:
+    """Straight lines between its samples lack an eighth of a wave of 40 Hz, and J lacked a part."""
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(0.0, 8.0, 5e-4)
+    phase = 2.0 * np.pi * np.outer(t_s, np.geomspace(8.0, 40.0, 12)) + rng.uniform(0.0, 6.28, 12)
+    current = 0.4 * np.sin(phase).sum(axis=1)
+    slow = 100.0 * np.sin(1.3 * t_s)
+    inertia = 2e-3
+    gain = (KT_NM_A * current) / inertia + np.gradient(slow, t_s)
+    omega = 250.0 + trapezoid(t_s, gain)
+    drag = COULOMB_NM * np.sign(omega) + VISCOUS * omega
+    current = current + (drag + inertia * np.gradient(slow, t_s)) / KT_NM_A
+    step = 2.0 * np.pi / 65536
+    drive = capture(
+        "drive",
+        f"c{seed}",
+        t_s=t_s,
+        iq_a=(current + 1e-3 * rng.normal(size=t_s.size))[np.arange(t_s.size) // 10 * 10],
+        theta_mech_rad=np.round(trapezoid(t_s, omega) / step) * step,
+        temp_magnet_degc=np.full(t_s.size, 25.0),
+    )
+    stated = {"kt_peak_nm_a": KT_NM_A, "u_kt_peak_nm_a": 4e-4}
+    campaign = Campaign("m", (held_apart(drive)[0],), stated)
+    known = fit_all(campaign, {})[0]
+    inertia_found = known.best("j_rotor_kgm2")
+    assert inertia_found is not None
+    assert inertia_found.number == pytest.approx(inertia, rel=0.005)
