@@ -164,8 +164,8 @@ def test_orders_of_cogging_and_of_six_fold_ripple() -> None:
 
 
 def test_friction_that_coasts_show_takes_no_place_of_a_torque() -> None:
-    """A knot of the drag curve that drives pass only while they accelerate: 94 % of the acceleration
-    seemed to follow no torque, since the drives alone were fitted without it.
+    """Drives that pass a knot of the drag curve only while they accelerate: 94 % of that seemed to
+    follow no torque, since they were fitted without it by themselves.
     """
     rng = np.random.default_rng(1)
     torque = np.concatenate([np.ones(6), np.zeros(30)])
