@@ -161,7 +161,7 @@ EFFECT = Effect(
             "given_v",
             "V",
             0.01,
-            0.0005,
+            0.0,
             "voltage_v",
             low=0.0,
             high=0.5,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -142,19 +143,26 @@ def is_determined(system: LinearSystem, before: LinearSystem, effect: Effect | N
 
     Notes
     -----
+    Of one that takes most of what is over the floor any amplitude will do: a compensation that
+    gives back nearly all leaves a dead time of which the loss at large current may be zero.
     Counterexamples: a drag below the lowest speed of any capture can mend how friction changes
     sense at a reversal, while its own size is not known at all; and waves of the flux too small to
     matter are sure beside a large one that may be zero.
 
     """
-    effect = effect or system.fit.model.effects[-1]
-    present = sure_amplitudes(system, leave_out(system), effect)
-    return size_of(system.fit, effect, present) >= 1.0 or (
-        bool(present) and _takes_most(system, before, significant_groups(before), effect)
-    )
+    effect, held_out = effect or system.fit.model.effects[-1], leave_out(system)
+    if size_of(system.fit, effect, sure_amplitudes(system, held_out, effect)) >= 1.0:
+        return True
+    takes_most = _takes_most(system, before, significant_groups(before), effect)
+    return takes_most and bool(sure_amplitudes(system, held_out, effect, least_negligible=0.0))
 
 
-def sure_amplitudes(system: LinearSystem, held_out: HeldOut, effect: Effect) -> list[Parameter]:
+def sure_amplitudes(
+    system: LinearSystem,
+    held_out: HeldOut,
+    effect: Effect,
+    least_negligible: float = sys.float_info.min,
+) -> list[Parameter]:
     """The amplitudes of an effect that differ significantly from zero beside all that is fitted.
 
     Parameters
@@ -165,6 +173,8 @@ def sure_amplitudes(system: LinearSystem, held_out: HeldOut, effect: Effect) -> 
         What leaving out captures moves.
     effect
         The effect.
+    least_negligible
+        Of the amplitudes that are asked for; 0 for those too that alone make no such effect.
 
     Returns
     -------
@@ -185,7 +195,7 @@ def sure_amplitudes(system: LinearSystem, held_out: HeldOut, effect: Effect) -> 
         system = system.only(np.array(kept, dtype=int))
         held_out = leave_out(system)
     least, discrimination = system.policy.selection.least_u, discriminate(system.fit, effect)
-    amplitudes = [p for p in parameters if p.amplitude and p.negligible > 0.0]
+    amplitudes = [p for p in parameters if p.amplitude and p.negligible >= least_negligible]
     sure = significantly_nonzero(system, held_out, least_of_several(least, len(amplitudes)))
     twists = [p for p in parameters if p.negligible > 0 and not p.amplitude]
     for pair in product(amplitudes, twists):
