@@ -18,8 +18,9 @@ captures are better explained by straight lines between rows, it has none.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -103,10 +104,14 @@ def with_usual_readings(system: LinearSystem) -> LinearSystem:
     PWM period in the usual frame is half a period in that of the sampling instant.
 
     """
-    for is_usual, usual in _USUAL:
-        if all(map(is_usual, system.segments)):
+    readings = (
+        (attrgetter("instrument.frame"), _in_other_frame),
+        (attrgetter("instrument.behind"), _of_other_rows),
+    )
+    for earlier, other in readings:
+        if not any(map(earlier, system.segments)):
             continue
-        back = tuple(s if is_usual(s) else usual(s) for s in system.segments)
+        back = tuple(other(s) if earlier(s) else s for s in system.segments)
         tried = gauss_newton(replace(system.fit, segments=back), before=system)
         if tried.deviance < system.deviance + system.policy.selection.tie:
             system = tried
@@ -215,10 +220,3 @@ def _reads_torque(segment: Segment) -> bool:
 def _at_other_place(segment: Segment) -> Segment:
     instrument = segment.instrument
     return replace(segment, instrument=replace(instrument, stator=not instrument.stator))
-
-
-_USUAL: tuple[tuple[Callable[[Segment], bool], Callable[[Segment], Segment]], ...] = (
-    (lambda segment: segment.instrument.frame == 0.0, _in_other_frame),
-    (lambda segment: segment.instrument.behind == 0.0, _of_other_rows),
-)
-"""Whether a reading is usual that an effect may stand for, and how it becomes so."""
