@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -143,8 +142,8 @@ def is_determined(system: LinearSystem, before: LinearSystem, effect: Effect | N
 
     Notes
     -----
-    Of one that takes most of what is over the floor any amplitude will do: a compensation that
-    gives back nearly all leaves a dead time of which the loss at large current may be zero.
+    Of one that takes most of what is over the floor an optional term with a shape will do: what a
+    compensation gives back may be nearly all that a dead time takes at large current.
     Counterexamples: a drag below the lowest speed of any capture can mend how friction changes
     sense at a reversal, while its own size is not known at all; and waves of the flux too small to
     matter are sure beside a large one that may be zero.
@@ -154,14 +153,14 @@ def is_determined(system: LinearSystem, before: LinearSystem, effect: Effect | N
     if size_of(system.fit, effect, sure_amplitudes(system, held_out, effect)) >= 1.0:
         return True
     takes_most = _takes_most(system, before, significant_groups(before), effect)
-    return takes_most and bool(sure_amplitudes(system, held_out, effect, least_negligible=0.0))
+    return takes_most and bool(sure_amplitudes(system, held_out, effect, terms=True))
 
 
 def sure_amplitudes(
     system: LinearSystem,
     held_out: HeldOut,
     effect: Effect,
-    least_negligible: float = sys.float_info.min,
+    terms: bool = False,
 ) -> list[Parameter]:
     """The amplitudes of an effect that differ significantly from zero beside all that is fitted.
 
@@ -173,8 +172,9 @@ def sure_amplitudes(
         What leaving out captures moves.
     effect
         The effect.
-    least_negligible
-        Of the amplitudes that are asked for; 0 for those too that alone make no such effect.
+    terms
+        Whether those of optional terms with a shape of their own are asked for too, which may be
+        there without what is usual of the effect.
 
     Returns
     -------
@@ -195,7 +195,10 @@ def sure_amplitudes(
         system = system.only(np.array(kept, dtype=int))
         held_out = leave_out(system)
     least, discrimination = system.policy.selection.least_u, discriminate(system.fit, effect)
-    amplitudes = [p for p in parameters if p.amplitude and p.negligible >= least_negligible]
+    shaped_terms = {p.optional for p in parameters if terms and p.optional and p.scan}
+    amplitudes = [
+        p for p in parameters if p.amplitude and (p.negligible > 0.0 or p.optional in shaped_terms)
+    ]
     sure = significantly_nonzero(system, held_out, least_of_several(least, len(amplitudes)))
     twists = [p for p in parameters if p.negligible > 0 and not p.amplitude]
     for pair in product(amplitudes, twists):
