@@ -132,6 +132,7 @@ def test_most_constants_are_published(rows: list[Row]) -> None:
     assert len(rows) >= 63
 
 
+@pytest.mark.slow
 def test_an_effect_that_was_found_takes_the_same_error_away_when_it_is_asked_for() -> None:
     """`diagnose` named compliance at 0.7 noise floors, and `compare` with it stayed at 159."""
     recordings = pipeline.read(BENCH / "L3")

@@ -110,6 +110,7 @@ def test_a_maker_logs_the_mean_about_a_row_or_the_vector_there(timing: str, held
     assert slow["vd_v"][3:-2:2] == pytest.approx(0.0)
 
 
+@pytest.mark.slow
 def test_the_gain_of_a_phase_is_named_though_nothing_knows_the_gain_of_all() -> None:
     """By drives, one resistance and a coast, all sensors alike, R and the magnet are one scale.
     A fit that is free along it began far off, and the name was lost.

@@ -86,6 +86,7 @@ def test_the_motion_of_a_free_shaft_shows_share_and_stiffness():
     assert twist == pytest.approx(full["size"] * torque, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_very_soft_coupling_passes_on_what_friction_leaves_of_the_torque():
     """A step of friction at a reversal is not in the coupling. With it, half the twist was found,
     and the deviance rose by 96.
