@@ -132,6 +132,11 @@ def beside_columns(signal: Array, columns: Array) -> Array:
     columns
         What makes it change as fast as its noise does [n, k].
 
+    Returns
+    -------
+    array [n]
+        In the unit of the signal.
+
     """
     shares, *_ = np.linalg.lstsq(np.diff(columns, 3, axis=0), np.diff(signal, 3), rcond=None)
     return signal - columns @ shares

@@ -184,6 +184,11 @@ def deviance_with_full_logs(system: LinearSystem) -> float:
     system
         The fit.
 
+    Returns
+    -------
+    float
+        The deviance itself where full logs say nothing of that effect.
+
     """
     fit = system.fit
     significance = [

@@ -132,7 +132,7 @@ def reading_notes(fit: Fit) -> tuple[str, ...]:
         Empty where there are none.
 
     """
-    delayed = any(effect.name == "sample_delay" for effect in fit.model.effects)
+    delayed = fit.values.get("sample_delay.of_speed") == 0.0
     share = fit.policy.cutting.slower_share
     notes = {_SAMPLED: set[str](), _MEANS: set[str](), _STATOR: set[str](), _DELAYED: set[str]()}
     for segment in fit.segments:

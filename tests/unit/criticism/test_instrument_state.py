@@ -120,12 +120,13 @@ def test_an_encoder_that_is_read_late_is_no_name_and_told_where_it_is_far_off(la
 
 @pytest.mark.slow
 def test_without_the_nuisance_it_would_be_a_name():
-    """What the nuisance is for: with a prior of nothing the same captures name a delay."""
+    """What the nuisance is for: with a prior of nothing the same captures name two delays."""
     motor = replace(design("gimbal-5208"), effects={})
     plan = tuple(step for step in CAMPAIGN if step[0] in ("torque_map_fast", "drive_0"))
     recorded = campaign(motor, Bench(late_angle_s=2e-5), 6, plan)
     spec = ModelSpec(policy=(("priors.late_angle_s", 1e-6),))
-    assert diagnose(campaign_of(recorded), spec, Constants()).missing
+    found = diagnose(campaign_of(recorded), spec, Constants())
+    assert set(found.missing) == {"sample_delay", "current_delay"}
 
 
 def test_the_filter_of_a_transducer_is_undone():

@@ -120,13 +120,14 @@ def test_a_handful_of_orders_hold_the_rotor_and_all_below_160_are_a_trap():
 
 @pytest.mark.slow
 def test_a_late_speed_is_what_the_resistance_was_hiding():
-    """R from 0.56 by the drive's own speed towards the 0.485 ohm of standstill by the angle's."""
+    """By the drive's own speed, taken as on time, R is far from the 0.485 ohm of standstill."""
     log = campaign("laas_solo")
     by_speed = without(log, "theta_mech_rad")
     blind, own = fit(by_speed, kinds=("q",), on_time=True), fit(by_speed, kinds=("q",))
     plain, late = fit(log, kinds=("q",)), fit(log, "sample_delay", kinds=("q",))
-    assert blind.values["r_ohm"] == pytest.approx(0.557, abs=0.01)
-    assert own.values["r_ohm"] == pytest.approx(0.495, abs=0.015)
+    far, near = (abs(one.values["r_ohm"] - 0.485) for one in (blind, own))
+    assert near < 0.02
+    assert near < 0.25 * far
     assert 1.5e-3 < own.values["late_speed_s"] < 2.5e-3
     assert own.held_out["vq_v"] < blind.held_out["vq_v"]
     assert 0.47 < plain.values["r_ohm"] < 0.56
