@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from pipeline.criticism.discovery.changed_constants import Change, changed_constant
 from pipeline.criticism.discovery.changed_within import ChangeWithin, changed_within
-from pipeline.criticism.discovery.unknown_structure import unknown_structure
+from pipeline.criticism.discovery.unknown_structure import is_part_of_a_curve, unknown_structure
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.parameter import Machine
@@ -43,6 +43,10 @@ _SMALLER = (
 _ALONE = (
     "{} would help {} alone: predicted from the others, the other captures that it moves do not "
     "gain with it; record that test once more"
+)
+_PART = (
+    "{} would take a part of what is left; a curve of one state of the machine explains it better "
+    "alone"
 )
 _WITHIN = (
     "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
@@ -86,6 +90,12 @@ class Ladder:
 
         """
         return explained(self.steps, self.held_out, remainders)
+
+    @property
+    def freed(self) -> tuple[str, ...]:
+        """What says that friction or a magnet is another in one kind of test, one sentence each."""
+        last = self.steps[-1].system
+        return (*friction_notes(last), *share_notes(last))
 
     def large(self) -> tuple[Remainder, ...]:
         """What is left and large for the machine as a whole.
@@ -184,8 +194,7 @@ def search_ladder(
         notes, sketch, remainders = [change.words], None, remainders or ladder.remainders
     else:
         notes, change = notes + _other_side_note(sketch, remainders), None
-    last = ladder.steps[-1].system
-    freed = (*friction_notes(last), *share_notes(last))
+    freed = ladder.freed
     return SearchResult(ladder, remainders, sketch, change, freed, (*freed, *notes))
 
 
@@ -279,7 +288,33 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
     kept, remainders = truncated(steps, in_common([r.system for r in steps], errors[: len(steps)]))
     held_out = in_common([r.system for r in kept], errors[: len(kept)])
     cut = {step.added[-1]: contradiction(step) for step in steps[len(kept) :]}
-    return Ladder(start, kept, list(held_out), remainders, cut | unconfirmed)
+    ladder = Ladder(start, kept, list(held_out), remainders, cut | unconfirmed)
+    return _without_parts_of_a_curve(ladder)
+
+
+def _without_parts_of_a_curve(ladder: Ladder) -> Ladder:
+    """The ladder without trailing effects that are a part of what no effect explains: a curve of
+    one state of the machine explains it better alone.
+    """
+    while len(ladder.steps) > 1 and (ladder.freed or not ladder.explains(ladder.remainders)):
+        system, name = ladder.steps[-1].system, ladder.steps[-1].added[-1]
+        if not is_part_of_a_curve(system, _worst_first(ladder.remainders), name):
+            break
+        kept = ladder.steps[:-1]
+        ladder = replace(
+            ladder,
+            steps=kept,
+            held_out=ladder.held_out[:-1],
+            remainders=remainder(kept[-1].system),
+            cut={**ladder.cut, name: _PART.format(name)},
+        )
+    return ladder
+
+
+def _worst_first(remainders: Sequence[Remainder]) -> list[str]:
+    """Signals with a remainder, the one that misses by most first."""
+    worst = sorted(remainders, key=lambda left_over: -left_over.chi2_per_n)
+    return list(dict.fromkeys(left_over.signal for left_over in worst))
 
 
 def _confirmed(
@@ -312,8 +347,7 @@ def _sketched(
     if not remainders or ladder.explains(remainders):
         return None, 0.0
     last = ladder.steps[-1].system
-    worst = sorted(remainders, key=lambda left_over: -left_over.chi2_per_n)
-    signals = list(dict.fromkeys(left_over.signal for left_over in worst))
+    signals = _worst_first(remainders)
     other_side = [signal for signal in signals if (signal in SHAFT) != (signals[0] in SHAFT)]
     sketch, gain = unknown_structure(last, signals, name, in_parts)
     if sketch is None and other_side:

@@ -17,6 +17,7 @@ from pipeline.criticism.regression.columns import Column, effect_columns
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
+from pipeline.criticism.selection.pruning import loss_without
 from pipeline.criticism.selection.truncation import SHAFT
 from pipeline.records.diagnosis import UnknownStructure
 
@@ -117,14 +118,76 @@ def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
     return ("torque",) if alone else ("torque", "flux", "angle")
 
 
+def is_part_of_a_curve(system: LinearSystem, signals: Sequence[str], name: str) -> bool:
+    """Whether a curve of some state of the machine explains the captures better without an effect
+    than the effect does, with the best curve beside it.
+
+    Parameters
+    ----------
+    system
+        The last fit, with the effect.
+    signals
+        Recorded signals that miss, the worst first.
+    name
+        The effect.
+
+    Returns
+    -------
+    bool
+        By the deviance to first order, and a penalty of ln n a parameter.
+
+    Notes
+    -----
+    A torque that grows with the square of the speed is in part a friction of one direction, since
+    few captures run backwards. Beside the friction a curve of the speed is still needed; beside the
+    curve the friction is not.
+
+    References
+    ----------
+    Schwarz, Ann. Stat. 6(2), 1978, 461, doi:10.1214/aos/1176344136.
+
+    """
+    offered, wide = _with_ports(system, _hooks(signals))
+    penalty, known = math.log(wide.size), wide.normal_equations()
+    thorough = wide.policy.selection.thorough
+
+    def gain(live: Indices) -> float:
+        """Fall of the deviance by a curve beside the effect, its penalty paid."""
+        chosen = np.concatenate([wide.model_columns, live])
+        return -known.only(chosen).best(*thorough).deviance - live.size * penalty
+
+    without_curve = known.only(wide.model_columns).best(*thorough).deviance
+    most = max((without_curve + gain(live) for _, live in offered), default=0.0)
+    least = min(
+        (loss_without(wide, (name,), live, known) + live.size * penalty for _, live in offered),
+        default=math.inf,
+    )
+    effect = system.fit.effect(name)
+    return least < effect.dof(system.fit.machine) * penalty - max(most, 0.0)
+
+
+def _with_ports(
+    before: LinearSystem, hooks: Sequence[str]
+) -> tuple[list[tuple[Port, Indices]], LinearSystem]:
+    """The ports that some capture excites, each with the places of its columns [k], and the system
+    that has them.
+    """
+    fit = before.fit
+    offered = ports(fit.model.machine, fit.policy.discovery, hooks)
+    columns = [effect_columns(port.effect, fit.model) for port in offered]
+    wide = linear_system(fit, [c for of_port in columns for c in of_port], before)
+    ends = wide.model_columns.size + np.cumsum([len(of_port) for of_port in columns])
+    places = [np.arange(end - len(c), end) for end, c in zip(ends.tolist(), columns, strict=True)]
+    live = [of_port[np.any(wide.matrix[:, of_port] != 0.0, axis=0)] for of_port in places]
+    return [(port, at) for port, at in zip(offered, live, strict=True) if at.size], wide
+
+
 def _ranked(
     before: LinearSystem, hooks: Sequence[str], in_parts: bool
 ) -> tuple[list[RankedInput], LinearSystem]:
     """Every port that is worth its penalty and helps where it was not fitted, the best first."""
     fit = before.fit
-    offered = ports(fit.model.machine, fit.policy.discovery, hooks)
-    columns = [effect_columns(port.effect, fit.model) for port in offered]
-    wide = linear_system(fit, [c for of_port in columns for c in of_port], before)
+    offered, wide = _with_ports(before, hooks)
     model_columns = wide.model_columns
     baseline = wide.normal_equations(model_columns).best()
     residual, base = wide.after(model_columns, baseline.step), baseline.deviance
@@ -135,13 +198,7 @@ def _ranked(
     penalty = math.log(wide.size)
     least = max(fit.policy.selection.tie, fit.policy.selection.least_share * excess)
     ranked = []
-    first = model_columns.size
-    for place, (port, port_columns) in enumerate(zip(offered, columns, strict=True)):
-        places = np.arange(first, first + len(port_columns))
-        first += len(port_columns)
-        live = places[np.any(wide.matrix[:, places] != 0.0, axis=0)]
-        if live.size == 0:
-            continue
+    for place, (port, live) in enumerate(offered):
         chosen = np.concatenate([model_columns, live])
         end = wide.normal_equations(chosen).best(*fit.policy.selection.thorough)
         after = wide.after(chosen, end.step)

@@ -38,9 +38,10 @@ def truncated(
 
     Notes
     -----
-    While anything is left, trailing steps are dropped that captures contradict, where the effects
-    found do not explain what is left; and those that lowered the held-out error by less than
-    `guess_share`, but for a first effect that explains it. A step stays that cleared a signal of
+    While anything is left, in the captures or where one is predicted from the others, trailing
+    steps are dropped that captures contradict, where the effects found do not explain what is left;
+    and those that lowered the held-out error by less than `guess_share`, but for a first effect
+    that explains it. A step stays that cleared a signal of
     all waves of the angle, or that takes most of what its own side, winding or shaft, misses in
     captures held out: a residual of the other side is no evidence against it. Not so a rare effect:
     what benches seldom have is less likely than a part of what nothing explains.
@@ -53,7 +54,7 @@ def truncated(
         before, after = held_out[count - 2].total, held_out[count - 1].total
         lower = after < (1.0 - policy.guess_share) * before
         explains = explained(kept, held_out, remainders)
-        if count == 1 or not remainders or (explains and (count == 2 or lower)):
+        if count == 1 or (explains and (count == 2 or lower or not remainders)):
             break
         if contradiction(steps[count - 1]):
             continue
