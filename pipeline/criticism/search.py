@@ -91,12 +91,6 @@ class Ladder:
         """
         return explained(self.steps, self.held_out, remainders)
 
-    @property
-    def freed(self) -> tuple[str, ...]:
-        """What says that friction or a magnet is another in one kind of test, one sentence each."""
-        last = self.steps[-1].system
-        return (*friction_notes(last), *share_notes(last))
-
     def large(self) -> tuple[Remainder, ...]:
         """What is left and large for the machine as a whole.
 
@@ -172,10 +166,10 @@ def search_ladder(
     """
 
     def search_again(*orders: float) -> Ladder:
-        if not orders:
-            return ladder_from(base, library)
-        wider = replace(machine, load_orders=orders)
-        return ladder_from(fit_of(segments(campaign, wider), model_of(model, wider)), library)
+        start, wider = base, replace(machine, load_orders=orders)
+        if orders:
+            start = fit_of(segments(campaign, wider), model_of(model, wider))
+        return _without_parts_of_a_curve(ladder_from(start, library))
 
     ladder, sketch, gain = _by_orders(search_again, name)
     remainders, notes = ladder.remainders, []
@@ -194,8 +188,14 @@ def search_ladder(
         notes, sketch, remainders = [change.words], None, remainders or ladder.remainders
     else:
         notes, change = notes + _other_side_note(sketch, remainders), None
-    freed = ladder.freed
+    freed = _freed(ladder)
     return SearchResult(ladder, remainders, sketch, change, freed, (*freed, *notes))
+
+
+def _freed(ladder: Ladder) -> tuple[str, ...]:
+    """What says that friction or a magnet is another in one kind of test, one sentence each."""
+    last = ladder.steps[-1].system
+    return (*friction_notes(last), *share_notes(last))
 
 
 def _changed_constant(system: LinearSystem) -> Change | ChangeWithin | None:
@@ -264,11 +264,12 @@ def _with_drift(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder | None:
     large = ladder.large()
     if ladder.explains(large):
         return None
-    drifting = drifting_segments(ladder.steps[-1].fit, large)
-    if drifting is None:
+    noisier = drifting_segments(ladder.steps[-1].fit, large)
+    if noisier is None:
         return None
-    start = replace(ladder.base.system.fit, segments=drifting)
-    return ladder_from(BaseFit(gauss_newton(start), ladder.base.hum), library)
+    start = replace(ladder.base.system.fit, segments=noisier)
+    drifting = ladder_from(BaseFit(gauss_newton(start), ladder.base.hum), library)
+    return _without_parts_of_a_curve(drifting)
 
 
 def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
@@ -288,15 +289,14 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
     kept, remainders = truncated(steps, in_common([r.system for r in steps], errors[: len(steps)]))
     held_out = in_common([r.system for r in kept], errors[: len(kept)])
     cut = {step.added[-1]: contradiction(step) for step in steps[len(kept) :]}
-    ladder = Ladder(start, kept, list(held_out), remainders, cut | unconfirmed)
-    return _without_parts_of_a_curve(ladder)
+    return Ladder(start, kept, list(held_out), remainders, cut | unconfirmed)
 
 
 def _without_parts_of_a_curve(ladder: Ladder) -> Ladder:
     """The ladder without trailing effects that are a part of what no effect explains: a curve of
     one state of the machine explains it better alone.
     """
-    while len(ladder.steps) > 1 and (ladder.freed or not ladder.explains(ladder.remainders)):
+    while len(ladder.steps) > 1 and (_freed(ladder) or not ladder.explains(ladder.remainders)):
         system, name = ladder.steps[-1].system, ladder.steps[-1].added[-1]
         if not is_part_of_a_curve(system, _worst_first(ladder.remainders), name):
             break
