@@ -57,13 +57,15 @@ _REPEAT = (
 )
 
 
-def with_changing_friction(system: LinearSystem) -> LinearSystem | None:
+def with_changing_friction(system: LinearSystem, most: float = math.inf) -> LinearSystem | None:
     """The fit with a friction that changes with the time since a capture began.
 
     Parameters
     ----------
     system
         Around a fit.
+    most
+        Deviance that its end must be below, to first order.
 
     Returns
     -------
@@ -84,7 +86,7 @@ def with_changing_friction(system: LinearSystem) -> LinearSystem | None:
     begun = min(_begun(system, span, scales), key=lambda start: start[0], default=None)
     penalty = 3.0 * math.log(system.size) + 2.0 * math.log(scales.size)
     least = system.deviance - penalty - policy.selection.tie
-    if begun is None or begun[0] > least:
+    if begun is None or begun[0] > min(least, most):
         return None
     tried = gauss_newton(begun[1])
     least = min(least, _by_speed(system) - penalty - policy.selection.tie)
@@ -227,13 +229,15 @@ def friction_notes(system: LinearSystem) -> Iterator[str]:
     )
 
 
-def with_free_shares(system: LinearSystem) -> LinearSystem | None:
+def with_free_shares(system: LinearSystem, most: float = math.inf) -> LinearSystem | None:
     """The fit with the shares of a test left free, of the test where that helps most.
 
     Parameters
     ----------
     system
         Around a fit.
+    most
+        Deviance that its end must be below, to first order.
 
     Returns
     -------
@@ -248,8 +252,8 @@ def with_free_shares(system: LinearSystem) -> LinearSystem | None:
         if test not in free_tests(fit)
     }
     test = max(gains, key=lambda one: gains[one], default="")
-    least = system.policy.selection.tie
-    if gains.get(test, 0.0) < least:
+    least, paid = system.policy.selection.tie, penalty * len(SHARES.get(test, ()))
+    if gains.get(test, 0.0) < max(least, system.deviance - most - paid):
         return None
     machine, names = fit.model.machine, SHARES[test]
     free = replace(machine, stated_u={**machine.stated_u, **dict.fromkeys(names, _FREE)})

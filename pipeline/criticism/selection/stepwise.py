@@ -151,11 +151,12 @@ def _instead_of_effect(
     where there is nothing of that kind.
     """
     tie = wide.policy.selection.tie
-    reread, rechosen = by_best_readings(wide), reconsidered(wide, at_floor=True)
-    unnamed = [with_free_shares(wide), *(end for end in (reread, rechosen) if end is not wide)]
-    instead = min(filter(None, unnamed), key=lambda end: end.deviance, default=None)
-    changing = with_changing_friction(wide)
     least = math.inf if chosen is None else deviance_with_full_logs(chosen)
+    reread, rechosen = by_best_readings(wide), reconsidered(wide, at_floor=True)
+    freed = with_free_shares(wide, least + tie)
+    unnamed = [freed, *(end for end in (reread, rechosen) if end is not wide)]
+    instead = min(filter(None, unnamed), key=lambda end: end.deviance, default=None)
+    changing = with_changing_friction(wide, least - tie)
     if instead is not None and instead.deviance >= least + tie:
         instead = None
     if changing is not None and changing.deviance < least - tie:

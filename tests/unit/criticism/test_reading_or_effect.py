@@ -128,8 +128,8 @@ def test_a_choice_that_explains_as_much_is_taken_in_place_of_changing_friction(
     )
     chosen = here if times == 20.0 else chosen
     monkeypatch.setattr(stepwise, "by_best_readings", lambda system: system)
-    monkeypatch.setattr(stepwise, "with_free_shares", lambda _: None)
-    monkeypatch.setattr(stepwise, "with_changing_friction", lambda _: changing)
+    monkeypatch.setattr(stepwise, "with_free_shares", lambda *_: None)
+    monkeypatch.setattr(stepwise, "with_changing_friction", lambda *_: changing)
     monkeypatch.setattr(stepwise, "reconsidered", lambda *_, **__: chosen)
     instead = stepwise._instead_of_effect(None, here, LIBRARY, 0, frozenset())
     assert instead is (chosen if taken else changing)
