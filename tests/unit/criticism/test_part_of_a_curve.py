@@ -25,8 +25,8 @@ def uneven(omega: Array, _: Array) -> Array:
 
 
 def shaken(omega: Array, theta: Array) -> Array:
-    """The same drag with an unbalance [N·m]."""
-    return uneven(omega, theta) + 0.03 * np.sin(theta + 0.4)
+    """The same drag with an unbalance [N·m], which is the smaller part."""
+    return uneven(omega, theta) + 0.004 * np.sin(theta + 0.4)
 
 
 @pytest.mark.parametrize(

@@ -162,6 +162,41 @@ def test_orders_of_an_earlier_step_join_where_the_last_one_leaves_something(
     assert asked == [(), (22, 24)]
 
 
+@pytest.mark.parametrize(
+    ("explained", "freed", "parts", "kept"),
+    [
+        (False, (), {"windage"}, 2),
+        (True, ("friction is lower",), {"windage"}, 2),
+        (True, (), {"windage"}, 3),
+        (False, (), {"windage", "stribeck"}, 1),
+        (False, (), {"stribeck"}, 3),
+    ],
+)
+def test_trailing_parts_of_a_curve_are_left_out_where_the_captures_are_not_explained(
+    searches: SimpleNamespace,
+    monkeypatch: pytest.MonkeyPatch,
+    explained: bool,
+    freed: tuple[str, ...],
+    parts: set[str],
+    kept: int,
+) -> None:
+    def ladder(*_: object) -> search.Ladder:
+        added = ((), ("stribeck",), ("stribeck", "windage"))
+        fit = Fit((), Model(machine(), ()), {}, (), {})
+        steps = tuple(SimpleNamespace(added=names, system=None, fit=fit) for names in added)
+        return search.Ladder(SimpleNamespace(hum=()), steps, [1.0] * 3, (), {})
+
+    monkeypatch.setattr(search, "ladder_from", ladder)
+    monkeypatch.setattr(search, "_sketched", lambda *_, **__: (None, 0.0))
+    monkeypatch.setattr(search, "explained", lambda *_: explained)
+    monkeypatch.setattr(search, "remainder", lambda *_, **__: ())
+    monkeypatch.setattr(search, "is_part_of_a_curve", lambda _, __, name: name in parts)
+    searches.freed = freed
+    found = end().ladder
+    assert len(found.steps) == len(found.held_out) == kept
+    assert set(found.cut) == {"stribeck", "windage"} - {*found.steps[-1].added}
+
+
 @pytest.mark.parametrize(("u", "told"), [(0.02, True), (0.2, False)])
 def test_a_share_that_may_be_none_is_no_change(u: float, told: bool, monkeypatch) -> None:
     """Friction of a coast was said to have changed by 1.5 ± 6 %."""

@@ -65,6 +65,17 @@ def test_a_further_effect_must_not_predict_worse_while_something_is_left(after, 
     assert len(truncated(steps, totals)[0]) == kept
 
 
+@pytest.mark.parametrize(("after", "kept"), [(9.5, 1), (4.0, 2)])
+def test_what_leaves_no_remainder_must_predict_as_well(after, kept, monkeypatch):
+    """A thermometer 8 K off under load: a dead time took every remainder, and 12 % of what other
+    captures predict.
+    """
+    steps = missing_by(vq_v=50.0), missing_by(vq_v=1.0)
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: ())
+    totals = [HeldOut(steps[0].system.residual, total) for total in (10.0, after)]
+    assert len(truncated(steps, totals)[0]) == kept
+
+
 @pytest.mark.parametrize(
     ("meter_rise", "observed", "kept"), [(0.0, True, 1), (0.3, True, 2), (0.0, False, 2)]
 )
