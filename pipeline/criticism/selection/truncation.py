@@ -11,6 +11,7 @@ from pipeline.criticism.machine.model import values_of
 from pipeline.criticism.regression.cross_validation import HeldOut, predicted_chi2
 from pipeline.criticism.regression.goodness import remainder, significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.selection.sizes import is_rare
 from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.records.diagnosis import Remainder
@@ -199,7 +200,9 @@ def explained(
     torque's error explains nothing of a shaft that coasts too short. Signals with a small part of
     the deviance do not count alone. Deviance is logarithmic: for an equation at a million floors,
     half of it remains at a thousand. A drag beside a viscous friction that drives the shaft is of
-    another form than what the captures show, where anything is left.
+    another form than what the captures show, where anything is left. What is left of a signal at an
+    order of the angle is at most `unexplained_share` of what the effects do there: their forms are
+    not wrong where they do nothing.
 
     """
     policy, over = steps[0].fit.policy.selection, steps[0].fit.policy.goodness.over
@@ -215,7 +218,26 @@ def explained(
     large = before > policy.least_share * before.sum()
     removed = bool((after[large] <= (1.0 - policy.least_share) * before[large]).all())
     allowed = policy.unexplained_share * float(before.sum())
-    return not remainders or (removed and float(after.sum()) < allowed)
+    removed &= float(after.sum()) < allowed
+    return not remainders or (removed and _is_of_their_forms(steps[-1], remainders))
+
+
+def _is_of_their_forms(step: LadderStep, remainders: Sequence[Remainder]) -> bool:
+    """Whether all that is left may be what the forms of the effects found are wrong by."""
+    system, fit = step.system, step.fit
+    found = [effect for effect in fit.model.effects if effect.name in step.added]
+    share = system.policy.selection.unexplained_share
+    wrong = np.concatenate(
+        [form_tolerance(s, fit.model, fit.values, found, share) for s in fit.segments]
+    )
+    scale = np.bincount(system.group, system.row_weight**-2) / np.maximum(system.counts, 1.0)
+    left = (system.reduced_chi2(system.residual) - 1.0) * scale
+    reported = {(r.capture, r.signal, r.order) for r in remainders}
+    over = significant_groups(system) & [
+        (system.segments[n].capture, channel, order) in reported
+        for n, channel, order in system.labels
+    ]
+    return bool((left[over] <= wrong[over] ** 2).all())
 
 
 def _excess(step: LadderStep, channels: set[str]) -> float:
