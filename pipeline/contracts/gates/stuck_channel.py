@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import polars as pl
 
 from pipeline.contracts.protocol import Gate, Passed, span_of, warning
 from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES
@@ -55,7 +56,10 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     for index, table in enumerate(capture.tables):
         for name in table.columns:
             signal = table[name].to_numpy()
-            if name in MUST_MOVE[capture.meta.test] and not _is_command(capture, name):
+            if name in MUST_MOVE[capture.meta.test] and not (
+                _is_command(capture, name)
+                or (name in DQ_VOLTAGES and is_short_circuit(table, options["motoring_share"]))
+            ):
                 _refuse_dead(name, signal)
             if name not in NOISY:
                 continue
@@ -74,6 +78,47 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 def _is_command(capture: Capture, name: str) -> bool:
     """Whether a column is the voltage that a drive commands: a step is one value in every row."""
     return name in DQ_VOLTAGES and capture.meta.voltage_kind == "commanded"
+
+
+def is_short_circuit(table: pl.DataFrame, motoring_share: float) -> bool:
+    """Whether zero voltages in every row are those of shorted terminals.
+
+    Parameters
+    ----------
+    table
+        Columns of a drive log.
+    motoring_share
+        Largest share [1] of a power that such a winding does not take.
+
+    Returns
+    -------
+    bool
+        False where a column is missing.
+
+    Notes
+    -----
+    A winding whose terminals are shorted takes no power: the magnet drives the current, which
+    brakes the shaft (i_q against the speed) and weakens the magnet (i_d below zero). At steady
+    speed, R i_d = ω_e L_q i_q and R i_q = −ω_e (ψ + L_d i_d). A current that does so in all but
+    `motoring_share` of Σ abs(ω i_q) and of Σ abs(i_d) is of a short circuit, and a voltage column
+    that is dead would see a drive's currents: they motor as well.
+
+    References
+    ----------
+    IEEE Std 1812-2014, 5.3 (short-circuit test of a machine with permanent magnets).
+
+    """
+    needed = (*DQ_VOLTAGES, "id_a", "iq_a", "omega_mech_rad_s")
+    if any(name not in table.columns for name in needed):
+        return False
+    columns = {name: table[name].to_numpy() for name in needed}
+    if any(np.any(np.nan_to_num(columns[name]) != 0.0) for name in DQ_VOLTAGES):
+        return False
+    for power in (columns["omega_mech_rad_s"] * columns["iq_a"], columns["id_a"]):
+        known = power[np.isfinite(power)]
+        if not known.any() or known[known > 0.0].sum() > motoring_share * np.abs(known).sum():
+            return False
+    return True
 
 
 def _refuse_dead(name: str, values: Array) -> None:
@@ -145,5 +190,7 @@ GATE = Gate(
         "drop_share": 0.2,
         # Beyond a fifth the record is no longer that of the test it claims to be.
         "refuse_share": 0.2,
+        # Noise, and what the current swings after the switch closes.
+        "motoring_share": 0.1,
     },
 )

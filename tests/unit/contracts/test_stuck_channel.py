@@ -49,6 +49,43 @@ def test_a_step_of_the_voltage_is_one_command_in_every_row(kind, expected) -> No
     assert said("stuck_channel", made) == expected
 
 
+def shorted(motoring: float = 0.0) -> dict[str, np.ndarray]:
+    """Columns of a winding with shorted terminals on a shaft that slows down from 400 rad/s.
+
+    Steady state of R 0.2 ohm, L 1 mH, psi 0.02 Wb, 4 pole pairs; `motoring` [1] of its q current
+    drives the shaft.
+
+    """
+    omega = np.linspace(400.0, 20.0, 2000)
+    electrical = 4.0 * omega
+    iq = -electrical * 0.02 * 0.2 / (0.2**2 + (1e-3 * electrical) ** 2)
+    noise = np.random.default_rng(3).standard_normal((2, omega.size))
+    turned = np.where(np.arange(omega.size) < motoring * omega.size, -1.0, 1.0)
+    return {
+        "id_a": electrical * 1e-3 * iq / 0.2 + 0.01 * noise[0],
+        "iq_a": turned * iq + 0.01 * noise[1],
+        "omega_mech_rad_s": omega,
+        "vd_v": np.zeros(omega.size),
+        "vq_v": np.zeros(omega.size),
+    }
+
+
+def test_no_voltage_in_any_row_is_a_short_circuit_where_the_current_only_brakes() -> None:
+    """A voltage column that nobody filled stands beside currents that motor as well."""
+    log = shorted()
+    assert said("stuck_channel", capture("drive", **log)) == ""
+    backwards = {**log, "iq_a": -log["iq_a"], "omega_mech_rad_s": -log["omega_mech_rad_s"]}
+    assert said("stuck_channel", capture("drive", **backwards)) == ""
+    assert said("stuck_channel", capture("drive", **shorted(motoring=0.5))) == "refused"
+    weakened = {**log, "id_a": -log["id_a"]}
+    assert said("stuck_channel", capture("drive", **weakened)) == "refused"
+    assert (
+        said("stuck_channel", capture("drive", **{**log, "vq_v": log["vq_v"] + 1.0})) == "refused"
+    )
+    del log["id_a"]
+    assert said("stuck_channel", capture("drive", **log)) == "refused"
+
+
 @pytest.mark.parametrize(("repeats", "settles"), [(24, False), (25, True)])
 def test_a_signal_that_repeats_beside_a_run_settles(repeats: int, settles: bool) -> None:
     """Of the 49 steps of the 50 rows before it, more than half repeat."""
