@@ -12,6 +12,8 @@ CURVATURE = "curvature of the current"
 """Second derivative of the q current: what a lag leaves of a late current, to second order."""
 LOAD_BETWEEN = "load between its samples"
 """What the current does between the samples of a load that is slower than it."""
+LATE_LOAD = ("late load", "curvature of the load")
+"""What a load [N·m] that is late by half of its row lacks, to first and to second order."""
 TIMING = frozenset({CURRENT_LAG, JUMPS})
 """What is not known of a current's instant."""
 SAMPLED = "sampled current"

@@ -22,6 +22,7 @@ from pipeline.estimation.mechanical.shaft_nuisances import (
     CURRENT_LAG,
     CURVATURE,
     JUMPS,
+    LATE_LOAD,
     LOAD_BETWEEN,
     OFFSET,
     RELUCTANCE,
@@ -255,6 +256,21 @@ def between_samples(capture: Capture, t_s: Array, current_a: Array) -> Array:
     return current_a - np.interp(t_s, at, np.interp(at, t_s, current_a))
 
 
+def half_row_s(capture: Capture) -> float:
+    """Half of the time [s] between two samples of a drive's load; 0 where it has none.
+
+    Parameters
+    ----------
+    capture
+        Of a drive or a coast.
+
+    """
+    if not capture.has("torque_shaft_nm"):
+        return 0.0
+    at = capture.tables[capture.table_of("torque_shaft_nm")]["t_s"].to_numpy()
+    return 0.5 * float(np.median(np.diff(at)))
+
+
 def _hidden(weak: WeakRows, theta: Array, kind: int) -> Flags:
     """Windows [w] of a drive in which the speed jumps: what the current did there is in no row."""
     limits = policy().shaft_rows
@@ -401,6 +417,8 @@ def _nuisances(part: _Part) -> dict[str, Array]:
         "d q current cubed": weak.integral(part.direct * part.current**3),
         "load lag": weak.integral(part.load, 1) * driven,
         LOAD_BETWEEN: weak.integral(part.between),
+        LATE_LOAD[0]: weak.integral(part.load, 1) * half_row_s(part.capture),
+        LATE_LOAD[1]: weak.integral(part.load, 2) * half_row_s(part.capture) ** 2 / 2.0,
         CURRENT_LAG: weak.integral(part.current, 1) * driven,
         CURVATURE: weak.integral(part.current, 2) * driven,
         "eccentric cos": weak.integral(turning.real, 2),

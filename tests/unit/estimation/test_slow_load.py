@@ -84,3 +84,47 @@ def test_a_current_of_200_hz_beside_an_angle_of_2_khz(seed: int) -> None:
     inertia_found = known.best("j_rotor_kgm2")
     assert inertia_found is not None
     assert inertia_found.number == pytest.approx(inertia, rel=0.005)
+
+
+def slow(seed: int) -> Capture:
+    """The same two machines in rows of 10 ms: means of current, samples of torque at their start."""
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(0.0, 4.0, 5e-4)
+    phase = 2.0 * np.pi * np.outer(t_s, np.geomspace(0.5, 40.0, 20)) + rng.uniform(0.0, 6.28, 20)
+    current = 0.3 * np.sin(phase).sum(axis=1)
+    held = np.zeros(t_s.size)
+    speed, angle = 60.0 * 7.0 * J_KGM2, 20.0 * 60.0 * 7.0 * J_KGM2
+    omega = np.full(t_s.size, 150.0)
+    wish = 150.0 * (1.0 + 0.3 * np.sin(2.5 * t_s))
+    gain = np.zeros(t_s.size)
+    for k in range(t_s.size - 1):
+        held[k + 1] = held[k] + 5e-4 * (wish[k] - omega[k])
+        drag = COULOMB_NM + VISCOUS * omega[k]
+        other = speed * (wish[k] - omega[k]) + angle * held[k]
+        gain[k] = (KT_NM_A * current[k] - drag + other) / (7.0 * J_KGM2)
+        omega[k + 1] = omega[k] + 5e-4 * gain[k]
+    load = KT_NM_A * current - COULOMB_NM - VISCOUS * omega - J_KGM2 * gain
+    rows = t_s.size // 20 * 20
+
+    def means(signal: np.ndarray) -> np.ndarray:
+        return signal[:rows].reshape(-1, 20).mean(axis=1)
+
+    theta = trapezoid(t_s, omega)
+    return capture(
+        "drive",
+        f"s{seed}",
+        t_s=t_s[19:rows:20],
+        iq_a=means(current + 1e-3 * rng.normal(size=t_s.size)),
+        id_a=np.zeros(rows // 20),
+        theta_mech_rad=theta[19:rows:20],
+        torque_shaft_nm=load[0:rows:20] + 4e-4 * rng.normal(size=rows // 20),
+        temp_magnet_degc=np.full(rows // 20, 25.0),
+    )
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_two_torques_whose_difference_is_as_small_as_half_a_row_of_delay(seed: int) -> None:
+    """The other machine is six times as heavy: what accelerates the shaft is a seventh."""
+    stated = {"kt_peak_nm_a": KT_NM_A, "u_kt_peak_nm_a": 4e-4}
+    inertia = fit_all(Campaign("m", (slow(seed),), stated), {})[0].best("j_rotor_kgm2")
+    assert inertia is None or abs(inertia.number - J_KGM2) < 3.0 * inertia.u
