@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
@@ -48,7 +49,8 @@ def held_apart(capture: Capture) -> tuple[Capture, list[Finding]]:
     findings = []
     for table in capture.tables:
         held = _held_rows(table) if "t_s" in table.columns else {}
-        streams += _in_common_rows(table, {name: rows for name, (rows, _) in held.items()})
+        new = {name: rows for name, (rows, _) in held.items()}
+        streams += _in_common_rows(table.with_columns(map(_filled, new)), new)
         for count in sorted({count for _, count in held.values()}):
             names = [name for name, (_, every) in held.items() if every == count]
             words = f"{', '.join(names)}: new in every {count}th row, the last value in between"
@@ -70,7 +72,8 @@ def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Indices, int]]:
     for name in table.columns:
         if not name.endswith(_SAMPLED) or not table[name].dtype.is_float():
             continue
-        changes = np.flatnonzero(np.diff(table[name].to_numpy()) != 0.0) + 1
+        # a row without a value brings none
+        changes = np.flatnonzero(np.diff(table.select(_filled(name))[name].to_numpy()) != 0.0) + 1
         steps = np.diff(changes)
         count = int(np.median(steps)) if steps.size >= _LEAST_HELD else 0
         if count == 1:
@@ -85,6 +88,11 @@ def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Indices, int]]:
             held[name] = np.rint(rows).astype(np.int64), count
     follows = any(name.endswith("_a") for name in faster)
     return {n: one for n, one in held.items() if not (follows and n.endswith("_v"))}
+
+
+def _filled(name: str) -> pl.Expr:
+    """A column with the last value in rows that hold none."""
+    return pl.col(name).fill_nan(None).forward_fill().fill_null(math.nan)
 
 
 def streams_split(capture: Capture, dense_share: float) -> Capture:

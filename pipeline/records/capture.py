@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records.parse import number
-from pipeline.records.row_means import curve_between, row_means, slower_rows
+from pipeline.records.row_means import bridged, curve_between, row_means, slower_rows
 
 if TYPE_CHECKING:
     import polars as pl
@@ -344,7 +344,8 @@ class Capture:
     def _on_clock(self, name: str, home: int) -> Array:
         table = self.tables[home]
         if name in table.columns:
-            return table[name].to_numpy().astype(np.float64, copy=False)
+            column = table[name].to_numpy().astype(np.float64, copy=False)
+            return bridged(table["t_s"].to_numpy(), column) if "t_s" in table.columns else column
         for index, other in enumerate(self.tables):
             if name in other.columns and "t_s" in other.columns and "t_s" in table.columns:
                 keep = self.kept(index) & np.isfinite(other[name].to_numpy())

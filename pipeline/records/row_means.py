@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 FASTER = 1.5
 """How many times as often as the rows a signal is sampled that is averaged over them."""
@@ -65,6 +66,50 @@ def curve_between(row_s: Array, sample_s: Array, samples: Array) -> Array:
     place = np.clip(np.searchsorted(sample_s, row_s, "right") - 1, 0, step_s.size - 1)
     near = np.isfinite(line) & (step_s[place] < FASTER * np.median(step_s))
     return np.where(near, curve, line)
+
+
+def bridged(row_s: Array, column: Array) -> Array:
+    """A column with the rows filled in that hold no value between two that do.
+
+    Parameters
+    ----------
+    row_s
+        Times of the rows [n, s].
+    column
+        The signal [n, any unit], NaN where it was not recorded.
+
+    Returns
+    -------
+    array [n]
+        With a cubic through the two values on either side of a single row without one, or a straight
+        line where that is not there; NaN in longer gaps.
+
+    Notes
+    -----
+    A logger that lacks one column in a row has the others there: a fit that needs all of them
+    would lose a third of its rows where each of eight columns lacks one in twenty.
+
+    """
+    blank = np.flatnonzero(~np.isfinite(column[1:-1])) + 1
+    single = blank[np.isfinite(column[blank - 1]) & np.isfinite(column[blank + 1])]
+    if single.size == 0:
+        return column
+    filled = column.copy()
+    filled[single] = _through(row_s, column, single, (-1, 1))
+    inner = single[(single >= 2) & (single < column.size - 2)]
+    cubic = _through(row_s, column, inner, (-2, -1, 1, 2))
+    filled[inner] = np.where(np.isfinite(cubic), cubic, filled[inner])
+    return filled
+
+
+def _through(row_s: Array, column: Array, places: Indices, beside: tuple[int, ...]) -> Array:
+    """Lagrange's polynomial through the values in rows beside some places, at these."""
+    distance = [row_s[places + k] - row_s[places] for k in beside]
+    total = np.zeros(places.size)
+    for k, own in zip(beside, distance, strict=True):
+        others = [other for other in distance if other is not own]
+        total += column[places + k] * np.prod([o / (o - own) for o in others], axis=0)
+    return total
 
 
 def row_means(row_s: Array, sample_s: Array, samples: Array) -> Array:

@@ -13,8 +13,11 @@ from pipeline.records.capture import Capture, Mask
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted
+from pipeline.records.row_means import bridged
 
 NAME = "missing_values"
+CONTINUOUS = ("drive", "torque_map", "spin_down", "heat_run")
+"""Logs of signals that change little from row to row."""
 TWO_CLOCKS = "put columns of different clocks on one clock, or in MCAP topics of their own"
 REMEDY = "find out why the channel dropped out, and record again if those rows matter"
 
@@ -26,7 +29,9 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     -----
     Fewer than `fewest` values of a column that the test rests on refuse, and so do fewer rows that
     hold all of them, in a table with a clock; without one each row is a reading by itself, and one
-    is enough. A column with values in
+    is enough. A single row without a value, of a log of continuous signals, is read between those
+    beside it: of eight columns that lack one value in twenty each, a third of the rows would go,
+    and a gap would be in every window. A column with values in
     fewer than `dense_share` [1] of the rows is a slow stream written into a fast table, not a
     fault: its blanks are left as they are. A stream that the test does not rest on may hold a
     single row.
@@ -42,7 +47,12 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
             continue
         finite = {name: np.isfinite(table[name].to_numpy()) for name in names}
         dense = {n: g for n, g in finite.items() if g.mean() >= options["dense_share"]}
-        keep = np.all(list(dense.values()), axis=0) if dense else np.ones(table.height, dtype=bool)
+        if "t_s" in table.columns and meta.test in CONTINUOUS:
+            row_s = table["t_s"].to_numpy()
+            known = {n: np.isfinite(bridged(row_s, table[n].to_numpy())) for n in dense}
+        else:
+            known = dense
+        keep = np.all(list(known.values()), axis=0) if dense else np.ones(table.height, dtype=bool)
         fewest = options["fewest"] if "t_s" in table.columns else 1.0
         for name in names:
             if np.count_nonzero(finite[name]) < fewest:
@@ -52,15 +62,19 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
                     f"{meta.test} needs {fewest:.0f} at least",
                     "record for longer, or faster",
                 )
-        if keep.all():
+        whole = np.all(list(dense.values()), axis=0) if dense else keep
+        if whole.all():
             continue
         holes = ", ".join(f"{n} {np.count_nonzero(~g)}" for n, g in dense.items() if not g.all())
-        words = f"{np.count_nonzero(~keep)} of {keep.size} rows miss a value ({holes})"
+        words = f"{np.count_nonzero(~whole)} of {keep.size} rows miss a value ({holes})"
         if np.count_nonzero(keep) < fewest:
             raise CaptureError(NAME, words, TWO_CLOCKS)
-        words += "; set aside"
-        masks.append(Mask(NAME, index, keep))
-        findings.append(warning(capture, NAME, words, REMEDY, span_of(~keep)))
+        aside = np.count_nonzero(~keep)
+        single = np.count_nonzero(~whole) - aside
+        words += "" if not single else f"; {single} are read between the rows beside them"
+        words += "" if not aside else f"; {aside} set aside" if single else "; set aside"
+        masks += [Mask(NAME, index, keep)] if aside else []
+        findings.append(warning(capture, NAME, words, REMEDY, span_of(~whole)))
     return Passed(tuple(masks), tuple(findings))
 
 

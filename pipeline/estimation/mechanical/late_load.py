@@ -33,8 +33,8 @@ def drag_beside_late_load(rows: ShaftRows, drag: DragFit) -> DragFit:
     Notes
     -----
     What accelerates is the difference of two torques, and no capture states whether a row of each
-    is a sample or a mean. T(t + τ) = T + τ T' + τ² T''/2: of a motor that drives a heavy machine the
-    difference is as small as these terms. Anything up to half a row is as likely (GUM 4.3.7).
+    is a sample or a mean. T(t + τ) = T + τ T' + τ² T''/2: of a motor that drives a heavy machine
+    the difference is as small as these terms. Anything up to half a row is as likely (GUM 4.3.7).
 
     """
     late = [rows.columns[name] for name in LATE_LOAD]

@@ -88,6 +88,16 @@ def test_values_that_a_bus_holds_are_samples_once() -> None:
     assert "iq_a, vq_v, omega_mech_rad_s: new in every 10th row" in findings[0].message
 
 
+def test_values_that_a_bus_holds_beside_rows_that_hold_none() -> None:
+    """A torque of 100 Hz counted as one of 1 kHz that is 5 ms late, and J came out threefold."""
+    values = np.random.default_rng(4).normal(size=101)
+    blank = np.where(np.random.default_rng(6).uniform(size=CLOCK.size) < 0.05, np.nan, 1.0)
+    made = capture("drive", t_s=CLOCK, iq_a=CLOCK**2, torque_shaft_nm=held(values) * blank)
+    kept, findings = held_apart(made)
+    assert [f.code for f in findings] == ["held_values"]
+    assert kept.tables[1]["torque_shaft_nm"].to_numpy() == pytest.approx(values[1:100])
+
+
 @pytest.mark.parametrize(
     "values",
     [

@@ -75,7 +75,7 @@ def test_only_columns_with_holes_are_named() -> None:
 @pytest.mark.parametrize(("whole", "refused"), [(2, False), (1, True), (0, True)])
 def test_rows_of_which_none_holds_all_columns(whole: int, refused: bool) -> None:
     """Two clocks in one table: each row held one of them, and all were set aside with a warning."""
-    odd = np.arange(400) % 2 == 1
+    odd = np.arange(400) // 4 % 2 == 1
     odd[:whole] = True
     current, voltage = np.where(odd, 1.0, np.nan), np.where(~odd, 1.0, np.nan)
     voltage[:whole] = 1.0
@@ -86,6 +86,25 @@ def test_rows_of_which_none_holds_all_columns(whole: int, refused: bool) -> None
         return
     (mask,) = GATES["missing_values"].check(made, GATES["missing_values"].options).masks
     assert np.count_nonzero(mask.keep) == whole
+
+
+def test_a_single_row_without_a_value_is_read_between_its_neighbours() -> None:
+    """A third of the rows went, and most windows with them, where eight columns lacked one in
+    twenty each; an edge of a step is between two rows, and is not drawn.
+    """
+    wave = np.sin(np.arange(400) / 9.0)
+    blank = np.where(np.arange(400) % 7 == 3, np.nan, wave)
+    blank[202:205] = np.nan
+    made = capture("drive", iq_a=blank, vq_v=wave, theta_mech_rad=np.arange(400.0))
+    passed = GATES["missing_values"].check(made, GATES["missing_values"].options)
+    assert [np.flatnonzero(~m.keep).tolist() for m in passed.masks] == [[202, 203, 204]]
+    (finding,) = passed.findings
+    assert "60 of 400 rows miss a value (iq_a 60); 57 are read between the rows" in finding.message
+    read = made.with_masks(*passed.masks).arrays("iq_a", "vq_v")
+    assert read["iq_a"] == pytest.approx(read["vq_v"], abs=6e-3)
+    step = capture("current_step", ia_a=blank, vab_v=wave)
+    (mask,) = GATES["missing_values"].check(step, GATES["missing_values"].options).masks
+    assert np.count_nonzero(~mask.keep) == 60
 
 
 @pytest.mark.parametrize(("ripple", "clear"), [(0.88, True), (0.90, False)])

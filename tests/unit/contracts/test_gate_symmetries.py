@@ -67,8 +67,8 @@ FAULTS: list[tuple[str, Capture, str]] = [
     ("phase_sum", capture("drive", **three(AMPS, SLOW) | {"ia_a": 10.5 * np.cos(SLOW)}), "warned"),
     ("temperature_unit", capture("drive", iq_a=ROWS, temp_winding_degc=300.0), "refused"),
     ("wrapped_angle", capture("drive", theta_mech_rad=np.mod(ROWS * 0.01, TURN)), "refused"),
-    ("missing_values", capture("drive", iq_a=with_one(ROWS, 7, np.nan), vq_v=1.0,
-                               theta_mech_rad=ROWS), "warned"),
+    ("missing_values", capture("drive", iq_a=with_one(with_one(ROWS, 7, np.nan), 8, np.nan),
+                               vq_v=1.0, theta_mech_rad=ROWS), "warned"),
     ("speed_against_angle", capture("drive", theta_mech_rad=ROWS * 0.05, omega_mech_rad_s=550.0),
      "warned"),
     ("speed_against_angle", capture("drive", theta_mech_rad=ROWS * 0.05, omega_mech_rad_s=700.0),
@@ -303,7 +303,8 @@ def test_a_record_of_400_rows_has_50_blocks() -> None:
 
 
 def test_only_finite_values_of_columns_with_any_are_looked_at() -> None:
-    made = capture("drive", iq_a=np.array([1.0, np.nan, 3.0]), id_a=np.full(3, np.nan))
+    two = np.array([1.0, np.nan, np.nan, 3.0])
+    made = capture("drive", iq_a=two, id_a=np.full(4, np.nan))
     found = current_coverage._finite(made, "iq_a", "id_a", "ia_a")
     assert {name: values.tolist() for name, values in found.items()} == {"iq_a": [1.0, 3.0]}
 

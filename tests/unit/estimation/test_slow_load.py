@@ -87,7 +87,7 @@ def test_a_current_of_200_hz_beside_an_angle_of_2_khz(seed: int) -> None:
 
 
 def slow(seed: int) -> Capture:
-    """The same two machines in rows of 10 ms: means of current, samples of torque at their start."""
+    """The same two machines in rows of 10 ms: means of current, torques of their start."""
     rng = np.random.default_rng(seed)
     t_s = np.arange(0.0, 4.0, 5e-4)
     phase = 2.0 * np.pi * np.outer(t_s, np.geomspace(0.5, 40.0, 20)) + rng.uniform(0.0, 6.28, 20)
