@@ -10,7 +10,8 @@ import numpy as np
 import polars as pl
 
 from pipeline.contracts.protocol import warning
-from pipeline.records.capture import Capture, Indices
+from pipeline.numerics.clocks import clearest_ratio, counted
+from pipeline.records.capture import Array, Capture, Indices
 from pipeline.records.finding import Finding
 
 _SAMPLED = ("_v", "_a", "_nm", "omega_mech_rad_s")
@@ -21,8 +22,71 @@ _MOST_HELD_S = 0.05
 """Longest that a bus holds a value [s]; a plateau of a test without noise is longer."""
 _ON_CLOCK = 0.95
 """Least share of a column's changes that keep to its own clock, where it is held between them."""
+_LEAST_STAMPS, _EVEN = 50, 1e-2
+"""Stamps from which on a clock is known, and by how much of a period they may be off it."""
+_MISSING, _MOST_SCATTER = 1.6, 0.5
+"""Distance of two stamps beyond which a sample may be missing, and scatter beyond which a stamp may
+be its neighbour's [periods]."""
+_SMOOTHER = 0.5
+"""Roughness of a signal over the count, of that over the stamps, that shows an even sampling."""
 _JITTER = 0.2
 """What a change may be off its clock by, over the time for which values are held."""
+
+
+def stamps_counted(capture: Capture) -> tuple[Capture, list[Finding]]:
+    """The capture with its samples counted, where only their stamps are uneven.
+
+    A computer that stamps samples as they arrive is late by ever other times; a shaft that turns
+    shows that they were taken evenly. Its angle over such stamps has a noise of the speed times
+    what they are off by.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+
+    Returns
+    -------
+    Capture
+        The same one where no signal is clearly smoother over the count.
+    list of Finding
+        A warning for each table that is counted.
+
+    """
+    tables, findings = [], []
+    for table in capture.tables:
+        even = _even_stamps(table)
+        tables.append(table if even is None else table.with_columns(pl.Series("t_s", even)))
+        if even is not None:
+            period = (even[-1] - even[0]) / max(even.size - 1, 1)
+            off = float(np.std(table["t_s"].to_numpy() - even)) / period
+            words = (
+                f"t_s is off an even clock by {100.0 * off:.2g} % of its period, and the signals "
+                "are not: the samples are counted"
+            )
+            remedy = "stamp samples where they are taken, not where they arrive"
+            rows = (0, table.height - 1)
+            findings.append(warning(capture, "scattered_stamps", words, remedy, rows))
+    return (replace(capture, tables=tuple(tables)) if findings else capture), findings
+
+
+def _even_stamps(table: pl.DataFrame) -> Array | None:
+    """Times [n, s] of a clock that is even, where only the stamps are not."""
+    if "t_s" not in table.columns or table.height < _LEAST_STAMPS:
+        return None
+    time = table["t_s"].to_numpy()
+    steps = np.diff(time)
+    clock = counted(time, _MISSING, _MOST_SCATTER)
+    if clock is None or np.abs(steps - np.median(steps)).max() <= _EVEN * np.median(steps):
+        return None
+    signals = [n for n in table.columns if n.endswith((*_SAMPLED, "_rad"))]
+    columns = [table[n].to_numpy() for n in signals if table[n].dtype.is_float()]
+    whole = [column for column in columns if np.isfinite(column).all()]
+    if clearest_ratio(time, clock[1], whole) >= _SMOOTHER:
+        return None
+    period, first = np.polyfit(clock[1], time, 1)
+    even: Array = first + period * clock[1]
+    return even
 
 
 def held_apart(capture: Capture) -> tuple[Capture, list[Finding]]:

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import polars.selectors as cs
 
-from pipeline.contracts.clocks import held_apart, streams_split
+from pipeline.contracts.clocks import held_apart, stamps_counted, streams_split
 from pipeline.contracts.gates import missing_values
 from pipeline.contracts.protocol import warning, with_time
 from pipeline.contracts.registry import gates
@@ -70,10 +70,11 @@ def validate(
     capture, unfilled = _filled_rows(capture)
     capture, twice = _rows_once(capture)
     check_tables(capture)
+    capture, counted = stamps_counted(capture)
     capture, held = held_apart(capture)
     capture, findings = _without_blanks(capture)
     capture, computed = _without_computed_torque(capture)
-    findings = [*turned, *settled, *unfilled, *twice, *held, *findings, *computed]
+    findings = [*turned, *settled, *unfilled, *twice, *counted, *held, *findings, *computed]
     refusals: dict[str, CaptureError] = {}
     broken: list[CaptureError] = []
     for gate in gates():

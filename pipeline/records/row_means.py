@@ -81,8 +81,8 @@ def bridged(row_s: Array, column: Array) -> Array:
     Returns
     -------
     array [n]
-        With a cubic through the two values on either side of a single row without one, or a straight
-        line where that is not there; NaN in longer gaps.
+        With a cubic through the two values on either side of a single row without one, or a
+        straight line where that is not there; NaN in longer gaps.
 
     Notes
     -----

@@ -59,7 +59,6 @@ ARITHMETIC = {
     # cells of a picture, when its waves are laid over each other; a turn
     "validation/signature.py": {"_CELLS", "_FEWEST", "_MANY_WAVES", "_FINE", "_FEWEST_PHASES"},
     "validation/trajectories.py": {"_PAD", "_START_S", "_PROBE"},  # samples kept; differences
-    "data/clocks.py": {"_REACH"},  # a cubic goes through four samples
     "data/segment.py": {"PAIR_RAD"},  # a turn
     # the grid of a search for a step; rounding; of a fixed point
     "data/rounding.py": {

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.criticism.data.clocks import counted, sampled_unevenly
 from pipeline.criticism.operating import Array, Flags, Indices
 from pipeline.criticism.policy.captures import Cutting
+from pipeline.numerics.clocks import clearest_ratio, counted
 from pipeline.numerics.projection import window_starts
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Capture
@@ -118,8 +118,8 @@ def even_clock(
             columns[name] = np.interp(time, time[finite], column[finite])
             keep &= finite
     uneven = np.abs(np.diff(time) - period).max() > policy.clock_even * period
-    clock = counted(time, policy) if uneven else None
-    if clock is not None and not sampled_unevenly(time, clock[1], columns.values(), policy):
+    clock = counted(time, policy.clock_missing, policy.clock_scatter) if uneven else None
+    if clock and clearest_ratio(time, clock[1], columns.values()) <= policy.clock_ratio:
         period, number = clock
         even = np.arange(number[-1] + 1)
         recorded = np.zeros(even.size, dtype=bool)

@@ -5,29 +5,31 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipeline.criticism.operating import Array, Indices
-from pipeline.criticism.policy.captures import Cutting
-
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 _REACH = 2
 """Samples at either side that a cubic goes through; it needs four."""
 
 
-def counted(time: Array, policy: Cutting) -> tuple[float, Indices] | None:
+def counted(time: Array, missing: float, most_scatter: float) -> tuple[float, Indices] | None:
     """The even clock behind stamps that scatter.
 
     Parameters
     ----------
     time
         Stamps [n, s], rising.
-    policy
-        Constants of judgement.
+    missing
+        Distance of two stamps [periods] from which on a sample may be missing between them.
+    most_scatter
+        Scatter of stamps [periods] from which on a stamp does not number its sample.
 
     Returns
     -------
     (period, numbers) or None
-        Period [s] and number of each sample [n]; None where the stamps scatter by more than half a
-        period about any even clock.
+        Period [s] and number of each sample [n]; None where the stamps scatter by more than that
+        about any even clock.
 
     Notes
     -----
@@ -36,14 +38,14 @@ def counted(time: Array, policy: Cutting) -> tuple[float, Indices] | None:
 
     Examples
     --------
-    >>> period, numbers = counted(np.array([0.0, 1.0, 2.0, 4.0, 5.0]), Cutting())
+    >>> period, numbers = counted(np.array([0.0, 1.0, 2.0, 4.0, 5.0]), 1.6, 0.5)
     >>> round(period, 9), numbers.tolist()
     (1.0, [0, 1, 2, 4, 5])
 
     """
     since = time - time[0]
     steps = np.diff(since) / np.median(np.diff(since))
-    gaps = np.where(steps > policy.clock_missing, np.rint(steps), 1.0)
+    gaps = np.where(steps > missing, np.rint(steps), 1.0)
     ends = []
     for counts in (np.ones(steps.size), gaps):
         number = np.concatenate([[0.0], np.cumsum(counts)])
@@ -51,13 +53,11 @@ def counted(time: Array, policy: Cutting) -> tuple[float, Indices] | None:
         scatter = float(np.std(since - first - period * number)) / period
         ends.append((scatter, float(period), number.astype(np.int64)))
     scatter, period, number = min(ends, key=lambda end: end[0])
-    return None if scatter > policy.clock_scatter else (period, number)
+    return None if scatter > most_scatter else (period, number)
 
 
-def sampled_unevenly(
-    time: Array, number: Indices, columns: Iterable[Array], policy: Cutting
-) -> bool:
-    """Whether the samples came unevenly, and not only their stamps.
+def clearest_ratio(time: Array, number: Indices, columns: Iterable[Array]) -> float:
+    """How much smoother signals are over the stamps than over the count of the samples.
 
     Parameters
     ----------
@@ -67,14 +67,12 @@ def sampled_unevenly(
         Number of each sample on the even clock [n].
     columns
         Signals [n each, any unit].
-    policy
-        Constants of judgement.
 
     Returns
     -------
-    bool
-        Where the signal that shows most runs `policy.clock_ratio` times more smoothly over the
-        stamps.
+    float
+        Ratio [1] of the signal that shows most: above 1 samples came unevenly, below 1 only their
+        stamps did; 1 where no signal shows it.
 
     Notes
     -----
@@ -84,8 +82,7 @@ def sampled_unevenly(
 
     """
     ratios = [_roughness(c, number.astype(float)) / _roughness(c, time) for c in columns]
-    clearest = max(ratios, key=lambda ratio: max(ratio, 1.0 / ratio), default=1.0)
-    return clearest > policy.clock_ratio
+    return max(ratios, key=lambda ratio: max(ratio, 1.0 / ratio), default=1.0)
 
 
 def _roughness(signal: Array, at: Array) -> float:
@@ -102,4 +99,5 @@ def _roughness(signal: Array, at: Array) -> float:
         foretold += weight * signal[moved[n]]
     error = np.abs(signal[inner] - foretold)
     moving = error[error > 0.0]
-    return max(float(np.median(moving)) if moving.size else 0.0, 1e-300)
+    rounding = 1e-12 * float(np.max(np.abs(signal), initial=0.0))
+    return max(float(np.median(moving)) if moving.size else 0.0, rounding, 1e-300)
