@@ -23,7 +23,7 @@ from pipeline.estimation.mechanical.drive_windows import (
     too_short,
     torque_is_separable,
 )
-from pipeline.estimation.mechanical.late_load import drag_beside_late_load
+from pipeline.estimation.mechanical.late_samples import drag_beside_late_samples
 from pipeline.estimation.mechanical.sampled_current import in_step, lagging_inertia, sampling_drag
 from pipeline.estimation.mechanical.setups import another_setup, setups_of
 from pipeline.estimation.mechanical.shaft_doubts import DRAGS, Doubts
@@ -208,7 +208,8 @@ def _fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> 
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
     law = acceleration(rows, driving)
     drag = drag_of_motion(rows, law, nuisances, options["level"], torque.kt_nm_a)
-    drag = drag_beside_late_load(rows, drag)
+    known_torque = torque.kt_nm_a, torque.reluctance_known
+    drag = drag_beside_late_samples(rows, drag, *known_torque)
     if not (drag.steady or torque_is_separable(drag.design, drag.sigma)):
         note = f"the drive's torque cannot be separated from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)

@@ -14,6 +14,8 @@ LOAD_BETWEEN = "load between its samples"
 """What the current does between the samples of a load that is slower than it."""
 LATE_LOAD = ("late load", "curvature of the load")
 """What a load [N·m] that is late by half of its row lacks, to first and to second order."""
+LATE_CURRENT = ("late current", "late bend of the current")
+"""What a current [A] that is late by half of its row lacks, to first and to second order."""
 TIMING = frozenset({CURRENT_LAG, JUMPS})
 """What is not known of a current's instant."""
 SAMPLED = "sampled current"

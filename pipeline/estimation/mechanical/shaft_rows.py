@@ -22,6 +22,7 @@ from pipeline.estimation.mechanical.shaft_nuisances import (
     CURRENT_LAG,
     CURVATURE,
     JUMPS,
+    LATE_CURRENT,
     LATE_LOAD,
     LOAD_BETWEEN,
     OFFSET,
@@ -256,19 +257,29 @@ def between_samples(capture: Capture, t_s: Array, current_a: Array) -> Array:
     return current_a - np.interp(t_s, at, np.interp(at, t_s, current_a))
 
 
-def half_row_s(capture: Capture) -> float:
-    """Half of the time [s] between two samples of a drive's load; 0 where it has none.
+def half_row_s(capture: Capture, name: str) -> float:
+    """Half of the time [s] between two samples of a column; 0 where it is not there.
 
     Parameters
     ----------
     capture
         Of a drive or a coast.
+    name
+        Of the column.
 
     """
-    if not capture.has("torque_shaft_nm"):
+    if not capture.has(name):
         return 0.0
-    at = capture.tables[capture.table_of("torque_shaft_nm")]["t_s"].to_numpy()
+    at = capture.tables[capture.table_of(name)]["t_s"].to_numpy()
     return 0.5 * float(np.median(np.diff(at)))
+
+
+def _late(names: tuple[str, str], weak: WeakRows, signal: Array, late_s: float) -> dict[str, Array]:
+    """Terms of a signal that is late, to first and to second order, in its unit."""
+    return {
+        names[0]: weak.integral(signal, 1) * late_s,
+        names[1]: weak.integral(signal, 2) * late_s**2 / 2.0,
+    }
 
 
 def _hidden(weak: WeakRows, theta: Array, kind: int) -> Flags:
@@ -417,8 +428,8 @@ def _nuisances(part: _Part) -> dict[str, Array]:
         "d q current cubed": weak.integral(part.direct * part.current**3),
         "load lag": weak.integral(part.load, 1) * driven,
         LOAD_BETWEEN: weak.integral(part.between),
-        LATE_LOAD[0]: weak.integral(part.load, 1) * half_row_s(part.capture),
-        LATE_LOAD[1]: weak.integral(part.load, 2) * half_row_s(part.capture) ** 2 / 2.0,
+        **_late(LATE_LOAD, weak, part.load, half_row_s(part.capture, "torque_shaft_nm")),
+        **_late(LATE_CURRENT, weak, part.current, half_row_s(part.capture, "iq_a")),
         CURRENT_LAG: weak.integral(part.current, 1) * driven,
         CURVATURE: weak.integral(part.current, 2) * driven,
         "eccentric cos": weak.integral(turning.real, 2),

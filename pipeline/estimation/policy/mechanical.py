@@ -102,6 +102,10 @@ class Drag:
     least_freedom : 1
         fewest degrees of freedom of an inertia's scatter
         derived: the scatter of v degrees is known to 1/sqrt(2 v): a quarter (JCGM 100:2008, E.4.3)
+    most_reluctance : 1
+        torque of reluctance over the magnet's where the d current is the largest, at the most,
+        where nothing shows it
+        chosen: (L_q − L_d) i/ψ of a reluctance motor with weak magnets
     unexplained_share : 1
         of the acceleration, squared, that may follow no logged torque
         calibrated: `the number halved and doubled` on loads of a third of rated torque, which left
@@ -130,6 +134,7 @@ class Drag:
     enough_coasting_rows: int = 12
     rows_a_column: int = 10
     least_freedom: int = 8
+    most_reluctance: float = 3.0
     unexplained_share: float = 0.02
     loaded_share: float = 0.1
     sampling_u_s: float = 0.5e-6

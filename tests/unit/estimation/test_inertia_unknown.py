@@ -59,6 +59,6 @@ def test_a_torque_constant_may_be_stated_and_magnets_unlogged_are_said_to_be() -
     )  # fmt: skip
     without = inertia.fit(Campaign("m", drives), Constants(()), inertia.ESTIMATOR.options)
     assert all("state kt_peak_nm_a" in e.note for e in without.estimates)
-    stated = Constants((known_value("kt_peak_nm_a", 0.4),))
+    stated = Constants((known_value("kt_peak_nm_a", 0.4), known_value("kt_reluctance_nm_a2", 0.0)))
     given = inertia.fit(Campaign("m", drives), stated, inertia.ESTIMATOR.options)
     assert all("temp_magnet_degc not logged" in e.note for e in given.estimates)

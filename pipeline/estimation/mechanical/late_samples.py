@@ -1,4 +1,4 @@
-"""What the instants of a load's samples leave open of the inertia and the drag of a shaft."""
+"""What the instants of samples leave open of the inertia and the drag of a shaft."""
 
 from __future__ import annotations
 
@@ -8,14 +8,23 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.estimation.mechanical.drag_fit import DragFit
-from pipeline.estimation.mechanical.shaft_nuisances import LATE_LOAD
+from pipeline.estimation.mechanical.shaft_nuisances import (
+    CURRENT_LAG,
+    JUMPS,
+    LATE_CURRENT,
+    LATE_LOAD,
+    RELUCTANCE,
+)
 from pipeline.estimation.mechanical.shaft_rows import ShaftRows
 from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import Array, autocorrelation_time, linear_fit
 
 
-def drag_beside_late_load(rows: ShaftRows, drag: DragFit) -> DragFit:
-    """The same fit, in doubt by the instants that the samples of a load stand for.
+def drag_beside_late_samples(
+    rows: ShaftRows, drag: DragFit, kt_nm_a: float, reluctance_known: bool
+) -> DragFit:
+    """The same fit, in doubt by the instants that samples of current and load stand for, and by a
+    reluctance torque that nothing shows.
 
     Parameters
     ----------
@@ -23,26 +32,38 @@ def drag_beside_late_load(rows: ShaftRows, drag: DragFit) -> DragFit:
         Windows of drives and coast-downs.
     drag
         Their fit.
+    kt_nm_a
+        Torque constant [N·m/A].
+    reluctance_known
+        Whether the torque holds what reluctance adds to it.
 
     Returns
     -------
     DragFit
-        With the change of J, T_c and B in `u_form` that a load makes which is late by up to half of
-        its row, to first and to second order, as far as the rows leave it open.
+        With the change of J, T_c and B in `u_form` that a current or a load makes which is late by
+        up to half of its row, to first and to second order, that a jump of the current anywhere
+        between two rows makes, and reluctance of up to `most_reluctance`, as far as the rows leave
+        it open.
 
     Notes
     -----
-    What accelerates is the difference of two torques, and no capture states whether a row of each
-    is a sample or a mean. T(t + τ) = T + τ T' + τ² T''/2: of a motor that drives a heavy machine
-    the difference is as small as these terms. Anything up to half a row is as likely (GUM 4.3.7).
+    T(t + τ) = T + τ T' + τ² T''/2, and no capture states whether a row is a sample or a mean.
+    Anything up to half a row is as likely (GUM 4.3.7). What accelerates a motor that drives a heavy
+    machine is the difference of two torques, as small as these terms.
 
     """
-    late = [rows.columns[name] for name in LATE_LOAD]
-    if drag.steady or not np.any(late[1]):
+    if drag.steady:
         return drag
+    late = [rows.columns[name] for name in LATE_LOAD]
+    if CURRENT_LAG not in drag.names:
+        late += [kt_nm_a * rows.columns[name] for name in (*LATE_CURRENT, JUMPS)]
+    largest = float(np.max(np.hypot(rows.q_current_a, rows.columns["d current"]), initial=0.0))
+    if not reluctance_known and RELUCTANCE not in drag.names and largest > 0.0:
+        most = policy().drag.most_reluctance * kt_nm_a / largest
+        late.append(most * rows.columns[RELUCTANCE])
     own = drag.constants(drag.coefficients)
     square = drag.u_form**2
-    for column in late:
+    for column in filter(np.any, late):
         size = open_size(drag, column)
         moved = [drag.constants(drag.refit(drag.design[:, 0] + k * column)) for k in (-size, size)]
         square = square + np.max(np.abs(np.array(moved) - own), axis=0) ** 2
