@@ -107,14 +107,17 @@ def _rests(speed: Array, slow: float, least: int, most: float, times: float) -> 
     """The samples [n] of runs in which a shaft is slower than `slow` and goes nowhere.
 
     A run has `least` samples, and the sum of its speeds is below `most`: a slow turn is no rest. A
-    reversal on the way is none either: the shaft stays for so many `times` what the speed, as it
-    changes before and after, takes to pass from `slow` to `-slow`.
+    reversal on the way is none either: the shaft stays for so many `times` what the speed takes to
+    pass from `slow` to zero as it changes before, and on from zero as it changes after. One that
+    comes to rest slowly may leave at once.
     """
     rests = np.zeros(speed.size, dtype=bool)
     for first, end in true_runs(np.abs(speed) < slow):
         beside = speed[max(first - least, 0) : first + 1], speed[end - 1 : end + least]
-        change = min((np.ptp(one) / (one.size - 1) for one in beside if one.size > 1), default=0.0)
-        passes = 2.0 * slow / change if change else 0.0
+        changes = [np.ptp(one) / (one.size - 1) for one in beside if one.size > 1]
+        passes = (
+            2.0 * slow * np.mean([1.0 / c for c in changes]) if changes and all(changes) else 0.0
+        )
         size, travel = end - first, np.abs(speed[first:end]).sum()
         rests[first:end] = size >= max(least, times * passes) and travel < most
     return rests

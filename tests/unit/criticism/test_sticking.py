@@ -66,3 +66,14 @@ def test_a_rest_is_neither_a_slow_turn_nor_a_pass_through_zero() -> None:
     ]
     assert {*range(20, 28)} <= {*rests[0].tolist()} <= {*range(18, 30)}
     assert rests[1].size == rests[2].size == 0
+
+
+def test_a_shaft_that_comes_to_rest_slowly_may_leave_at_once() -> None:
+    """The rest counted as a pass of the slow side both ways, and its friction as that of motion:
+    sound drives had presliding, or cogging, beside a log of a short circuit.
+    """
+    coming, leaving = np.linspace(0.6, 0.0, 30, endpoint=False), np.linspace(0.0, 3.0, 13)
+    rests = _rests(np.concatenate([coming, np.zeros(12), leaving]), 0.15, 2, 20.0, 2.0)
+    assert {*range(30, 42)} <= {*rests.nonzero()[0].tolist()}
+    for turned in (leaving, -leaving):
+        assert not _rests(np.concatenate([coming, turned]), 0.15, 2, 20.0, 2.0).any()
