@@ -67,6 +67,7 @@ ARITHMETIC = {
         "_FIRST_WINDOW",
         "_WIDER",
         "_PLACES",
+        "_KNOWN",
         "_SPACING",
         "_FINEST",
         "_REACH",

@@ -25,6 +25,9 @@ _REACH = 1.5
 in the next; number of the parts; spacing of trial steps, at first and at the end, in turns of the
 phase over a part; how many spacings they reach around the step before. A lobe of the coherence is
 a turn wide: a wider spacing misses it, a finer one costs time."""
+_KNOWN = 16
+"""Values that two neighbours share from which on their spacing is a step: a drive that is switched
+off, or limits its current, shares a few."""
 _SHIFTS = (-0.375, -0.125, 0.125, 0.375)
 _ROUNDS = 3
 """Parts of a step by which a motion is moved to be rounded anew, evenly spread; rounds in which its
@@ -53,10 +56,24 @@ def resolution(signal: Array, policy: SensorNoise) -> float:
         The least distance of two values, where `policy.mostly` of all distances are whole
         multiples of it; else 0.
 
+    Notes
+    -----
+    A rounded signal that came unevenly and was put on an even clock has values between its steps.
+    Where two neighbours are the same it has none: the step is that of such values, if there are
+    `_KNOWN` of them.
+
     """
-    gaps = np.diff(np.unique(signal))
+    same = np.unique(signal[1:][np.diff(signal) == 0.0])
+    return _spacing(np.unique(signal), policy) or (
+        _spacing(same, policy) if same.size >= _KNOWN else 0.0
+    )
+
+
+def _spacing(values: Array, policy: SensorNoise) -> float:
+    """The least distance of ascending values [n], of which most are whole multiples; else 0."""
+    gaps = np.diff(values)
     # what floating point makes of equal numbers is no step
-    gaps = gaps[gaps > _FLOATING * np.abs(signal).max(initial=0.0)]
+    gaps = gaps[gaps > _FLOATING * np.abs(values).max(initial=0.0)]
     if gaps.size == 0:
         return 0.0
     steps = gaps / gaps.min()
