@@ -24,6 +24,8 @@ Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 
 _DQ_CURRENTS = ("id_a", "iq_a")
+_CONTINUOUS = ("drive", "torque_map", "spin_down", "heat_run")
+"""Logs of signals that change little from row to row."""
 _ALTERNATING = frozenset(
     name for line in ("a", "b", "c", "ab", "bc", "ca") for name in (f"v{line}_v", f"i{line}_a")
 )
@@ -321,6 +323,28 @@ class Capture:
         keep = self.kept(home) if masked else np.ones(self.tables[home].height, dtype=bool)
         return {name: self._on_clock(name, home)[keep] for name in names}
 
+    def bridged_column(self, index: int, name: str) -> Array:
+        """A column of a table, `bridged` in a log of continuous signals.
+
+        Parameters
+        ----------
+        index
+            Number of the table.
+        name
+            Of the column.
+
+        Returns
+        -------
+        array [n]
+            Waves of the phases, and columns without a clock, as they are.
+
+        """
+        table = self.tables[index]
+        column = table[name].to_numpy().astype(np.float64, copy=False)
+        if self.meta.test not in _CONTINUOUS or name in _ALTERNATING or "t_s" not in table.columns:
+            return column
+        return bridged(table["t_s"].to_numpy(), column)
+
     def finite(self, *names: str, needed: Collection[str] = ()) -> dict[str, Array]:
         """Columns on a common clock, in the rows in which they are finite.
 
@@ -344,8 +368,7 @@ class Capture:
     def _on_clock(self, name: str, home: int) -> Array:
         table = self.tables[home]
         if name in table.columns:
-            column = table[name].to_numpy().astype(np.float64, copy=False)
-            return bridged(table["t_s"].to_numpy(), column) if "t_s" in table.columns else column
+            return self.bridged_column(home, name)
         for index, other in enumerate(self.tables):
             if name in other.columns and "t_s" in other.columns and "t_s" in table.columns:
                 keep = self.kept(index) & np.isfinite(other[name].to_numpy())

@@ -13,11 +13,8 @@ from pipeline.records.capture import Capture, Mask
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted
-from pipeline.records.row_means import bridged
 
 NAME = "missing_values"
-CONTINUOUS = ("drive", "torque_map", "spin_down", "heat_run")
-"""Logs of signals that change little from row to row."""
 TWO_CLOCKS = "put columns of different clocks on one clock, or in MCAP topics of their own"
 REMEDY = "find out why the channel dropped out, and record again if those rows matter"
 
@@ -47,12 +44,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
             continue
         finite = {name: np.isfinite(table[name].to_numpy()) for name in names}
         dense = {n: g for n, g in finite.items() if g.mean() >= options["dense_share"]}
-        if "t_s" in table.columns and meta.test in CONTINUOUS:
-            row_s = table["t_s"].to_numpy()
-            known = {n: np.isfinite(bridged(row_s, table[n].to_numpy())) for n in dense}
-        else:
-            known = dense
-        keep = np.all(list(known.values()), axis=0) if dense else np.ones(table.height, dtype=bool)
+        known = [np.isfinite(capture.bridged_column(index, name)) for name in dense]
+        keep = np.all(known, axis=0) if known else np.ones(table.height, dtype=bool)
         fewest = options["fewest"] if "t_s" in table.columns else 1.0
         for name in names:
             if np.count_nonzero(finite[name]) < fewest:

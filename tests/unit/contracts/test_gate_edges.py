@@ -102,6 +102,8 @@ def test_a_single_row_without_a_value_is_read_between_its_neighbours() -> None:
     assert "60 of 400 rows miss a value (iq_a 60); 57 are read between the rows" in finding.message
     read = made.with_masks(*passed.masks).arrays("iq_a", "vq_v")
     assert read["iq_a"] == pytest.approx(read["vq_v"], abs=6e-3)
+    phases = capture("drive", ia_a=blank, ib_a=wave, ic_a=-wave, theta_mech_rad=np.arange(400.0))
+    assert np.isnan(phases.arrays("ia_a")["ia_a"]).sum() == 60
     step = capture("current_step", ia_a=blank, vab_v=wave)
     (mask,) = GATES["missing_values"].check(step, GATES["missing_values"].options).masks
     assert np.count_nonzero(~mask.keep) == 60
