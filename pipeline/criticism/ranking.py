@@ -34,7 +34,7 @@ from pipeline.criticism.validation.error_maps import (
 from pipeline.physics.glossary import unit_of
 from pipeline.records.diagnosis import RankedEffect, ReportedParameter, StepError, StepRecord
 
-_AGAINST = "captures contradict it: see the note"
+_AGAINST = "captures contradict it, or show that it is part of a curve: see the note"
 _UNSUPPORTED = "takes some of what is left, but too little to be named beside what nothing explains"
 
 
