@@ -200,9 +200,10 @@ def explained(
     torque's error explains nothing of a shaft that coasts too short. Signals with a small part of
     the deviance do not count alone. Deviance is logarithmic: for an equation at a million floors,
     half of it remains at a thousand. A drag beside a viscous friction that drives the shaft is of
-    another form than what the captures show, where anything is left. What is left of a signal at an
-    order of the angle is at most `unexplained_share` of what the effects do there: their forms are
-    not wrong where they do nothing.
+    another form than what the captures show, where anything is left. Where the held-out error is
+    over what a floor may be wrong by, what is left of a signal at an order of the angle is at most
+    `unexplained_share` of what the effects do there: their forms are not wrong where they do
+    nothing.
 
     """
     policy, over = steps[0].fit.policy.selection, steps[0].fit.policy.goodness.over
@@ -219,7 +220,9 @@ def explained(
     removed = bool((after[large] <= (1.0 - policy.least_share) * before[large]).all())
     allowed = policy.unexplained_share * float(before.sum())
     removed &= float(after.sum()) < allowed
-    return not remainders or (removed and _is_of_their_forms(steps[-1], remainders))
+    if not remainders or not removed:
+        return not remainders
+    return last <= over or _is_of_their_forms(steps[-1], remainders)
 
 
 def _is_of_their_forms(step: LadderStep, remainders: Sequence[Remainder]) -> bool:
