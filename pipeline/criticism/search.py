@@ -70,7 +70,7 @@ class Ladder:
         What is over the floor at their end.
     cut
         Every effect that would remove some of that and was dropped, with a note where captures
-        contradict it, an empty one where it would be unsupported.
+        contradict it or it is part of a curve, an empty one where it would be unsupported.
 
     """
 
