@@ -54,11 +54,11 @@ BOUND = {"sha256_rows", "motor_id", "contract"}
 
 
 def log() -> str:
-    """Some rows of a shaft that turns under current, a blank among them."""
+    """Some rows of a shaft that turns under current, two without a current among them."""
     rng, rows = np.random.default_rng(5), ["Time;RPM;Iq;Uq;Turns"]
     for n in range(200):
         rpm = 300.0 + 30.0 * np.sin(n / 50.0) + rng.normal(0.0, 0.1)
-        iq_a = "" if n == 100 else f"{1.0 + np.sin(n / 40.0) + rng.normal(0.0, 0.01):.5f}"
+        iq_a = "" if n in (100, 101) else f"{1.0 + np.sin(n / 40.0) + rng.normal(0.0, 0.01):.5f}"
         uq_v = 0.3 + 0.05 * rpm + rng.normal(0.0, 0.01)
         rows.append(f"{n:.1f};{rpm:.4f};{iq_a};{uq_v:.4f};{300.0 / 60.0 * n / 1000.0:.6f}")
     return "\n".join(rows) + "\n"
