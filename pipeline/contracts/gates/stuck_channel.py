@@ -105,7 +105,7 @@ def is_short_circuit(table: pl.DataFrame, motoring_share: float) -> bool:
 
     References
     ----------
-    IEEE Std 1812-2014, 5.3 (short-circuit test of a machine with permanent magnets).
+    IEEE Std 1812-2014, short-circuit tests of machines with permanent magnets.
 
     """
     needed = (*DQ_VOLTAGES, "id_a", "iq_a", "omega_mech_rad_s")

@@ -149,21 +149,16 @@ def is_part_of_a_curve(system: LinearSystem, signals: Sequence[str], name: str) 
     """
     offered, wide = _with_ports(system, _hooks(signals))
     penalty, known = math.log(wide.size), wide.normal_equations()
-    thorough = wide.policy.selection.thorough
-
-    def gain(live: Indices) -> float:
-        """Fall of the deviance by a curve beside the effect, its penalty paid."""
-        chosen = np.concatenate([wide.model_columns, live])
-        return -known.only(chosen).best(*thorough).deviance - live.size * penalty
-
-    without_curve = known.only(wide.model_columns).best(*thorough).deviance
-    most = max((without_curve + gain(live) for _, live in offered), default=0.0)
-    least = min(
-        (loss_without(wide, (name,), live, known) + live.size * penalty for _, live in offered),
-        default=math.inf,
-    )
+    thorough, own = wide.policy.selection.thorough, wide.model_columns
+    plain = known.only(own).best(*thorough).deviance
+    beside, alone = [0.0], [math.inf]
+    for _, curve in offered:
+        paid = curve.size * penalty
+        both = known.only(np.concatenate([own, curve])).best(*thorough).deviance
+        beside.append(both - plain + paid)
+        alone.append(loss_without(wide, (name,), curve, known) + paid)
     effect = system.fit.effect(name)
-    return least < effect.dof(system.fit.machine) * penalty - max(most, 0.0)
+    return min(alone) < min(beside) + effect.dof(system.fit.machine) * penalty
 
 
 def _with_ports(

@@ -42,10 +42,10 @@ def truncated(
     While anything is left, in the captures or where one is predicted from the others, trailing
     steps are dropped that captures contradict, where the effects found do not explain what is left;
     and those that lowered the held-out error by less than `guess_share`, but for a first effect
-    that explains it. A step stays that cleared a signal of
-    all waves of the angle, or that takes most of what its own side, winding or shaft, misses in
-    captures held out: a residual of the other side is no evidence against it. Not so a rare effect:
-    what benches seldom have is less likely than a part of what nothing explains.
+    that explains it. A step stays that cleared a signal of all waves of the angle, or that takes
+    most of what its own side, winding or shaft, misses in captures held out: a residual of the
+    other side is no evidence against it. Not so a rare effect: what benches seldom have is less
+    likely than a part of what nothing explains.
 
     """
     policy = steps[0].fit.policy.selection
