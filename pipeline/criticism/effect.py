@@ -163,6 +163,7 @@ class Evidence:
 
     `exact`: its form is a law, of which nothing is left over for another effect to take up.
     `of_phases`: it goes with the electrical angle, which is not known without the pole pairs.
+    `rotor_angles`: the fewest known angles of the rotor that show it, as two fit any wave.
     `alternatives`: other effects, each with the test or calibration that discriminates it from
     this. `rare`: benches seldom have it, so that of two that tie the other is named. `in_place_of`:
     a nuisance, zero in a model with the effect, and the parameter that is it at an unusual size.
@@ -175,6 +176,7 @@ class Evidence:
     rare: bool = False
     exact: bool = False
     of_phases: bool = False
+    rotor_angles: int = 0
     in_place_of: tuple[str, str] | None = None
     friction: bool = False
     alternatives: Mapping[str, str] = field(default_factory=dict)
@@ -282,12 +284,12 @@ class Effect(Description, Evidence, Hooks):
         return {f"{self.name}.{p.name}": p for p in self.parameters_of(machine)}
 
     def gone_through(self, machine: Machine) -> bool:
-        """Whether some capture goes through enough of a wave of the effect over the angle.
+        """Whether the captures go through enough of a wave of the effect over the angle.
 
         Parameters
         ----------
         machine
-            Holds how far the shaft turns.
+            Holds how far the shaft turns, and at how many angles the winding was recorded.
 
         Returns
         -------
@@ -295,6 +297,8 @@ class Effect(Description, Evidence, Hooks):
             True for an effect without such waves.
 
         """
+        if machine.rotor_angles < self.rotor_angles:
+            return False
         orders = [p.order for p in self.parameters_of(machine) if p.order]
         return not orders or max(orders) * machine.travel_turns >= machine.policy.cutting.least_wave
 

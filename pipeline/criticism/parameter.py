@@ -146,6 +146,9 @@ class Machine:
         Other orders, whole numbers or not, that a fit left in logs under load.
     travel_turns
         How far the shaft turns in any one capture [turns].
+    rotor_angles
+        Known angles of the rotor at which its winding was recorded, within a sixth of an electrical
+        turn; infinite where one is logged as it turns.
     pairs_known
         Whether anything gives the pole pairs. Where not, they are taken as one, so that
         a flux linkage is Ke, and one over speed or torque says nothing of the flux.
@@ -167,6 +170,7 @@ class Machine:
     encoder_rad: float = 0.0
     load_orders: tuple[float, ...] = ()
     travel_turns: float = math.inf
+    rotor_angles: float = math.inf
     pairs_known: bool = True
     unlogged: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     stated: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -33,7 +33,8 @@ _SHAFT_ALONE = ("spin_down", "cogging")
 """Tests without a current, of which a winding's pole pairs say nothing."""
 _OF_AN_ANGLE = ("vd_v", *LINES_V, "va_v", "vb_v", "vc_v", "ia_a", "ib_a", "ic_a")
 """What a turning winding shows by its electrical angle; q voltage, q current and torque do not."""
-_TURNING = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
+_ANGLES = ("theta_mech_rad", "theta_elec_rad")
+_TURNING = (*_ANGLES, "omega_mech_rad_s")
 _LINES_A = ("ia_a", "ib_a", "ic_a")
 
 
@@ -94,6 +95,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         stated,
         encoder_step(campaign, policy),
         travel_turns=max(map(_travel_turns, campaign.captures), default=0.0),
+        rotor_angles=_rotor_angles(campaign),
         pairs_known=counted,
         unlogged=_unlogged(campaign),
         stated=known,
@@ -182,6 +184,25 @@ def _travel_turns(capture: Capture) -> float:
         last = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
         return (float(np.nanmax(theta) - np.nanmin(theta)) + last) / TURN_RAD if theta.size else 0.0
     return math.inf if any(capture.has(name) for name in _TURNING) else 0.0
+
+
+def _rotor_angles(campaign: Campaign) -> float:
+    """Known angles of the rotor at which its winding was recorded, within a sixth of an electrical
+    turn, which is the wave of a machine of three phases; infinite where it turns by a known angle.
+    """
+    locked: set[float] = set()
+    wave_deg = 360 // 6
+    for capture in campaign.captures:
+        if capture.meta.test in _SHAFT_ALONE:
+            continue
+        if any(capture.has(name) for name in _ANGLES):
+            return math.inf
+        stated = capture.meta.theta_elec_deg
+        angles = [] if stated is None else [stated]
+        if capture.has("theta_elec_deg"):
+            angles = capture.arrays("theta_elec_deg")["theta_elec_deg"].tolist()
+        locked |= {round(angle) % wave_deg for angle in angles if math.isfinite(angle)}
+    return len(locked)
 
 
 def encoder_step(campaign: Campaign, policy: Policy) -> float:

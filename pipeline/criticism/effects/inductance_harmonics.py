@@ -46,6 +46,7 @@ EFFECT = Effect(
     signature="orders 6ε proportional to current in voltage and to its square in torque",
     tests=("torque_map",),
     of_phases=True,
+    rotor_angles=3,
     experiment="a torque map, or a slow turn under current",
     headline=tuple(
         f"inductance that changes with the rotor's angle, {{{name}_cos & {name}_sin %}} {where}"

@@ -20,7 +20,11 @@ from pipeline.estimation.electrical.operating_points import (
 from pipeline.estimation.electrical.ripple_torque import RIPPLE
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, angle_doubt, standstill_words
 from pipeline.estimation.mechanical.map_drag import MapDrag, map_drag
-from pipeline.estimation.mechanical.other_current import not_along_q, unlogged_share
+from pipeline.estimation.mechanical.other_current import (
+    not_along_q,
+    reluctance_counts,
+    unlogged_share,
+)
 from pipeline.estimation.mechanical.sampled_current import sampling_drag
 from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d
 from pipeline.estimation.method import Method, over_x
@@ -57,6 +61,7 @@ EXPERIMENT = (
     "record a torque_map: the dynamometer holds a speed while positive and negative q currents "
     "are stepped, at two or more d currents, in both senses of rotation"
 )
+ONE_D_CURRENT = "at one d current the torque of the magnet is not apart from that of reluctance"
 TURNED = ("id", "id sense", "iq^2 - id^2", "id speed", "iq^2 - id^2 speed")
 BENDING = ("iq^3", "iq^5", "id^2 iq", "id iq^3", "id^3 iq", "id^2 iq^3")
 
@@ -117,6 +122,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     alpha, _ = magnet_coefficient(known)
     chosen = _chosen(points, alpha, options["level"])
     model = _regress(points, alpha, chosen)
+    if model.dof + len(model.names) > len(points):
+        return METHOD.nothing(GIVES, f"{ONE_D_CURRENT}; {EXPERIMENT}")
     still = angle_doubt(points, model.kt_nm_a, pairs, known)
     note = _note(captures, table, points, chosen)
     estimates = _estimates(points, model, chosen, still, known, note)
@@ -154,7 +161,8 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
     Returns
     -------
     base : dict of array [n]
-        Columns of the offset T0 of each group [1], of K [A] and, where i_d moves, of K_rel [A²].
+        Columns of the offset T0 of each group [1], of K [A], and of K_rel [A²] where there is an
+        i_d.
     candidates : dict of array [n]
         Columns that enter where a test asks for them: saturation (odd powers of i_q, even and odd
         ones of i_d), a frame that is turned (i_d, i_q² - i_d²), the more the faster where currents
@@ -183,7 +191,7 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
     alpha = _column(points, "alpha_mech_rad_s2")
     if np.ptp(alpha) > 0.0:
         candidates["acceleration"] = alpha
-    if np.ptp(i_d) > policy().aligned.least_d_share * np.ptp(i_q):
+    if reluctance_counts(i_d, i_q):
         base["id iq"] = i_d * i_q
         candidates |= {
             "id": i_d,

@@ -15,7 +15,11 @@ from pipeline.estimation.electrical.magnet_temperature import (
 )
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, RIPPLES, SOURCE, ripple_share
-from pipeline.estimation.mechanical.other_current import not_along_q, unlogged_share
+from pipeline.estimation.mechanical.other_current import (
+    not_along_q,
+    reluctance_counts,
+    unlogged_share,
+)
 from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -66,7 +70,7 @@ def torque(
     Returns
     -------
     base : array [n, 2 or 3]
-        Columns of T0, Kt, and K_r where i_d moves.
+        Columns of T0, Kt, and K_r where there is an i_d.
     candidates : dict of array [n]
         Columns that enter where a test asks for them: saturation (i_q³, i_q⁵), friction that
         holds torque back from the transducer, and the torque ripple of the angles.
@@ -77,7 +81,7 @@ def torque(
 
     """
     base = [np.ones(iq_a.size), iq_a * warm]
-    if np.ptp(id_a) > policy().aligned.least_d_share * np.ptp(iq_a):
+    if reluctance_counts(id_a, iq_a):
         base.append(id_a * iq_a)
     candidates = {"iq^3": iq_a**3, "iq^5": iq_a**5, "sign iq": np.sign(iq_a)}
     if theta_elec_rad is not None:

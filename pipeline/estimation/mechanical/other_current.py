@@ -13,6 +13,22 @@ LOG_D = (
 )
 
 
+def reluctance_counts(id_a: Array, iq_a: Array) -> bool:
+    """Whether the reluctance torque of a d current is a column of its own beside the magnet's.
+
+    A d current that stays where it is makes as much of it as one that moves: without its column it
+    would be torque of the magnet.
+
+    Parameters
+    ----------
+    id_a, iq_a : array [n], A
+        Rotor-frame currents.
+
+    """
+    span = policy().aligned.least_d_share * np.ptp(iq_a)
+    return bool(max(float(np.ptp(id_a)), 2.0 * float(np.max(np.abs(id_a), initial=0.0))) > span)
+
+
 def unlogged_share(residuals_nm: Array, magnet_nm: Array) -> float:
     """Relative standard uncertainty of Kt where no d current was logged.
 

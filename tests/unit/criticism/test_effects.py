@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.data.segment import slow_orders
 from pipeline.criticism.effects import cogging
 from pipeline.criticism.library.registry import chosen, effects
@@ -16,8 +17,11 @@ from pipeline.criticism.machine.coenergy import base_flux, effect_flux
 from pipeline.criticism.machine.model import Model, evaluate, values_of
 from pipeline.criticism.operating import Recorded, ShaftState
 from pipeline.physics.glossary import COLUMNS, TESTS
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
 from pipeline.records.errors import UsageError
 from tests.unit.criticism.machines import BASE, machine, operating
+from tests.unit.estimation.signals import capture
 
 LIBRARY = effects()
 
@@ -411,3 +415,22 @@ def test_an_order_is_offered_where_some_capture_goes_through_one_of_its_waves():
     assert LIBRARY["coulomb_friction"].gone_through(shorter)
     arm = replace(machine(), travel_turns=0.2)
     assert LIBRARY["unbalance"].gone_through(arm)
+
+
+def test_no_wave_of_the_inductances_is_offered_of_two_locked_angles():
+    """Two fit any wave and its mean: what saturation left of such steps was named one."""
+    harmonics, rows = LIBRARY["inductance_harmonics"], np.linspace(0.0, 1.0, 300)
+
+    def size(*angles, **columns):
+        columns = {"t_s": rows, "vab_v": rows, "ia_a": rows, **columns}
+        steps = [
+            capture("current_step", f"{n}", pole_pairs=4, theta_elec_deg=angle, **columns)
+            for n, angle in enumerate(angles)
+        ]
+        return machine_of(Campaign("m", tuple(steps)), Constants())
+
+    two_of_a_wave = size(330.0, 60.0, 330.0, 120.0)
+    assert not harmonics.gone_through(two_of_a_wave)
+    assert LIBRARY["saturation"].gone_through(two_of_a_wave)
+    assert harmonics.gone_through(size(330.0, 60.0, 15.0))
+    assert harmonics.gone_through(size(330.0, theta_mech_rad=rows))

@@ -118,9 +118,10 @@ def test_columns_of_the_torque() -> None:
         "id speed": [5.0, 3.0 * W], "iq^2 - id^2 speed": [-15.0, 7.0 * W],
     }  # fmt: skip
     assert {name: column.tolist() for name, column in more.items()} == expected
-    for share, there in ((0.097, False), (0.103, True)):
-        pair = [point(-5.0, 0.0), point(5.0, share * 10.0)]
-        assert ("id iq" in torque(pair, 0.0)[0]) is there
+    for share, there in ((0.048, False), (0.052, True)):
+        for other in (0.0, share * 10.0):
+            pair = [point(-5.0, other), point(5.0, share * 10.0)]
+            assert ("id iq" in torque(pair, 0.0)[0]) is there
     assert _sigma([point(1.0, rows=25), point(1.0, rows=175)]) == pytest.approx(
         [2.0, math.sqrt(4 / 7)]
     )
