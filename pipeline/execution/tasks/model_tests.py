@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -122,4 +123,8 @@ def judged_model(
         return Tested(
             ModelVerdict("not_tested", model.name, model.effects, note=message), (broken,)
         )
+    finally:
+        # a segment and what is kept of it refer to each other, and the collector counts objects,
+        # not the size of their arrays: a worker would grow with every motor of a fleet
+        gc.collect()
     return Tested(verdict, (), document if diagnose == "true" else None)

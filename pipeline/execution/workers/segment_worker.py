@@ -8,6 +8,7 @@ them by value.
 
 from __future__ import annotations
 
+import gc
 import importlib
 import logging
 from collections.abc import Callable, Iterator, Sequence
@@ -185,6 +186,7 @@ def _load_of(segment: Segment) -> int:
 
 def _forget() -> None:
     _SEGMENTS.clear()
+    gc.collect()
 
 
 def _load_effects(effects_path: str | None) -> None:

@@ -54,6 +54,8 @@ class Exports:
     def settle_all(self, contents: Mapping[Key, bytes]) -> None:
         """Gives versions their files, unless they are there: each is written once, never again.
 
+        What other writers have pending of such a version goes, be they interrupted or not.
+
         Parameters
         ----------
         contents
@@ -83,13 +85,17 @@ class Exports:
                     self._put(key, content)
                 return
             final, pending = self.folder / place_of(key), self._pending(key, owner)
-            if final.exists():
-                pending.unlink(missing_ok=True)
-                return
-            if not pending.exists():
-                self._prepare(key, content, owner)
-            pending.replace(final)
-            sync_folder(final.parent)
+            if not final.exists():
+                if not pending.exists():
+                    self._prepare(key, content, owner)
+                try:
+                    pending.replace(final)
+                except FileNotFoundError:
+                    if not final.exists():
+                        raise
+                sync_folder(final.parent)
+            for left in _pending_of(final):
+                left.unlink(missing_ok=True)
         except OSError as error:
             raise _failure(self.place, error) from error
 
@@ -125,7 +131,7 @@ class Exports:
         if self.folder is None:
             return False
         final = self.folder / place_of(key)
-        for pending in sorted(final.parent.glob(f".{key[1]}.*{PENDING}")):
+        for pending in _pending_of(final):
             if hashlib.sha256(pending.read_bytes()).hexdigest() == sha256:
                 pending.replace(final)
                 sync_folder(final.parent)
@@ -195,6 +201,11 @@ class Exports:
         assert self.folder is not None
         final = self.folder / place_of(key)
         return final.with_name(f".{key[1]}.{owner}{PENDING}")
+
+
+def _pending_of(final: Path) -> list[Path]:
+    """What writers have pending of a version, by the file that it is to be."""
+    return sorted(final.parent.glob(f".{final.stem}.*{PENDING}"))
 
 
 def _each(work: Callable[[Key], None], keys: Iterable[Key]) -> None:

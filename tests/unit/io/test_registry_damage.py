@@ -182,6 +182,35 @@ def test_what_a_writer_left_before_its_commit_is_noted(registry: Registry, tmp_p
     assert "1 pending" in found.notes[0]
 
 
+def test_the_next_writer_of_a_version_clears_what_an_interrupted_one_left(
+    registry: Registry, tmp_path: Path
+) -> None:
+    final = export(tmp_path / "registry", 1)
+    final.parent.mkdir(parents=True)
+    final.with_name(f".{final.stem}.4711.pending").write_bytes(b"{")
+    registry.publish([document("a", 1)], NOON)
+    assert final.is_file()
+    assert not list((tmp_path / "registry").rglob("*.pending"))
+
+
+def test_a_writer_whose_version_another_has_settled_is_content(
+    registry: Registry, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The other one's file appears, and this one's pending file goes, just before it is named."""
+    replace = Path.replace
+
+    def late(path: Path, target: Path) -> Path:
+        if path.suffix == ".pending":
+            target.write_bytes(path.read_bytes())
+            path.unlink()
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", late)
+    registry.publish([document("a", 1)], NOON)
+    assert export(tmp_path / "registry", 1).is_file()
+    assert registry.verify().faults == ()
+
+
 def test_a_place_that_is_a_file(tmp_path: Path) -> None:
     (tmp_path / "registry").write_text("not a folder")
     registry = Registry(str(tmp_path / "registry"))
