@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -145,7 +145,7 @@ def _scales(
     clamped = _largest(tables, ("torque_shaft_nm",))
     recorded = {"impedance_ohm": voltage / current} if current and voltage else {}
     current, voltage = current or 1.0, voltage or 1.0
-    psi = voltage / (pole_pairs * speed)
+    psi = _flux_scale(campaign.captures, pole_pairs) or voltage / (pole_pairs * speed)
     if not turned and (amperes := _largest(campaign.of("torque_table"), ("iq_a",))):
         # the voltage of a winding that no test turned is that of its resistance
         psi = clamped / (1.5 * pole_pairs * amperes)
@@ -161,6 +161,21 @@ def _scales(
         "flux_wb": psi,
         **recorded,
     }
+
+
+def _flux_scale(captures: Sequence[Capture], pole_pairs: int) -> float:
+    """Flux linkage [Wb] by the largest voltage of a turning winding and the largest speed of one;
+    0 without any. A crawl and a spin of one motor have next to nothing of each other's.
+    """
+    lines = 1.0 / math.sqrt(3.0)
+    spun = [
+        (max(_largest([c], ("vd_v", "vq_v")), lines * _largest([c], LINES_V)), _speed(c))
+        for c in captures
+        if c.meta.test != _HELD
+    ]
+    voltages = [voltage for voltage, speed in spun if voltage and speed]
+    speeds = [speed for voltage, speed in spun if voltage and speed]
+    return max(voltages) / (pole_pairs * max(speeds)) if speeds else 0.0
 
 
 def _settling(campaign: Campaign, policy: Policy) -> dict[str, float]:

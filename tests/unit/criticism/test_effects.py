@@ -434,3 +434,30 @@ def test_no_wave_of_the_inductances_is_offered_of_two_locked_angles():
     assert LIBRARY["saturation"].gone_through(two_of_a_wave)
     assert harmonics.gone_through(size(330.0, 60.0, 15.0))
     assert harmonics.gone_through(size(330.0, theta_mech_rad=rows))
+
+
+def test_the_flux_of_a_crawl_beside_a_spin():
+    """The crawl's voltage over the spin's speed was a hundredth of it: no step led back."""
+    t, flux_wb, pairs = np.linspace(0.0, 1.0, 4000), 0.0028, 7
+    line_v = math.sqrt(3.0) * pairs * 350.0 * flux_wb * np.sin(pairs * 350.0 * t)
+    spin = capture(
+        "open_circuit",
+        "spin",
+        pole_pairs=pairs,
+        t_s=t,
+        vab_v=line_v,
+        omega_mech_rad_s=350.0 + 0 * t,
+    )
+    speed = 1.6 * np.sin(9.0 * t)
+    crawl = capture(
+        "drive",
+        "crawl",
+        pole_pairs=pairs,
+        t_s=t,
+        omega_mech_rad_s=speed,
+        iq_a=0.4 * np.cos(9.0 * t),
+        vq_v=0.04 * np.cos(9.0 * t) + pairs * flux_wb * speed,
+    )
+    scales = machine_of(Campaign("m", (spin, crawl)), Constants()).scales
+    assert scales["flux_wb"] == pytest.approx(flux_wb, rel=0.1)
+    assert scales["torque_nm"] == pytest.approx(1.5 * pairs * flux_wb * 0.4, rel=0.1)
