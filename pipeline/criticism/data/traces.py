@@ -98,8 +98,8 @@ def even_clock(
     columns
         [n each]; missing values are bridged.
     keep
-        Samples that count [n]: not those bridged, inside a gap of over 1.5 periods, or at either
-        end.
+        Samples that count [n]: not those bridged, inside a gap, or at either end; a single row that
+        is missing is read between its neighbours.
 
     Notes
     -----
@@ -122,9 +122,10 @@ def even_clock(
     if clock and clearest_ratio(time, clock[1], columns.values()) <= policy.clock_ratio:
         period, number = clock
         even = np.arange(number[-1] + 1)
-        recorded = np.zeros(even.size, dtype=bool)
-        recorded[number] = keep
+        there, recorded = np.zeros((2, even.size), dtype=bool)
+        there[number], recorded[number] = True, keep
         columns = {name: np.interp(even, number, column) for name, column in columns.items()}
+        recorded[1:-1] |= ~there[1:-1] & recorded[:-2] & recorded[2:]
         keep = recorded
     elif uneven:
         even = time[0] + period * np.arange(round((time[-1] - time[0]) / period) + 1)
