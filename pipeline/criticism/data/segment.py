@@ -122,6 +122,8 @@ class Instrument:
     behind
         How long before its motion the currents and voltages of a row are [samples]: 0.5 where they
         are means up to the instant at which the motion is read, else 0.
+    single
+        Whether its voltages, stated as held from one row to the next, are of one PWM period each.
 
     """
 
@@ -137,6 +139,7 @@ class Instrument:
     snapshots: bool = False
     waves: bool = True
     behind: float = 0.0
+    single: bool = False
 
     @property
     def commanded(self) -> bool:

@@ -10,7 +10,8 @@ which on it is held, or of the middle of its hold. That is known only where each
 to be the mean about the middle of one hold.
 
 Telemetry averages currents and voltages over a row, or samples them at its end, where the motion is
-read. Means are half a row before it.
+read. Means are half a row before it. Of a faster log only some rows may have been kept: a voltage
+that was held from one row of that to the next is none that is held between those.
 
 A current that moves fast between slow rows may look as if it had waves of the angle. Where the
 captures are better explained by straight lines between rows, it has none.
@@ -20,17 +21,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from operator import attrgetter
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.segment import Cache, Segment
+from pipeline.criticism.parameter import Machine
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.improvement import clears
 from pipeline.criticism.signals.true_current import ripples
+from pipeline.criticism.signals.true_state import averaging
 
 TORQUE = "torque_shaft_nm"
 _HALF_HOLD = 0.5
@@ -43,6 +47,10 @@ _MEANS = (
 _STATOR = (
     "torque_shaft_nm of {} captures is read at the stator (a reaction torque): no inertia of the "
     "rotor is in it; in the shaft it would miss by more"
+)
+_SINGLE = (
+    "voltages of {} captures, stated as held from one row to the next, are taken as those of one "
+    "PWM period each, which explains them better"
 )
 _SAMPLED = (
     "voltages of {} captures are taken in the rotor frame of the sampling instant, which explains "
@@ -107,6 +115,7 @@ def with_usual_readings(system: LinearSystem) -> LinearSystem:
     readings = (
         (attrgetter("instrument.frame"), _in_other_frame),
         (attrgetter("instrument.behind"), _of_other_rows),
+        (attrgetter("instrument.single"), partial(_of_other_hold, system.fit.machine)),
     )
     for earlier, other in readings:
         if not any(map(earlier, system.segments)):
@@ -134,12 +143,13 @@ def reading_notes(fit: Fit) -> tuple[str, ...]:
     """
     delayed = fit.values.get("sample_delay.of_speed") == 0.0
     share = fit.policy.cutting.slower_share
-    notes = {_SAMPLED: set[str](), _MEANS: set[str](), _STATOR: set[str](), _DELAYED: set[str]()}
+    notes = {note: set[str]() for note in (_SAMPLED, _MEANS, _SINGLE, _STATOR, _DELAYED)}
     for segment in fit.segments:
         is_sampled = segment.instrument.frame != 0.0
         for note, applies in (
             (_SAMPLED, is_sampled),
             (_MEANS, segment.instrument.behind != 0.0),
+            (_SINGLE, segment.instrument.single),
             (_STATOR, segment.instrument.stator),
             (_DELAYED, delayed and not is_sampled and _has_held_vectors(segment, share)),
         ):
@@ -161,6 +171,11 @@ def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
         each = zip(system.segments, slow, strict=True)
         means = tuple(_of_other_rows(s) if its_own else s for s, its_own in each)
         yield gauss_newton(replace(system.fit, segments=means))
+    sparse = [_may_be_single(segment, share) for segment in system.segments]
+    if any(sparse):
+        each = zip(system.segments, sparse, strict=True)
+        single = tuple(_of_other_hold(system.fit.machine, s) if may_be else s for s, may_be in each)
+        yield gauss_newton(replace(system.fit, segments=single))
     if any(ripples(segment) for segment in system.segments):
         yield gauss_newton(replace(system.fit, segments=tuple(map(_other_lines, system.segments))))
     torques = np.array([channel == TORQUE for _, channel, _ in system.labels], dtype=bool)
@@ -198,6 +213,17 @@ def _may_hold_means(segment: Segment, slower_share: float) -> bool:
     return slow and not centred and "iq_a" in segment.recorded
 
 
+def _may_be_single(segment: Segment, slower_share: float) -> bool:
+    """Whether voltages that are stated as held from row to row may be of one PWM period each: in a
+    log that is slower than its PWM.
+    """
+    instrument, pwm_s = segment.instrument, segment.fixed.get("pwm_s", 0.0)
+    slow = 0.0 < pwm_s < slower_share * segment.ts_s
+    return "vd_v" in segment.channels and (
+        instrument.single or (slow and instrument.timing == "held")
+    )
+
+
 def _in_other_frame(segment: Segment) -> Segment:
     instrument = segment.instrument
     return replace(segment, instrument=replace(instrument, frame=_HALF_HOLD - instrument.frame))
@@ -206,6 +232,16 @@ def _in_other_frame(segment: Segment) -> Segment:
 def _of_other_rows(segment: Segment) -> Segment:
     instrument = segment.instrument
     return replace(segment, instrument=replace(instrument, behind=_HALF_HOLD - instrument.behind))
+
+
+def _of_other_hold(machine: Machine, segment: Segment) -> Segment:
+    single = not segment.instrument.single
+    timing = "instant" if single else "held"
+    instrument = replace(
+        segment.instrument, single=single, timing=timing, points=1, snapshots=False
+    )
+    other = replace(segment, instrument=instrument, cache=Cache())
+    return replace(other, instrument=averaging(other, machine))
 
 
 def _other_lines(segment: Segment) -> Segment:
