@@ -108,6 +108,7 @@ def test_an_effect_of_the_speed_is_named_without_an_angle_or_a_voltage() -> None
     assert found.ladder[-1].held_out < 1.3
 
 
+@pytest.mark.slow
 def test_a_drag_is_named_by_a_speed_beside_voltages() -> None:
     """The voltages say the flux, and the speed what the current does not turn."""
     found = diagnose(Campaign("m", (log(1, 5e-7, volts=True),)), ModelSpec(), Constants({}))
