@@ -156,7 +156,18 @@ EFFECT = Effect(
             usual=(1.0, 0.5),
             words="of half a dead time, by which a current is sampled before the middle of a pulse",
         ),
-        Parameter("lag_s", "s", 0.25, 0.0, "period_s", low=-1.0, high=1.0, scan=(0.0,)),
+        # the edges that lose it are within half a PWM period of the sample
+        Parameter(
+            "lag_s",
+            "s",
+            0.25,
+            0.0,
+            "period_s",
+            low=-1.0,
+            high=1.0,
+            scan=(0.0,),
+            usual=(0.0, 5e-5),
+        ),
         Parameter(
             "given_v",
             "V",

@@ -171,14 +171,15 @@ def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
     machine
         Determines which parameters there are.
     score
-        Of optional terms those that its step uses are counted; None counts none.
+        Of optional terms those that its step uses are counted; None counts none. A shape with a
+        prior is not: it stays at what is usual where captures do not show it.
 
     """
     used = {} if score is None else score.step
     return sum(
         not p.optional or bool(used.get(name))
         for name, p in effect.named(machine).items()
-        if not p.choice
+        if not p.choice and (p.amplitude or p.usual is None)
     )
 
 

@@ -17,7 +17,7 @@ from pipeline.criticism.regression.linear_system import LinearSystem, model_colu
 from pipeline.criticism.selection.candidates import Candidate, candidates, searched, widened
 from pipeline.criticism.selection.improvement import fall_below_floor, power_share
 from pipeline.criticism.selection.refit import floored_anew
-from pipeline.criticism.selection.score_test import Score, _Scoring, score_all
+from pipeline.criticism.selection.score_test import Score, _Scoring, paid_for, score_all
 from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, machine, with_drag
 
 
@@ -203,6 +203,23 @@ def test_the_best_of_several_choices_has_had_as_many_chances():
     )
     more = searched(offered, clock) - searched(offered, plain)
     assert more == pytest.approx(2.0 * np.log(len(recorders)))
+
+
+@pytest.mark.parametrize(
+    ("name", "fitted_so", "count"),
+    [
+        ("dead_time", ("loss_v",), 2),
+        ("dead_time", ("loss_v", "on_v"), 3),
+        ("current_gain", ("cosine", "sine", "mean"), 3),
+    ],
+)
+def test_a_shape_with_a_prior_costs_a_score_no_parameter(name, fitted_so, count):
+    """A dead time of two parameters, a voltage and a width, was charged for four: the lags of its
+    pulses and of its sign are what they usually are where captures do not show them.
+    """
+    step = {f"{name}.{one}": 0.1 for one in fitted_so}
+    score = SimpleNamespace(step=step)
+    assert paid_for(effects()[name], machine(), score) == count
 
 
 @pytest.mark.parametrize(("penalty", "named"), [(15.0, "stribeck"), (32.0, None)])
