@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -63,7 +64,8 @@ class Baseline:
         return cls(wide, added, held_out, *factors, significant)
 
     def is_improved_by(self, tried: LinearSystem, score: Score) -> bool:
-        """Whether a candidate predicts captures held out better, and mends more than it spoils.
+        """Whether a candidate predicts captures held out better, and mends more than it spoils; of
+        one that may be hidden in the fit, by what it takes over the floor of these captures alone.
 
         Parameters
         ----------
@@ -77,6 +79,7 @@ class Baseline:
         same_hook = _same_hook(score.candidate.effect, self.added)
         doubts = _form_error_factors(wide, same_hook), self.doubt
         below = policy.same_hook_penalties if same_hook else policy.held_out_penalties
+        below = math.inf if score.may_be_hidden else below
         least = policy.held_out_penalties * score.penalty, below * score.penalty
         one, other = in_common((wide, tried), (self.held_out, leave_out(tried)))
         without = predicted_chi2(wide, one) * self.shrunk

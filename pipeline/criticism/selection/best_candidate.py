@@ -44,9 +44,11 @@ def best_candidate(
     """
     effects, couplings = wide.fit.model.effects, bool(significant_groups(wide).any())
     inside = {e.discriminator for e in effects} - {None}
-    passing = [s for s in scores if s.passes and _may_join(s, inside, couplings)]
-    passing.sort(key=lambda s: s.penalty - s.fall)
-    return _chosen(wide, passing, effects[base:], unsure)
+    joining = [s for s in scores if _may_join(s, inside, couplings)]
+    joining.sort(key=lambda s: s.penalty - s.fall)
+    passing, hidden = [s for s in joining if s.passes], [s for s in joining if s.may_be_hidden]
+    added = effects[base:]
+    return _chosen(wide, passing, added, unsure) or _chosen(wide, hidden, added, unsure)
 
 
 def _may_join(score: Score, inside: Set[object], couplings: bool) -> bool:

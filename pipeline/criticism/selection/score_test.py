@@ -85,10 +85,28 @@ class Score:
         discriminator is not discriminated from noise of the angle's sensor, which runs through a
         drive's speed loop and so is in torque and angle alike.
         """
+        return self._is_worth_it and self._helps
+
+    @property
+    def may_be_hidden(self) -> bool:
+        """Whether it is worth its penalty and large enough, and helps too little in the fit alone.
+
+        Nuisances may take there what captures show that are predicted from the others: zeros of a
+        transducer, one a capture, took an offset that all of them have.
+        """
+        clear = self.fall > self.policy.below_floor_penalties * self.penalty
+        uncoupled = self.candidate.effect.discriminator is None
+        return clear and uncoupled and self._is_worth_it and not self._helps
+
+    @property
+    def _is_worth_it(self) -> bool:
+        return self.fall > self.penalty and self.matters and self.confounder is None
+
+    @property
+    def _helps(self) -> bool:
         effect = self.candidate.effect
         below = self._below_floor and effect.hook != "sensor" and effect.discriminator is None
-        helps = self.share >= self.policy.least_share or below or self.other_inertia
-        return self.fall > self.penalty and self.matters and helps and self.confounder is None
+        return self.share >= self.policy.least_share or below or self.other_inertia
 
     @property
     def _below_floor(self) -> bool:
@@ -274,7 +292,7 @@ class _Scoring:
 
         A loss that is too small to be reported must not be reported under a wrong name.
         """
-        if not score.passes:
+        if not (score.passes or score.may_be_hidden):
             return None
         small = [
             (other, places)

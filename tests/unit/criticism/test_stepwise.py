@@ -25,6 +25,7 @@ from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.score_test import Score
 from pipeline.criticism.selection.sizes import material, size_of
 from pipeline.criticism.selection.stepwise import search
+from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import (
     BASE,
     LIBRARY,
@@ -36,6 +37,8 @@ from tests.unit.criticism.machines import (
     machine,
     with_drag,
 )
+
+TORQUE = "torque_shaft_nm"
 
 
 def test_a_sound_machine_is_left_alone():
@@ -63,6 +66,32 @@ def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none
     assert steps[0].system.reduced_chi2(steps[0].system.residual).max() < 1.0
     assert steps[-1].added == ("windage",)
     assert search(cautious(none, 9.0), LIBRARY)[-1].added == ()
+
+
+def mirrored(segment):
+    """The log of a machine that turns and pulls the other way."""
+    turned = {name: -segment.recorded[name] for name in ("iq_a", "vq_v", "theta_mech_rad", TORQUE)}
+    weak = segment.weak
+    again = projection(turned["theta_mech_rad"], weak.starts, weak.length, (1, 7, 14, 42))
+    return replace(segment, recorded={**segment.recorded, **turned}, weak=again)
+
+
+@pytest.mark.parametrize(("senses", "added"), [((1, 1, 1, 1, 1, 1), 1), ((1, 1, -1, -1, 1, -1), 0)])
+def test_what_all_captures_have_is_none_of_their_zeros(senses, added):
+    """Six usual zeros of the transducer, each capture's own: each fit was at its floor. Predicted
+    from the others, a capture is not where all have the same.
+    """
+    zero_nm = 6.0 * machine().policy.noise_floors.transducer_offset * machine().scales["torque_nm"]
+    plain = [log(noise=1.0, seed=n) for n in range(5, 11)]
+    both = [mirrored(one) if n % 2 else one for n, one in enumerate(plain)]
+    segments = tuple(
+        replace(one, recorded={**one.recorded, TORQUE: one.recorded[TORQUE] + sense * zero_nm})
+        for sense, one in zip(senses, both, strict=True)
+    )
+    library = {**LIBRARY, "torque_offset": effects()["torque_offset"]}
+    steps = search(fitted(segments), library)
+    assert not remainder(steps[0].system)
+    assert steps[-1].added == ("torque_offset",) * added
 
 
 def test_a_drag_inside_the_allowance_of_a_bench_is_not_named_however_long_the_log():
