@@ -95,7 +95,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         stated,
         encoder_step(campaign, policy),
         travel_turns=max(map(_travel_turns, campaign.captures), default=0.0),
-        rotor_angles=_rotor_angles(campaign),
+        rotor_angles=_rotor_angles(campaign, pole_pairs),
         pairs_known=counted,
         unlogged=_unlogged(campaign),
         stated=known,
@@ -201,7 +201,7 @@ def _travel_turns(capture: Capture) -> float:
     return math.inf if any(capture.has(name) for name in _TURNING) else 0.0
 
 
-def _rotor_angles(campaign: Campaign) -> float:
+def _rotor_angles(campaign: Campaign, pole_pairs: int) -> float:
     """Known angles of the rotor at which its winding was recorded, within a sixth of an electrical
     turn, which is the wave of a machine of three phases; infinite where it turns by a known angle.
     """
@@ -210,10 +210,14 @@ def _rotor_angles(campaign: Campaign) -> float:
     for capture in campaign.captures:
         if capture.meta.test in _SHAFT_ALONE:
             continue
-        if any(capture.has(name) for name in _ANGLES):
-            return math.inf
         stated = capture.meta.theta_elec_deg
         angles = [] if stated is None else [stated]
+        for name, pairs in zip(_ANGLES, (pole_pairs, 1), strict=True):
+            if capture.has(name):
+                turned = np.degrees(pairs * capture.arrays(name)[name])
+                if np.ptp(turned) > wave_deg:
+                    return math.inf
+                angles = [float(turned.mean())]
         if capture.has("theta_elec_deg"):
             angles = capture.arrays("theta_elec_deg")["theta_elec_deg"].tolist()
         locked |= {round(angle) % wave_deg for angle in angles if math.isfinite(angle)}

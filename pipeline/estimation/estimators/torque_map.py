@@ -122,11 +122,12 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     alpha, _ = magnet_coefficient(known)
     chosen = _chosen(points, alpha, options["level"])
     model = _regress(points, alpha, chosen)
-    if model.dof + len(model.names) > len(points):
-        return METHOD.nothing(GIVES, f"{ONE_D_CURRENT}; {EXPERIMENT}")
     still = angle_doubt(points, model.kt_nm_a, pairs, known)
     note = _note(captures, table, points, chosen)
     estimates = _estimates(points, model, chosen, still, known, note)
+    if model.dof + len(model.names) > len(points):
+        why = f"{ONE_D_CURRENT}; {EXPERIMENT}"
+        estimates = (*(METHOD.missing(name, why) for name in GIVES[:2]), *estimates[2:])
     return Fit(estimates, _evidence(points, model, alpha, chosen))
 
 

@@ -25,8 +25,8 @@ def reluctance_counts(id_a: Array, iq_a: Array) -> bool:
         Rotor-frame currents.
 
     """
-    span = policy().aligned.least_d_share * np.ptp(iq_a)
-    return bool(max(float(np.ptp(id_a)), 2.0 * float(np.max(np.abs(id_a), initial=0.0))) > span)
+    span = 2.0 * np.max(np.abs(id_a), initial=0.0)
+    return bool(span > policy().aligned.least_d_share * np.ptp(iq_a))
 
 
 def unlogged_share(residuals_nm: Array, magnet_nm: Array) -> float:

@@ -314,7 +314,7 @@ class Aligned:
     Attributes
     ----------
     least_d_share : 1
-        of the span of q current that the d current moves by, or twice its size, to count
+        of the span of the q current that is the least of twice a d current's size to count
         chosen: below it reluctance torque is lost in saturation of the q current's
 
     """
