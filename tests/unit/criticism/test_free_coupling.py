@@ -263,7 +263,8 @@ def test_a_coupling_that_is_asked_for_is_fitted_as_a_search_fits_it() -> None:
     assert asked.parameters["compliance.share"].value == pytest.approx(0.35, abs=0.05)
 
 
-@pytest.mark.parametrize("floors", [2.0, pytest.param(8.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("floors", [2.0, 8.0])
 def test_a_start_is_tried_wherever_the_torque_is_over_its_floor(floors):
     """A log of 1 kHz missed by 5 floors, and one of 4 kHz by 1.2: under a limit of 20 no start was
     tried, and a coupling of 80 Hz was `unknown`.

@@ -9,8 +9,13 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.diagnosis import diagnose
-from pipeline.criticism.selection.other_readings import _may_hold_means
+from pipeline.criticism.diagnosis import base_fit, diagnose
+from pipeline.criticism.selection.other_readings import (
+    _may_hold_means,
+    by_best_readings,
+    reading_notes,
+)
+from pipeline.criticism.selection.requested_model import BaseFit
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -88,10 +93,13 @@ def test_every_hundredth_row_of_a_log_holds_no_voltage_until_the_next() -> None:
     """The metadata are of the whole log. As means of a row they explained more than as held, and a
     motor of bench B had a `current_delay` that undid it for the currents.
     """
-    diagnosis = found(means=False, timing="held")
-    assert (diagnosis.missing, diagnosis.unknown) == ((), None)
-    assert any("one PWM period each" in note for note in diagnosis.notes)
-    assert not any("means over the row" in note for note in diagnosis.notes)
+    log = Campaign("m", (telemetry(1, means=False, timing="held"),))
+    base = base_fit(log, ModelSpec(), Constants())
+    assert isinstance(base, BaseFit)
+    fit = by_best_readings(base.system).fit
+    (drive,) = (s.instrument for s in fit.segments if "vd_v" in s.channels)
+    assert (drive.single, drive.behind) == (True, 0.0)
+    assert "one PWM period each" in reading_notes(fit)[0]
 
 
 @pytest.mark.parametrize(
