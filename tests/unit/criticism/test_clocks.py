@@ -11,7 +11,7 @@ from pipeline.criticism.data.drive_log import drive_log
 from pipeline.criticism.data.traces import even_clock, window_between_gaps
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.numerics.clocks import counted
-from pipeline.records.capture import Capture, CaptureMeta
+from pipeline.records.capture import Capture, CaptureMeta, Mask
 from tests.unit.criticism.machines import machine
 
 CUTTING = DEFAULT.cutting
@@ -70,6 +70,15 @@ def test_samples_that_are_missing_leave_their_numbers_out():
     error = np.abs(found["theta_mech_rad"] - angle(even))
     assert error[there].max() < 1e-12
     assert error[single].max() < 0.5 * (180.0 + 0.02 * 300.0**2) * PERIOD**2
+
+
+def test_a_row_that_a_gate_set_aside_is_not_read_between_others():
+    """What is known of it is that something is wrong with it."""
+    even, stamps = instants()
+    gated = Mask("spikes", 0, np.arange(even.size) != 900)
+    capture = log(stamps, angle(even)).with_masks(gated)
+    _, _, keep = even_clock(capture, ("theta_mech_rad",), CUTTING)
+    assert np.flatnonzero(~keep[1:-1]).tolist() == [899]
 
 
 def test_windows_of_a_log_that_lost_a_tenth_of_its_rows_are_longer_than_ten_rows():

@@ -94,6 +94,23 @@ def test_what_all_captures_have_is_none_of_their_zeros(senses, added):
     assert steps[-1].added == ("torque_offset",) * added
 
 
+def test_an_offset_of_all_captures_within_a_cautious_floor_is_no_name():
+    """Captures held out are at their floors too: nothing is over one that it could take."""
+    offset_nm = (
+        6.0 * machine().policy.noise_floors.transducer_offset * machine().scales["torque_nm"]
+    )
+    plain = [log(noise=1.0, seed=n) for n in range(5, 11)]
+    segments = tuple(
+        replace(one, recorded={**one.recorded, TORQUE: one.recorded[TORQUE] + offset_nm})
+        for one in (mirrored(one) if n % 2 else one for n, one in enumerate(plain))
+    )
+    library = {**LIBRARY, "torque_offset": effects()["torque_offset"]}
+    steps = search(cautious(segments, 9.0), library)
+    (score,) = (s for s in steps[0].scores if s.candidate.effect.name == "torque_offset")
+    assert score.may_be_hidden
+    assert steps[-1].added == ()
+
+
 def test_a_drag_inside_the_allowance_of_a_bench_is_not_named_however_long_the_log():
     """The floor is what bench and model may have wrong: windows by the dozen show one error."""
     wrong = NoiseFloors(model_drive=2e-4)

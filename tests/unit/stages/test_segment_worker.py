@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
+import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 from multiprocessing import parent_process
@@ -18,6 +20,7 @@ from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.regression.parallel import by_threads, in_order, on_each
 from pipeline.criticism.residuals.segments import segments
+from pipeline.execution.workers import segment_worker as segment_worker_module
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.segment_worker import (
     SegmentWorker,
@@ -211,3 +214,17 @@ def test_in_a_driver_there_is_no_segment_worker_of_its_own(found) -> None:
     open_own()
     with shared_or_in_order():
         assert not any(on_each(whose, found, [(0,)] * len(found)))
+
+
+def test_segments_that_are_forgotten_go_with_what_refers_to_them(monkeypatch) -> None:
+    (turn,) = segments(Campaign("m", (slow_turn(1),)), machine())
+    turn.cache["sampler"] = turn, np.zeros(8)
+    left = weakref.ref(turn.cache)
+    monkeypatch.setitem(segment_worker_module._SEGMENTS, 1, turn)
+    gc.disable()
+    try:
+        del turn
+        segment_worker_module._forget()
+        assert left() is None
+    finally:
+        gc.enable()
