@@ -95,7 +95,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         stated,
         encoder_step(campaign, policy),
         travel_turns=max(map(_travel_turns, campaign.captures), default=0.0),
-        rotor_angles=_rotor_angles(campaign, pole_pairs),
+        rotor_angles=_rotor_angles(campaign, pole_pairs, policy),
         pairs_known=counted,
         unlogged=_unlogged(campaign),
         stated=known,
@@ -173,9 +173,11 @@ def _flux_scale(captures: Sequence[Capture], pole_pairs: int) -> float:
         for c in captures
         if c.meta.test != _HELD
     ]
-    voltages = [voltage for voltage, speed in spun if voltage and speed]
-    speeds = [speed for voltage, speed in spun if voltage and speed]
-    return max(voltages) / (pole_pairs * max(speeds)) if speeds else 0.0
+    turning = [(voltage, speed) for voltage, speed in spun if voltage and speed]
+    if not turning:
+        return 0.0
+    voltages, speeds = zip(*turning, strict=True)
+    return float(max(voltages) / (pole_pairs * max(speeds)))
 
 
 def _settling(campaign: Campaign, policy: Policy) -> dict[str, float]:
@@ -201,12 +203,13 @@ def _travel_turns(capture: Capture) -> float:
     return math.inf if any(capture.has(name) for name in _TURNING) else 0.0
 
 
-def _rotor_angles(campaign: Campaign, pole_pairs: int) -> float:
+def _rotor_angles(campaign: Campaign, pole_pairs: int, policy: Policy) -> float:
     """Known angles of the rotor at which its winding was recorded, within a sixth of an electrical
     turn, which is the wave of a machine of three phases; infinite where it turns by a known angle.
+    Those nearer than the least part of a wave that counts are one.
     """
-    locked: set[float] = set()
-    wave_deg = 360 // 6
+    locked: set[int] = set()
+    wave_deg, parts = 360 // 6, round(1.0 / policy.cutting.least_wave)
     for capture in campaign.captures:
         if capture.meta.test in _SHAFT_ALONE:
             continue
@@ -220,7 +223,8 @@ def _rotor_angles(campaign: Campaign, pole_pairs: int) -> float:
                 angles = [float(turned.mean())]
         if capture.has("theta_elec_deg"):
             angles = capture.arrays("theta_elec_deg")["theta_elec_deg"].tolist()
-        locked |= {round(angle) % wave_deg for angle in angles if math.isfinite(angle)}
+        places = (parts * angle / wave_deg for angle in angles if math.isfinite(angle))
+        locked |= {round(place) % parts for place in places}
     return len(locked)
 
 

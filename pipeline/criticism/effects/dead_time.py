@@ -156,7 +156,7 @@ EFFECT = Effect(
             usual=(1.0, 0.5),
             words="of half a dead time, by which a current is sampled before the middle of a pulse",
         ),
-        # the edges that lose it are within half a PWM period of the sample
+        # the edges that lose it are within half a PWM period of the sample, here one of 10 kHz
         Parameter(
             "lag_s",
             "s",

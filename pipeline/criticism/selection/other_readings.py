@@ -19,7 +19,7 @@ captures are better explained by straight lines between rows, it has none.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from operator import attrgetter
@@ -161,21 +161,17 @@ def reading_notes(fit: Fit) -> tuple[str, ...]:
 def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
     """The fit by the other reading of each column that may have one."""
     share = system.policy.cutting.slower_share
-    held = [_has_held_vectors(segment, share) for segment in system.segments]
-    if any(held):
-        each = zip(system.segments, held, strict=True)
-        turned = tuple(_in_other_frame(s) if its_own else s for s, its_own in each)
-        yield gauss_newton(replace(system.fit, segments=turned))
-    slow = [_may_hold_means(segment, share) for segment in system.segments]
-    if any(slow):
-        each = zip(system.segments, slow, strict=True)
-        means = tuple(_of_other_rows(s) if its_own else s for s, its_own in each)
-        yield gauss_newton(replace(system.fit, segments=means))
-    sparse = [_may_be_single(segment, share) for segment in system.segments]
-    if any(sparse):
-        each = zip(system.segments, sparse, strict=True)
-        single = tuple(_of_other_hold(system.fit.machine, s) if may_be else s for s, may_be in each)
-        yield gauss_newton(replace(system.fit, segments=single))
+    others: tuple[tuple[Callable[[Segment, float], bool], Callable[[Segment], Segment]], ...] = (
+        (_has_held_vectors, _in_other_frame),
+        (_may_hold_means, _of_other_rows),
+        (_may_be_single, partial(_of_other_hold, system.fit.machine)),
+    )
+    for may_be, other in others:
+        which = [may_be(segment, share) for segment in system.segments]
+        if any(which):
+            each = zip(system.segments, which, strict=True)
+            read = tuple(other(segment) if its_own else segment for segment, its_own in each)
+            yield gauss_newton(replace(system.fit, segments=read))
     if any(ripples(segment) for segment in system.segments):
         yield gauss_newton(replace(system.fit, segments=tuple(map(_other_lines, system.segments))))
     torques = np.array([channel == TORQUE for _, channel, _ in system.labels], dtype=bool)
@@ -184,11 +180,13 @@ def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
         # only the inertia's column is another there
         kept = np.flatnonzero([column.name != "j_kgm2" for column in system.columns])
         fit = replace(system.fit, segments=tuple(moved))
-        other = gauss_newton(fit, before=system.only(kept))
+        elsewhere = gauss_newton(fit, before=system.only(kept))
         # what neither place explains is an effect's, and no coupling shows at the stator; the
         # deviance is logarithmic, so what it spoils in other captures counts by its power
-        if clears(system, torques, *(one.reduced_chi2(one.residual) for one in (system, other))):
-            yield other
+        if clears(
+            system, torques, *(one.reduced_chi2(one.residual) for one in (system, elsewhere))
+        ):
+            yield elsewhere
 
 
 def _has_held_vectors(segment: Segment, slower_share: float) -> bool:

@@ -433,6 +433,7 @@ def test_no_wave_of_the_inductances_is_offered_of_two_locked_angles():
     assert not harmonics.gone_through(two_of_a_wave)
     assert LIBRARY["saturation"].gone_through(two_of_a_wave)
     assert harmonics.gone_through(size(330.0, 60.0, 15.0))
+    assert not harmonics.gone_through(size(330.4, 60.0, 331.6))
     assert harmonics.gone_through(size(330.0, theta_mech_rad=rows))
     assert not harmonics.gone_through(size(330.0, 60.0, theta_mech_rad=0.1 + 1e-4 * rows))
 

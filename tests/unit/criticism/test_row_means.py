@@ -90,8 +90,8 @@ def test_samples_are_read_as_samples(late_s: float, missing: tuple[str, ...]) ->
 
 
 def test_every_hundredth_row_of_a_log_holds_no_voltage_until_the_next() -> None:
-    """The metadata are of the whole log. As means of a row they explained more than as held, and a
-    motor of bench B had a `current_delay` that undid it for the currents.
+    """The metadata are of the whole log. A motor of bench B was read as means of a row instead,
+    with a `current_delay` that undid it for the currents.
     """
     log = Campaign("m", (telemetry(1, means=False, timing="held"),))
     base = base_fit(log, ModelSpec(), Constants())
