@@ -71,7 +71,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     sensors = prepared(columns, period, machine.policy, speed)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     columns, starts = thinned(columns, keep, window, policy.windows)
-    weak = projection(columns["theta_mech_rad"], starts, window, ())
+    weak = projection(
+        columns["theta_mech_rad"], starts, window, slow_orders(machine), cycles=2.0, margin=4.0
+    )
     return segment_of(
         capture, "shaft", "bench", period, columns, sensors, channels=(channel,), weak=weak
     )

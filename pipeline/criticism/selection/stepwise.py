@@ -122,7 +122,8 @@ def _steps_from(
         if len(steps) == policy.most_steps:
             break
         chosen = best_candidate(wide, scores, base, unsure)
-        instead = _instead_of_effect(chosen, wide, library, base, unsure)
+        lower = _lower_without(chosen, wide)
+        instead = lower or _instead_of_effect(chosen, wide, library, base, unsure)
         if instead is not None:
             fit = reconsidered(instead).fit
             del steps[-1]
@@ -138,6 +139,19 @@ def _steps_from(
         if tuple(e.name for e in fit.model.effects[base:]) in {r.added for r in steps}:
             break
     return steps
+
+
+def _lower_without(chosen: LinearSystem | None, wide: LinearSystem) -> LinearSystem | None:
+    """The fit without the `chosen` effect, begun from all else of the fit with it, where it is better
+    than the one that the effect joined; None where it is not.
+
+    The former was then at a minimum of its own, and the effect is credited with a way out of it.
+    """
+    if chosen is None:
+        return None
+    values = {name: chosen.fit.values[name] for name in wide.fit.values if name in chosen.fit.values}
+    again = gauss_newton(wide.fit.at(values), before=wide)
+    return again if again.deviance < wide.deviance - wide.policy.selection.tie else None
 
 
 def _instead_of_effect(
