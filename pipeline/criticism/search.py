@@ -91,6 +91,13 @@ class Ladder:
         """
         return explained(self.steps, self.held_out, remainders)
 
+    def leaves_something(self) -> bool:
+        """Whether its effects explain less than what is over the floor, or leave more of the
+        held-out error than a floor may be wrong by.
+        """
+        over = self.steps[-1].fit.policy.goodness.over
+        return self.held_out[-1].total ** 2 > 1.0 + over or not self.explains(self.remainders)
+
     def large(self) -> tuple[Remainder, ...]:
         """What is left and large for the machine as a whole.
 
@@ -295,8 +302,11 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
 def _without_parts_of_a_curve(ladder: Ladder) -> Ladder:
     """The ladder without trailing effects that are a part of what no effect explains: a curve of
     one state of the machine explains it better alone.
+
+    Effects that explain what is left by their forms alone are asked as well, where they leave more
+    than a floor may be wrong by: half of what a brake takes from a coast is a drag of eddies.
     """
-    while len(ladder.steps) > 1 and (_freed(ladder) or not ladder.explains(ladder.remainders)):
+    while len(ladder.steps) > 1 and (_freed(ladder) or ladder.leaves_something()):
         system, name = ladder.steps[-1].system, ladder.steps[-1].added[-1]
         if not is_part_of_a_curve(system, _worst_first(ladder.remainders), name):
             break

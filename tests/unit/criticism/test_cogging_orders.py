@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +49,27 @@ def test_cogging_of_the_slots_alone_is_named():
     diagnosis = pipeline.diagnose(pipeline.Recordings({one.motor_id: one}))[one.motor_id]
     assert (diagnosis.verdict, diagnosis.missing) == ("missing", ("cogging",))
     assert diagnosis.ladder[-1].held_out < 1.3
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "order", "size_nm"),
+    [
+        ("gimbal-5208", 1, 84, 0.0085),
+        ("servo-ipm", 2, 72, 0.06),
+        pytest.param("servo-ipm", 1, 72, 0.06, marks=pytest.mark.slow),
+    ],
+)
+def test_one_coast_shows_cogging_and_its_size_over_the_inertia(name, seed, order, size_nm):
+    """Where it is slow: the first was silent, and friction of low speeds was named for the second."""
+    motor = design(name)
+    motor = replace(motor, effects={"cogging": motor.effects["cogging"]})
+    one = campaign_of(campaign(motor, Bench(instruments=EXACT), seed, PLAN[2:]))
+    result = pipeline.diagnose(pipeline.Recordings({one.motor_id: one}))[one.motor_id]
+    assert result.missing == ("cogging",)
+    says = "".join(note for note in result.notes if f"_{order}_nm/j_kgm2" in note)
+    parts = [float(word) for word in re.findall(r"= (-?[\d.]+) ±", says.replace("−", "-"))]
+    assert len(parts) == 2
+    assert math.hypot(*parts) * motor.j_rotor_kgm2 == pytest.approx(size_nm, rel=0.05)
 
 
 def test_orders_are_those_that_magnets_and_slots_make():

@@ -163,19 +163,22 @@ def test_orders_of_an_earlier_step_join_where_the_last_one_leaves_something(
 
 
 @pytest.mark.parametrize(
-    ("explained", "freed", "parts", "kept"),
+    ("explained", "error", "freed", "parts", "kept"),
     [
-        (False, (), {"windage"}, 2),
-        (True, ("friction is lower",), {"windage"}, 2),
-        (True, (), {"windage"}, 3),
-        (False, (), {"windage", "stribeck"}, 1),
-        (False, (), {"stribeck"}, 3),
+        (False, 1.0, (), {"windage"}, 2),
+        (True, 1.0, ("friction is lower",), {"windage"}, 2),
+        (True, 1.0, (), {"windage"}, 3),
+        (True, 1.4, (), {"windage"}, 3),
+        (True, 1.5, (), {"windage"}, 2),
+        (False, 1.0, (), {"windage", "stribeck"}, 1),
+        (False, 1.0, (), {"stribeck"}, 3),
     ],
 )
-def test_trailing_parts_of_a_curve_are_left_out_where_the_captures_are_not_explained(
+def test_trailing_parts_of_a_curve_are_left_out_where_something_is_left(
     searches: SimpleNamespace,
     monkeypatch: pytest.MonkeyPatch,
     explained: bool,
+    error: float,
     freed: tuple[str, ...],
     parts: set[str],
     kept: int,
@@ -184,7 +187,8 @@ def test_trailing_parts_of_a_curve_are_left_out_where_the_captures_are_not_expla
         added = ((), ("stribeck",), ("stribeck", "windage"))
         fit = Fit((), Model(machine(), ()), {}, (), {})
         steps = tuple(SimpleNamespace(added=names, system=None, fit=fit) for names in added)
-        return search.Ladder(SimpleNamespace(hum=()), steps, [1.0] * 3, (), {})
+        held_out = [SimpleNamespace(total=error)] * 3
+        return search.Ladder(SimpleNamespace(hum=()), steps, held_out, (), {})
 
     monkeypatch.setattr(search, "ladder_from", ladder)
     monkeypatch.setattr(search, "_sketched", lambda *_, **__: (None, 0.0))

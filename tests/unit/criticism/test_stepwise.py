@@ -17,7 +17,7 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.criticism.selection import best_candidate, refit
+from pipeline.criticism.selection import best_candidate, refit, stepwise
 from pipeline.criticism.selection.acceptance import _form_error_factors, _same_hook, is_determined
 from pipeline.criticism.selection.candidates import Candidate
 from pipeline.criticism.selection.refit import floored_anew
@@ -55,6 +55,28 @@ def test_the_next_effect_is_judged_against_a_fit_that_has_converged():
     found = floored_anew(moved)
     assert linear_system(moved).deviance > linear_system(found).deviance + 1.0
     assert found.values["psi_wb"] == pytest.approx(fit.values["psi_wb"], rel=2e-5)
+
+
+def test_no_effect_is_credited_with_a_way_out_of_another_minimum(monkeypatch):
+    """A late edge of a dead time had two minima. A friction that grows with the load was named for
+    the way from one to the other, and was 2.3 of its own uncertainty.
+    """
+    fit = fitted((log(noise=1.0), log(noise=1.0, seed=6)))
+    stuck = replace(fit, values={**fit.values, "psi_wb": 1.01 * fit.values["psi_wb"]})
+    offered = []
+
+    def windage(wide, *_):
+        offered.append(wide.deviance)
+        model = wide.fit.model.with_effects(effects()["windage"])
+        begun = replace(fit, model=model, values={**zero(effects()["windage"], model), **fit.values})
+        return gauss_newton(begun) if len(offered) == 1 else None
+
+    monkeypatch.setattr(stepwise, "best_candidate", windage)
+    steps = search(stuck, LIBRARY)
+    assert [step.added for step in steps] == [()]
+    assert len(offered) == 2
+    assert offered[1] < offered[0] - 100.0
+    assert steps[0].fit.values["psi_wb"] == pytest.approx(fit.values["psi_wb"], rel=1e-4)
 
 
 def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none():
