@@ -102,7 +102,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         moved=() if requested is None else requested.moved,
         bare=None if requested is None else requested.total,
         traces=tuple(
-            traces(system.fit, simulated, None if requested is None else requested.fitted)
+            traces(system, held_out, simulated, None if requested is None else requested.fitted)
         ),
         combinations=reported_combinations(system, held_out),
         before=() if requested is None else requested.errors,

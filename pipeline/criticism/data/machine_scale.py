@@ -246,11 +246,12 @@ def encoder_step(campaign: Campaign, policy: Policy) -> float:
     Notes
     -----
     A log at many speeds shows it; at one speed an angle may move by nearly whole steps a sample,
-    and look finer or coarser than it is.
+    and look finer or coarser than it is. Rows that are read between others are in no steps.
 
     """
     logs = [c for c in campaign.of("drive") if c.has("theta_mech_rad")]
-    angles = [c.arrays("theta_mech_rad")["theta_mech_rad"] for c in logs]
+    tables = [c.tables[c.table_of("theta_mech_rad")] for c in logs]
+    angles = [table["theta_mech_rad"].to_numpy() for table in tables]
     steps = [rounding_step(angle, policy.sensor_noise) for angle in angles]
     step = float(np.median(steps)) if steps else 0.0
     agree = all(abs(one - step) <= policy.cutting.encoder_share * step for one in steps)

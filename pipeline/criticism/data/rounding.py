@@ -290,7 +290,8 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     Parameters
     ----------
     signal
-        Samples [n, rad]; an encoder of 2^n steps a turn, or of whole lines, is taken as such.
+        Samples [n, rad], NaN where a row lacks it; an encoder of 2^n steps a turn, or of whole
+        lines, is taken as such.
     policy
         Constants of judgement.
 
@@ -308,14 +309,16 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     give q sharply enough to separate 4000 steps a turn from 4096.
 
     """
-    signal = signal[np.isfinite(signal)]
     if signal.size < policy.block + 3:
         return 0.0
-    largest = sliding_window_view(np.abs(signal), 4).max(axis=1)
+    differences = np.diff(signal, 3)
+    seen = np.isfinite(differences)
+    largest = sliding_window_view(np.abs(signal), 4).max(axis=1)[seen]
+    differences, signal = differences[seen], signal[np.isfinite(signal)]
     decades = np.floor(np.log10(np.maximum(largest, _FLOATING)))
     of_decade = {decade: _decimal(largest[decades == decade]) for decade in np.unique(decades)}
     decimals = np.array([of_decade[decade] for decade in decades])
-    differences, third = np.diff(signal, 3), np.empty(0)
+    third = np.empty(0)
     for decimal in np.unique(decimals):
         alike = differences[decimals == decimal]
         third = np.append(third, _beyond_digits(alike, decimal, policy))

@@ -15,6 +15,7 @@ from pipeline.numerics.clocks import clearest_ratio, counted
 from pipeline.numerics.projection import window_starts
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Capture
+from pipeline.records.row_means import bridged
 
 if TYPE_CHECKING:
     import polars as pl
@@ -124,21 +125,29 @@ def even_clock(
         even = np.arange(number[-1] + 1)
         there, recorded = np.zeros((2, even.size), dtype=bool)
         there[number], recorded[number] = True, keep
-        columns = {name: np.interp(even, number, column) for name, column in columns.items()}
+        columns = {name: _counted(column, number, even) for name, column in columns.items()}
         recorded[1:-1] |= ~there[1:-1] & recorded[:-2] & recorded[2:]
         keep = recorded
     elif uneven:
         even = time[0] + period * np.arange(round((time[-1] - time[0]) / period) + 1)
         after = np.clip(np.searchsorted(time, even), 1, time.size - 1)
-        bridged = (
+        keep = (
             (time[after] - time[after - 1] < policy.clock_gap * period)
             & keep[after]
             & keep[after - 1]
         )
         columns = {name: np.interp(even, time, column) for name, column in columns.items()}
-        keep = bridged
     keep[:1] = keep[-1:] = False
     return period, columns, keep
+
+
+def _counted(column: Array, number: Indices, even: Indices) -> Array:
+    """A column at every count of a clock, of rows that have a `number` each."""
+    filled = np.full(even.size, np.nan)
+    filled[number] = column
+    filled = bridged(even.astype(float), filled)
+    known = np.isfinite(filled)
+    return np.interp(even, even[known], filled[known]) if known.any() else filled
 
 
 def smoothed(signal: Array, width: int) -> Array:

@@ -142,15 +142,16 @@ def _steps_from(
 
 
 def _lower_without(chosen: LinearSystem | None, wide: LinearSystem) -> LinearSystem | None:
-    """The fit without the `chosen` effect, begun from all else of the fit with it, where it is better
-    than the one that the effect joined; None where it is not.
+    """The fit without the `chosen` effect, begun from all else of the fit with it, where it is
+    better than the one that the effect joined; None where it is not.
 
     The former was then at a minimum of its own, and the effect is credited with a way out of it.
     """
     if chosen is None:
         return None
-    values = {name: chosen.fit.values[name] for name in wide.fit.values if name in chosen.fit.values}
-    again = gauss_newton(wide.fit.at(values), before=wide)
+    ends = chosen.fit.values
+    begun = wide.fit.at({name: ends[name] for name in wide.fit.values if name in ends})
+    again = gauss_newton(begun, before=wide)
     return again if again.deviance < wide.deviance - wide.policy.selection.tie else None
 
 

@@ -11,10 +11,8 @@ import numpy as np
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.data.traces import smoothed
-from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.operating import Array
 from pipeline.criticism.regression.cross_validation import HeldOut
-from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.validation.error_maps import disjoint
@@ -164,14 +162,19 @@ class Before:
 
 
 def traces(
-    fit: Fit, simulated: Sequence[Simulated], before: Before | None = None
+    system: LinearSystem,
+    held_out: HeldOut,
+    simulated: Sequence[Simulated],
+    before: Before | None = None,
 ) -> Iterator[Trace]:
-    """Recorded and predicted signals of simulated captures, window by window.
+    """Recorded and predicted signals of captures, window by window.
 
     Parameters
     ----------
-    fit
+    system
         The fit.
+    held_out
+        Its held-out residual, with the parameters that each capture is predicted by.
     simulated
         Free runs.
     before
@@ -180,46 +183,57 @@ def traces(
     Yields
     ------
     Trace
-        Signals of the free runs, and of captures under current those of the equations too, averaged
-        over a millisecond.
+        Of a drive's logs what the equations predict, averaged over a millisecond, whether their
+        rows are close enough for a free run or not; and signals of the free runs.
 
     """
-    for one in simulated:
-        segment, run = fit.segments[one.number], one.run
-        if equation_of(segment).use.currents:
-            yield from _equations(segment, fit, one, before)
-        known: Mapping[str, Array] = {}
-        if before is not None:
-            known = beside(run, segment, before.system.fit.model, before.values(one.number))
-        for signal in run.signals:
-            columns = (run.t_s, run.recorded[signal], run.simulated[signal], known.get(signal))
-            yield _trace(segment, signal, "free_run", one.split, columns)
+    runs = {one.number: one for one in simulated}
+    for number, segment in enumerate(system.segments):
+        if segment.instrument.name == "drive":
+            yield from _equations(segment, number, system, held_out, before)
+        if number in runs:
+            yield from _free_run(segment, runs[number], before)
+
+
+def _free_run(segment: Segment, simulated: Simulated, before: Before | None) -> Iterator[Trace]:
+    """What a free run predicts."""
+    run = simulated.run
+    known: Mapping[str, Array] = {}
+    if before is not None:
+        model = before.system.fit.model
+        known = beside(run, segment, model, before.values(simulated.number))
+    for signal in run.signals:
+        columns = (run.t_s, run.recorded[signal], run.simulated[signal], known.get(signal))
+        yield _trace(segment, signal, "free_run", simulated.split, columns)
 
 
 def _equations(
-    segment: Segment, fit: Fit, simulated: Simulated, before: Before | None
+    segment: Segment, number: int, system: LinearSystem, held_out: HeldOut, before: Before | None
 ) -> Iterator[Trace]:
     """What the equations predict from the recorded state, averaged over a millisecond.
 
     Without the mean, the noise of the angle's second difference would cover the torque.
     """
-    weak = segment.weak
+    weak, fit = segment.weak, system.fit
     if weak is None:
         return
-    residuals = residual(segment, fit.model, simulated.values)
+    values, split = values_without(number, system, held_out)
+    residuals = residual(segment, fit.model, values)
     baseline = None
     if before is not None:
-        baseline = residual(segment, before.system.fit.model, before.values(simulated.number))
+        baseline = residual(segment, before.system.fit.model, before.values(number))
     width = max(2 * round(fit.policy.validation.look_s / segment.ts_s / 2) + 1, 1)
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(width // 2, weak.length, max(width // 2, 1))[None, :]
     for place, channel in enumerate(segment.channels):
+        if channel not in segment.recorded:
+            # an acceleration, which no column holds
+            continue
         recorded = smoothed(segment.recorded[channel], width)[rows]
         model = recorded - smoothed(residuals[place], width)[rows]
         without = None if baseline is None else recorded - smoothed(baseline[place], width)[rows]
         time = segment.recorded["t_s"][rows]
-        columns = (time, recorded, model, without)
-        yield _trace(segment, channel, "equation", simulated.split, columns)
+        yield _trace(segment, channel, "equation", split, (time, recorded, model, without))
 
 
 def _trace(

@@ -89,6 +89,18 @@ def test_windows_of_a_log_that_lost_a_tenth_of_its_rows_are_longer_than_ten_rows
     assert window_between_gaps(PERIOD, keep, CUTTING) > 80
 
 
+def test_an_angle_in_a_lost_row_bends_as_it_does_beside_it():
+    """A straight line there is twice the acceleration in a second difference: waves of a coast."""
+    even, _ = instants()
+    there = np.ones(even.size, dtype=bool)
+    there[500:3000:10] = False
+    slowing = 300.0 * even - 400.0 * even**2
+    _, found, keep = even_clock(log(even[there], slowing[there]), ("theta_mech_rad",), CUTTING)
+    bend = np.diff(found["theta_mech_rad"], 2) / PERIOD**2
+    assert keep[1:-1].all()
+    assert bend == pytest.approx(np.full(bend.size, -800.0), rel=1e-3)
+
+
 @pytest.mark.parametrize("missing", [1, 30])
 def test_a_gap_of_samples_that_came_unevenly_is_bridged_and_not_kept(missing):
     even, stamps = instants()

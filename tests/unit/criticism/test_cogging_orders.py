@@ -54,13 +54,12 @@ def test_cogging_of_the_slots_alone_is_named():
 @pytest.mark.parametrize(
     ("name", "seed", "order", "size_nm"),
     [
-        ("gimbal-5208", 1, 84, 0.0085),
+        pytest.param("gimbal-5208", 1, 84, 0.0085, marks=pytest.mark.slow),
         ("servo-ipm", 2, 72, 0.06),
-        pytest.param("servo-ipm", 1, 72, 0.06, marks=pytest.mark.slow),
     ],
 )
 def test_one_coast_shows_cogging_and_its_size_over_the_inertia(name, seed, order, size_nm):
-    """Where it is slow: the first was silent, and friction of low speeds was named for the second."""
+    """Where it is slow. Nothing was said of one, and of the other a friction of low speeds."""
     motor = design(name)
     motor = replace(motor, effects={"cogging": motor.effects["cogging"]})
     one = campaign_of(campaign(motor, Bench(instruments=EXACT), seed, PLAN[2:]))

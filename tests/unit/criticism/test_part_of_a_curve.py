@@ -50,7 +50,10 @@ def test_an_effect_is_part_of_a_curve_where_the_curve_alone_explains_more(drag, 
 
 @pytest.mark.parametrize(
     ("name", "size", "fastest_rad_s", "seed"),
-    [("joint-11p", 0.02, 120.0, 1), ("gimbal-5208", 0.04, 40.0, 2)],
+    [
+        ("joint-11p", 0.02, 120.0, 1),
+        pytest.param("gimbal-5208", 0.04, 40.0, 2, marks=pytest.mark.slow),
+    ],
 )
 def test_a_brake_that_fades_with_speed_is_no_effect_of_the_library(
     name: str, size: float, fastest_rad_s: float, seed: int
@@ -67,4 +70,5 @@ def test_a_brake_that_fades_with_speed_is_no_effect_of_the_library(
     one = campaign_of(campaign(motor, Bench(instruments=EXACT), seed, plan))
     result = pipeline.diagnose(pipeline.Recordings({one.motor_id: one}))[one.motor_id]
     assert (result.verdict, result.missing) == ("unknown", ())
-    assert "omega_mech_rad_s" in str(result.structure)
+    assert result.unknown is not None
+    assert "omega_mech_rad_s" in result.unknown.variables

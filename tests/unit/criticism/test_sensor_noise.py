@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
+from pipeline.criticism.data.machine_scale import encoder_step
 from pipeline.criticism.data.rounding import (
     coarse_step,
     dither_of,
@@ -26,6 +28,7 @@ from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.regression.noise_propagation import _readings_error, noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import _by_encoder
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from tests.unit.criticism.machines import BASE, coasting, in_frame_of, log, machine
 
 SENSORS = DEFAULT.sensor_noise
@@ -81,6 +84,20 @@ def test_a_shaft_that_turns_by_nearly_whole_steps_a_sample_shows_its_step():
     theta = np.round(np.round(moved / step) * step, 8)
     assert np.median(np.abs(np.diff(theta, 3))) < 1e-3 * step
     assert rounding_step(theta, SENSORS) == pytest.approx(step, rel=1e-9)
+
+
+def test_rows_that_lack_their_angle_hide_no_step():
+    """What is read between two rows is in halves of a step; over a gap the angle moves by more."""
+    step, random = 2.0 * np.pi / 2**14, np.random.default_rng(2)
+    t = np.arange(12_000) * 1e-3
+    moved = 200.0 * np.sin(0.5 * t) * t + 1e-4 * random.normal(size=t.size)
+    theta = np.round(moved / step) * step
+    theta[random.uniform(size=t.size) < 0.05] = np.nan
+    assert rounding_step(theta, SENSORS) == pytest.approx(step, rel=1e-9)
+    meta = CaptureMeta("m", "drive", pole_pairs=7)
+    table = pl.DataFrame({"t_s": t, "theta_mech_rad": theta})
+    drive = Capture("drive.mcap", "0", "verified", meta, (table,))
+    assert encoder_step(Campaign("m", (drive,)), DEFAULT) == pytest.approx(step, rel=1e-9)
 
 
 @pytest.mark.parametrize("pace", [0.03, 0.94, 47.2])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
 
 from pipeline.contracts.clocks import held_apart
+from pipeline.criticism.comparison import compare
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.numerics.integrals import trapezoid
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
@@ -109,3 +112,16 @@ def test_what_straight_lines_miss_of_a_slow_current_is_noise(seed: int) -> None:
     found = run(of_slow_currents(seed))
     assert found.missing == ()
     assert found.verdict != "unknown"
+
+
+def test_a_log_too_slow_for_a_free_run_shows_what_its_equations_predict():
+    """A comparison had no trace of it: neither a plot, nor a residual, nor a recording."""
+    campaign = log(1)
+    (quick,) = campaign.captures
+    slow = replace(quick, tables=(quick.tables[0][:: 2 * ROWS],))
+    of_slow = replace(campaign, captures=(slow,))
+    found = compare(of_slow, ModelSpec("standard", ()), Constants()).traces
+    assert {(one.signal, one.kind) for one in found} == {("vd_v", "equation"), ("vq_v", "equation")}
+    for trace in found:
+        measured, model = (np.ma.masked_invalid(one) for one in (trace.measured, trace.model))
+        assert np.ma.std(measured - model) < 0.1 * np.ma.std(measured)

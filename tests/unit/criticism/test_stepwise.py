@@ -68,7 +68,9 @@ def test_no_effect_is_credited_with_a_way_out_of_another_minimum(monkeypatch):
     def windage(wide, *_):
         offered.append(wide.deviance)
         model = wide.fit.model.with_effects(effects()["windage"])
-        begun = replace(fit, model=model, values={**zero(effects()["windage"], model), **fit.values})
+        begun = replace(
+            fit, model=model, values={**zero(effects()["windage"], model), **fit.values}
+        )
         return gauss_newton(begun) if len(offered) == 1 else None
 
     monkeypatch.setattr(stepwise, "best_candidate", windage)
