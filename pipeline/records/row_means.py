@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -81,8 +83,8 @@ def bridged(row_s: Array, column: Array) -> Array:
     Returns
     -------
     array [n]
-        With a cubic through the two values on either side of a single row without one, or a
-        straight line where that is not there; NaN in longer gaps.
+        With a cubic through the two nearest values on either side of a single row without one, or a
+        straight line where they are not there; NaN in longer gaps.
 
     Notes
     -----
@@ -90,25 +92,26 @@ def bridged(row_s: Array, column: Array) -> Array:
     would lose a third of its rows where each of eight columns lacks one in twenty.
 
     """
-    blank = np.flatnonzero(~np.isfinite(column[1:-1])) + 1
-    single = blank[np.isfinite(column[blank - 1]) & np.isfinite(column[blank + 1])]
+    known = np.isfinite(column)
+    single = np.flatnonzero(~known[1:-1] & known[:-2] & known[2:]) + 1
     if single.size == 0:
         return column
-    filled = column.copy()
-    filled[single] = _through(row_s, column, single, (-1, 1))
-    inner = single[(single >= 2) & (single < column.size - 2)]
-    cubic = _through(row_s, column, inner, (-2, -1, 1, 2))
-    filled[inner] = np.where(np.isfinite(cubic), cubic, filled[inner])
+    places, filled = np.flatnonzero(known), column.copy()
+    after = np.searchsorted(places, single)
+    filled[single] = _through(row_s, column, single, [places[after - 1], places[after]])
+    inner = (after >= 2) & (after < places.size - 1)
+    beside = [places[after[inner] + k] for k in (-2, -1, 0, 1)]
+    filled[single[inner]] = _through(row_s, column, single[inner], beside)
     return filled
 
 
-def _through(row_s: Array, column: Array, places: Indices, beside: tuple[int, ...]) -> Array:
+def _through(row_s: Array, column: Array, places: Indices, beside: Sequence[Indices]) -> Array:
     """Lagrange's polynomial through the values in rows beside some places, at these."""
-    distance = [row_s[places + k] - row_s[places] for k in beside]
+    distance = [row_s[rows] - row_s[places] for rows in beside]
     total = np.zeros(places.size)
-    for k, own in zip(beside, distance, strict=True):
+    for rows, own in zip(beside, distance, strict=True):
         others = [other for other in distance if other is not own]
-        total += column[places + k] * np.prod([o / (o - own) for o in others], axis=0)
+        total += column[rows] * np.prod([o / (o - own) for o in others], axis=0)
     return total
 
 

@@ -229,7 +229,7 @@ def _rotor_angles(campaign: Campaign, pole_pairs: int, policy: Policy) -> float:
 
 
 def encoder_step(campaign: Campaign, policy: Policy) -> float:
-    """The step of the encoder in drive logs.
+    """The step of the encoder in drive logs; in coasts where there are none.
 
     Parameters
     ----------
@@ -241,16 +241,18 @@ def encoder_step(campaign: Campaign, policy: Policy) -> float:
     Returns
     -------
     float
-        [rad]; 0 where there is none that the logs agree on.
+        [rad]; 0 where there is none that they agree on.
 
     Notes
     -----
-    A log at many speeds shows it; at one speed an angle may move by nearly whole steps a sample,
+    A record at many speeds shows it; at one speed an angle may move by nearly whole steps a sample,
     and look finer or coarser than it is. Rows that are read between others are in no steps.
 
     """
-    logs = [c for c in campaign.of("drive") if c.has("theta_mech_rad")]
-    tables = [c.tables[c.table_of("theta_mech_rad")] for c in logs]
+    drives, coasts = (
+        [c for c in campaign.of(test) if c.has("theta_mech_rad")] for test in ("drive", "spin_down")
+    )
+    tables = [c.tables[c.table_of("theta_mech_rad")] for c in drives or coasts]
     angles = [table["theta_mech_rad"].to_numpy() for table in tables]
     steps = [rounding_step(angle, policy.sensor_noise) for angle in angles]
     step = float(np.median(steps)) if steps else 0.0

@@ -94,10 +94,12 @@ def test_rows_that_lack_their_angle_hide_no_step():
     theta = np.round(moved / step) * step
     theta[random.uniform(size=t.size) < 0.05] = np.nan
     assert rounding_step(theta, SENSORS) == pytest.approx(step, rel=1e-9)
-    meta = CaptureMeta("m", "drive", pole_pairs=7)
     table = pl.DataFrame({"t_s": t, "theta_mech_rad": theta})
-    drive = Capture("drive.mcap", "0", "verified", meta, (table,))
-    assert encoder_step(Campaign("m", (drive,)), DEFAULT) == pytest.approx(step, rel=1e-9)
+    for test in ("drive", "spin_down"):
+        meta = CaptureMeta("m", test, pole_pairs=7)
+        capture = Capture("one.mcap", "0", "verified", meta, (table,))
+        found = encoder_step(Campaign("m", (capture,)), DEFAULT)
+        assert found == pytest.approx(step, rel=1e-9), test
 
 
 @pytest.mark.parametrize("pace", [0.03, 0.94, 47.2])
