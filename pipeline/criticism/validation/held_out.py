@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.segment import Segment, clock
 from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.operating import Array
 from pipeline.criticism.regression.cross_validation import HeldOut
@@ -232,7 +232,7 @@ def _equations(
         recorded = smoothed(segment.recorded[channel], width)[rows]
         model = recorded - smoothed(residuals[place], width)[rows]
         without = None if baseline is None else recorded - smoothed(baseline[place], width)[rows]
-        time = segment.recorded["t_s"][rows]
+        time = clock(segment)[rows]
         yield _trace(segment, channel, "equation", split, (time, recorded, model, without))
 
 
