@@ -289,11 +289,21 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
     library
         Effects that may be added.
 
+    Notes
+    -----
+    Where an effect inside goes because captures contradict it, those after it were found beside its
+    wrong form. They are looked for again without it.
+
     """
     searched = search(start.system.fit, library)
     errors = [leave_out(step.system) for step in searched]
     steps, unconfirmed = _confirmed(searched, errors)
     kept, remainders = truncated(steps, in_common([r.system for r in steps], errors[: len(steps)]))
+    for step in steps[len(kept) : -1]:
+        name, against = step.added[-1], contradiction(step)
+        if against:
+            again = ladder_from(start, {n: one for n, one in library.items() if n != name})
+            return replace(again, cut={name: against, **again.cut})
     held_out = in_common([r.system for r in kept], errors[: len(kept)])
     cut = {step.added[-1]: contradiction(step) for step in steps[len(kept) :]}
     return Ladder(start, kept, list(held_out), remainders, cut | unconfirmed)

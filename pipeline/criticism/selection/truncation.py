@@ -7,8 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import values_of
 from pipeline.criticism.regression.cross_validation import HeldOut, predicted_chi2
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import remainder, significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.noise_floors import form_tolerance
@@ -95,7 +97,7 @@ def contradiction(step: LadderStep) -> str:
     for effect in model.effects:
         if effect.name not in step.added[-1:]:
             continue
-        if effect.hook == "torque" and (driving := _driving_friction(step)):
+        if _is_drag(effect, step.fit) and (driving := _driving_friction(step)):
             return (
                 f"{effect.name} would take much of what is left, but goes with a viscous friction "
                 f"of {driving:.2g} N·m·s/rad, which drives the shaft"
@@ -112,12 +114,19 @@ def contradiction(step: LadderStep) -> str:
     return ""
 
 
+def _is_drag(effect: Effect, fit: Fit) -> bool:
+    """Whether an effect is a torque of the speed, and not a wave of the angle alone."""
+    waves = all(p.order for p in effect.parameters_of(fit.machine))
+    return effect.hook == "torque" and not waves
+
+
 def _driving_friction(step: LadderStep) -> float:
     """The viscous friction [N·m·s/rad] beside a drag that was found, where it certainly drives the
-    shaft; else zero. A drag of a wrong form leaves its difference from the true one to it.
+    shaft; else zero. A drag of a wrong form leaves its difference from the true one to it; a wave
+    of the angle leaves it none.
     """
     system, value = step.system, step.fit.values["b_nm_s_rad"]
-    drags = [e for e in step.fit.model.effects if e.hook == "torque" and e.name in step.added]
+    drags = [e for e in step.fit.model.effects if e.name in step.added and _is_drag(e, step.fit)]
     if value >= 0.0 or not drags:
         return 0.0
     names = [system.columns[place].name for place in system.model_columns.tolist()]

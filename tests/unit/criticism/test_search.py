@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pipeline.criticism import search
-from pipeline.criticism.machine.model import Model
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.search import search_ladder
-from pipeline.criticism.selection import free_shares
+from pipeline.criticism.selection import free_shares, truncation
+from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.records.comparison import ModelSpec
-from tests.unit.criticism.machines import machine
+from tests.unit.criticism.machines import fitted, machine, with_drag
 
 
 @pytest.fixture
@@ -199,6 +203,43 @@ def test_trailing_parts_of_a_curve_are_left_out_where_something_is_left(
     found = end().ladder
     assert len(found.steps) == len(found.held_out) == kept
     assert set(found.cut) == {"stribeck", "windage"} - {*found.steps[-1].added}
+
+
+def test_what_was_found_beside_a_wrong_form_is_looked_for_without_it(monkeypatch) -> None:
+    """Cogging that was found after a drag went with it, and was said to be of no known effect."""
+
+    def searched(_: object, library: dict[str, object]) -> list[SimpleNamespace]:
+        found = [name for name in ("iron_eddy", "cogging", "stribeck") if name in library]
+        ladder = [tuple(found[:count]) for count in range(len(found) + 1)]
+        return [SimpleNamespace(added=names, system=names) for names in ladder]
+
+    def cut(steps: list, _: object) -> tuple[list, tuple]:
+        return (steps[:1] if "iron_eddy" in steps[-1].added else steps[:2]), ()
+
+    monkeypatch.setattr(search, "search", searched)
+    monkeypatch.setattr(search, "leave_out", lambda _: None)
+    monkeypatch.setattr(search, "in_common", lambda systems, _: systems)
+    monkeypatch.setattr(search, "_confirmed", lambda steps, _: (steps, {}))
+    monkeypatch.setattr(search, "truncated", cut)
+    drives = {"iron_eddy": "its friction drives", "stribeck": "so does its own"}
+    monkeypatch.setattr(search, "contradiction", lambda step: drives.get(step.added[-1], ""))
+    start = SimpleNamespace(system=SimpleNamespace(fit=None))
+    ladder = search.ladder_from(start, dict.fromkeys(("iron_eddy", "cogging", "stribeck")))
+    assert [step.added for step in ladder.steps] == [(), ("cogging",)]
+    assert ladder.cut == drives
+
+
+@pytest.mark.parametrize(
+    ("name", "speaks"), [("windage", True), ("cogging", False), ("unbalance", False)]
+)
+def test_a_friction_that_drives_speaks_against_drags_and_no_waves(name: str, speaks: bool) -> None:
+    fit = fitted([with_drag(lambda *_: 0.0, seed) for seed in (5, 6)])
+    effect = effects()[name]
+    model = fit.model.with_effects(effect)
+    values = {**zero(effect, model), **fit.values, "b_nm_s_rad": -1e-3}
+    system = linear_system(replace(fit, model=model, values=values))
+    step = LadderStep((name,), system, ())
+    assert bool(truncation.contradiction(step)) == speaks
 
 
 @pytest.mark.parametrize(("u", "told"), [(0.02, True), (0.2, False)])
