@@ -144,12 +144,12 @@ def test_one_torque_beside_the_coasts_makes_all_of_it_known(tmp_path):
 
 def test_windage_of_coasts_alone_is_named_without_a_size(tmp_path, capsys):
     """`diagnose` gave the drag in N·m, to 1 %, of a shaft of which no torque is known. That there
-    is windage, and windage over inertia, is known.
+    is windage, and windage over inertia, is known; so is the design's own cogging.
     """
     size = 0.3 * DRY
     folder = recorded(tmp_path / "windage", COASTS + WINDING, windage={})
     document = made(folder, "diagnose")
-    assert document["missing"] == ["windage"]
+    assert document["missing"] == ["windage", "cogging"]
     (ranked,) = (one for one in document["ranking"] if one["effect"] == "windage")
     assert {(p["value"], p["u"]) for p in ranked["parameters"].values()} == {(None, None)}
     step = document["ladder"][-1]["parameters"]
