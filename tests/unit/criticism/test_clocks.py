@@ -12,7 +12,6 @@ from pipeline.criticism.data.traces import even_clock, window_between_gaps
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.numerics.clocks import counted
 from pipeline.records.capture import Capture, CaptureMeta, Mask
-from pipeline.records.row_means import bridged
 from tests.unit.criticism.machines import machine
 
 CUTTING = DEFAULT.cutting
@@ -100,16 +99,6 @@ def test_an_angle_in_a_lost_row_bends_as_it_does_beside_it():
     bend = np.diff(found["theta_mech_rad"], 2) / PERIOD**2
     assert keep[1:-1].all()
     assert bend == pytest.approx(np.full(bend.size, -800.0), rel=1e-3)
-
-
-@pytest.mark.parametrize("beside", [-2, 2, 3])
-def test_a_row_without_a_value_bends_whatever_else_is_missing_near_it(beside):
-    """Where a second row lacked its own, a straight line was taken."""
-    t_s = PERIOD * np.arange(40)
-    bent = 3.0 + 200.0 * t_s - 4e4 * t_s**2 + 1e6 * t_s**3
-    column = bent.copy()
-    column[[20, 20 + beside]] = np.nan
-    assert bridged(t_s, column) == pytest.approx(bent, rel=1e-12)
 
 
 @pytest.mark.parametrize("missing", [1, 30])

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from pipeline.records.capture import Capture, CaptureMeta, Mask
-from pipeline.records.row_means import row_means, slower_rows
+from pipeline.records.row_means import bridged, row_means, slower_rows
 
 
 def test_a_stream_of_which_every_row_is_set_aside_is_missing() -> None:
@@ -69,3 +69,13 @@ def test_waves_stay_on_their_own_clock_beside_an_angle_of_another() -> None:
     data = capture.arrays("t_s", *voltage, *motion)
     assert data["vab_v"] == pytest.approx(voltage["vab_v"], abs=1e-12)
     assert data["theta_mech_rad"][1:-1] == pytest.approx(300.0 * own_s[1:-1])
+
+
+@pytest.mark.parametrize("beside", [-2, 2, 3])
+def test_a_row_without_a_value_bends_whatever_else_is_missing_near_it(beside):
+    """Where a second row lacked its own, a straight line was taken."""
+    t_s = 1e-3 * np.arange(40)
+    bent = 3.0 + 200.0 * t_s - 4e4 * t_s**2 + 1e6 * t_s**3
+    column = bent.copy()
+    column[[20, 20 + beside]] = np.nan
+    assert bridged(t_s, column) == pytest.approx(bent, rel=1e-12)
