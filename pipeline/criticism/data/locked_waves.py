@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -24,11 +24,14 @@ class LockedWaves:
         Third differences of the waves [n - 3, k].
     policy
         How many rows a wave needs, and how little it may turn.
+    bases
+        `basis` of each width that was asked for: all columns of a log need the same.
 
     """
 
     third: Array
     policy: SensorNoise
+    bases: dict[int, tuple[Array, Array]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, theta_rad: Array, orders: Sequence[float], policy: SensorNoise) -> LockedWaves:
@@ -68,16 +71,36 @@ class LockedWaves:
 
         """
         blocks = third[: third.size // width * width].reshape(-1, width)
-        waves = self.third[: blocks.size].reshape(len(blocks), width, -1)
-        basis, sizes, _ = np.linalg.svd(waves, full_matrices=False)
-        basis = basis * (sizes > self.policy.still * sizes[:, :1])[:, None, :]
+        basis, taken = self.basis(width)
         left = blocks - np.einsum(
             "bwk,bk->bw", basis, np.einsum("bwk,bw->bk", basis, blocks, optimize=True)
         )
-        # third differences of white noise have 20 times its variance
-        taken = _noise_along(basis) / (20.0 * width)
         remainder: Array = (left / np.sqrt(1.0 - taken)[:, None]).ravel()
         return remainder
+
+    def basis(self, width: int) -> tuple[Array, Array]:
+        """What the waves of each block span, and how much white noise a fit of them takes.
+
+        Parameters
+        ----------
+        width
+            Third differences a block.
+
+        Returns
+        -------
+        tuple of arrays [blocks, width, k], [blocks]
+            Orthonormal columns, zero where the rotor stands still, and the share of the variance of
+            the third differences of white noise that lies along them.
+
+        """
+        if width not in self.bases:
+            blocks = len(self.third) // width
+            waves = self.third[: blocks * width].reshape(blocks, width, -1)
+            basis, sizes, _ = np.linalg.svd(waves, full_matrices=False)
+            basis = basis * (sizes > self.policy.still * sizes[:, :1])[:, None, :]
+            # third differences of white noise have 20 times its variance
+            self.bases[width] = basis, _noise_along(basis) / (20.0 * width)
+        return self.bases[width]
 
 
 def _noise_along(basis: Array) -> Array:
