@@ -12,7 +12,7 @@ from pipeline.criticism.data.holding_cells import holding_orders
 from pipeline.criticism.data.instruments import stated_u
 from pipeline.criticism.data.rounding import rounding_step
 from pipeline.criticism.data.settling import settling_of
-from pipeline.criticism.data.traces import LINES_V, with_values
+from pipeline.criticism.data.traces import LINES_V, on_counts, with_values
 from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import BENDING, UNLOGGED, WARMING, Machine
 from pipeline.criticism.policy.policy import DEFAULT, Policy
@@ -252,8 +252,7 @@ def encoder_step(campaign: Campaign, policy: Policy) -> float:
     drives, coasts = (
         [c for c in campaign.of(test) if c.has("theta_mech_rad")] for test in ("drive", "spin_down")
     )
-    tables = [c.tables[c.table_of("theta_mech_rad")] for c in drives or coasts]
-    angles = [table["theta_mech_rad"].to_numpy() for table in tables]
+    angles = [on_counts(c, "theta_mech_rad", policy.cutting) for c in drives or coasts]
     steps = [rounding_step(angle, policy.sensor_noise) for angle in angles]
     step = float(np.median(steps)) if steps else 0.0
     agree = all(abs(one - step) <= policy.cutting.encoder_share * step for one in steps)

@@ -12,7 +12,7 @@ from pipeline.criticism.data.hysteresis import play_lag, with_travel
 from pipeline.criticism.data.locked_waves import LockedWaves
 from pipeline.criticism.data.rounding import coarse_step, step_of_differences
 from pipeline.criticism.data.segment import Sensors, SpeedSensor
-from pipeline.criticism.data.traces import smoothed
+from pipeline.criticism.data.traces import READ_BETWEEN, smoothed
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.sensors import SensorNoise
@@ -52,7 +52,8 @@ def prepared(
         For `segment_of`.
 
     """
-    noise, steps = noise_and_steps(columns, policy.sensor_noise, orders)
+    sensed = {name: column for name, column in columns.items() if name != READ_BETWEEN}
+    noise, steps = noise_and_steps(sensed, policy.sensor_noise, orders)
     width = max(2 * round(policy.cutting.temperature_s / period) + 1, 51)
     for name in TEMPERATURES:
         if name in columns:

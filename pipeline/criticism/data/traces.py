@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,8 @@ LINES_V = ("vab_v", "vbc_v", "vca_v")
 PAD = 24
 """Samples kept on either side of a window that is cut out: what differences and smoothing of a
 speed reach over."""
+READ_BETWEEN = "read_between"
+"""Column of the rows that were lost, or lack their angle, and are read between others."""
 _SHORTEST = 24
 """Fewest rows of a capture with a clock: three windows of eight, by judgement."""
 
@@ -97,7 +99,8 @@ def even_clock(
     period
         Sample period [s].
     columns
-        [n each]; missing values are bridged.
+        [n each]; missing values are bridged. Where rows were lost, or lack the angle,
+        `READ_BETWEEN` is 1 in those that are read between their neighbours, and 0 in others.
     keep
         Samples that count [n]: not those bridged, inside a gap, or at either end; a single row that
         is missing is read between its neighbours.
@@ -113,21 +116,24 @@ def even_clock(
     keep = capture.kept(home).copy()
     time = columns.pop("t_s")
     period = float(np.median(np.diff(time)))
+    lacks = _lacks_angle(capture.tables[home], names)
     for name, column in columns.items():
         finite = np.isfinite(column)
         if not finite.all() and finite.any():
             columns[name] = np.interp(time, time[finite], column[finite])
             keep &= finite
     uneven = np.abs(np.diff(time) - period).max() > policy.clock_even * period
-    clock = counted(time, policy.clock_missing, policy.clock_scatter) if uneven else None
-    if clock and clearest_ratio(time, clock[1], columns.values()) <= policy.clock_ratio:
+    clock = _counts(time, columns, policy) if uneven else None
+    if clock:
         period, number = clock
         even = np.arange(number[-1] + 1)
         there, recorded = np.zeros((2, even.size), dtype=bool)
         there[number], recorded[number] = True, keep
-        columns = {name: _counted(column, number, even) for name, column in columns.items()}
-        recorded[1:-1] |= ~there[1:-1] & recorded[:-2] & recorded[2:]
-        keep = recorded
+        columns = {name: _filled(_placed(column, number)) for name, column in columns.items()}
+        single, lost = np.zeros((2, even.size), dtype=bool)
+        lost[1:-1] = ~there[1:-1] & recorded[:-2] & recorded[2:]
+        single[number], keep = lacks, recorded | lost
+        lacks = single | lost
     elif uneven:
         even = time[0] + period * np.arange(round((time[-1] - time[0]) / period) + 1)
         after = np.clip(np.searchsorted(time, even), 1, time.size - 1)
@@ -137,15 +143,71 @@ def even_clock(
             & keep[after - 1]
         )
         columns = {name: np.interp(even, time, column) for name, column in columns.items()}
+        lacks = np.zeros(even.size, dtype=bool)
     keep[:1] = keep[-1:] = False
+    if np.any(lacks & keep):
+        columns[READ_BETWEEN] = (lacks & keep).astype(np.float64)
     return period, columns, keep
 
 
-def _counted(column: Array, number: Indices, even: Indices) -> Array:
-    """A column at every count of a clock, of rows that have a `number` each."""
-    filled = np.full(even.size, np.nan)
-    filled[number] = column
-    filled = bridged(even.astype(float), filled)
+def _lacks_angle(table: pl.DataFrame, names: Iterable[str]) -> Flags:
+    """Rows of a table [n] in which an angle among the columns was not recorded."""
+    angles = [name for name in names if name.startswith("theta") and name in table.columns]
+    lacks: Flags = np.zeros(table.height, dtype=bool)
+    for name in angles:
+        lacks |= ~np.isfinite(table[name].to_numpy())
+    return lacks
+
+
+def on_counts(capture: Capture, name: str, policy: Cutting) -> Array:
+    """A column at every count of its clock.
+
+    Parameters
+    ----------
+    capture
+        With `t_s`.
+    name
+        The column.
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    array [n]
+        NaN in rows that were lost, or lack it; as recorded where its rows have no even clock.
+
+    """
+    table = capture.tables[capture.table_of("t_s", name)]
+    time, column = table["t_s"].to_numpy(), table[name].to_numpy()
+    period = float(np.median(np.diff(time)))
+    uneven = np.abs(np.diff(time) - period).max() > policy.clock_even * period
+    known = np.isfinite(column)
+    clock = _counts(time[known], {name: column[known]}, policy) if uneven else None
+    return column if clock is None else _placed(column[known], clock[1])
+
+
+def _counts(
+    time: Array, columns: Mapping[str, Array], policy: Cutting
+) -> tuple[float, Indices] | None:
+    """Period [s] and number of each row [n] of an even clock that its stamps [n, s] are about; None
+    where its columns [n each] are not of one.
+    """
+    clock = counted(time, policy.clock_missing, policy.clock_scatter)
+    even = clock and clearest_ratio(time, clock[1], columns.values()) <= policy.clock_ratio
+    return clock if even else None
+
+
+def _placed(column: Array, number: Indices) -> Array:
+    """A column at every count of a clock, of rows that have a `number` each; NaN in the others."""
+    placed = np.full(number[-1] + 1, np.nan)
+    placed[number] = column
+    return placed
+
+
+def _filled(column: Array) -> Array:
+    """A column [n] with its missing values, NaN, read between others."""
+    even = np.arange(column.size)
+    filled = bridged(even.astype(float), column)
     known = np.isfinite(filled)
     return np.interp(even, even[known], filled[known]) if known.any() else filled
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
-from pipeline.criticism.data.traces import thinned, window_between_gaps
+from pipeline.criticism.data.traces import READ_BETWEEN, thinned, window_between_gaps
 from pipeline.criticism.data.unlogged_load import rests, runs_free
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
@@ -28,7 +28,15 @@ from pipeline.numerics.projection import projection
 from pipeline.records.capture import Capture
 
 TORQUE, RECORDER = "torque_shaft_nm", "log"
-_USED = ("theta_mech_rad", "iq_a", "id_a", "travel_rad", "run", "temp_magnet_degc")
+_USED = (
+    "theta_mech_rad",
+    "iq_a",
+    "id_a",
+    "travel_rad",
+    "run",
+    "temp_magnet_degc",
+    READ_BETWEEN,
+)
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:

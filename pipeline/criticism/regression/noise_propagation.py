@@ -17,7 +17,7 @@ from pipeline.criticism.data.segment import (
     projected,
     row_index,
 )
-from pipeline.criticism.data.traces import LINES_V, parabolas
+from pipeline.criticism.data.traces import LINES_V, READ_BETWEEN, parabolas
 from pipeline.criticism.data.traces import smoothed as box_mean
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.operating import Array, Indices, Signals, Values
@@ -25,6 +25,7 @@ from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.criticism.regression.sampler import Sampler
 from pipeline.criticism.residuals.residual import residual
 from pipeline.physics.frames import vector_of_lines
+from pipeline.records.row_means import bridged
 
 IN_ROTOR_FRAME = (("id_a", "iq_a"), ("vd_v", "vq_v"))
 """Columns of the two axes that a recorder turns by the angle that it reads."""
@@ -57,7 +58,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     model has that goes with the angle is noise there. Signals that are coarse are rounded anew. The
     noise of an angle that was smoothed is smoothed alike: what is slow in it stays as it was. What
     the smoothing changes in the residual counts too: it may have been noise or motion. A rounded
-    angle, or speed that is integrated, is rounded anew as well (`_of_rounding`).
+    angle, or speed that is integrated, is rounded anew as well (`_of_rounding`). A row that
+    was lost, or lacks its angle, has the noise of those that it is read between.
 
     """
     policy, recording = model.policy.noise_floors, _Recording.of(segment, model, values)
@@ -159,7 +161,8 @@ class _Recording:
     def change(self, recorded: Signals) -> Array:
         """What other columns make of the weak residual [R]."""
         _, _, valid, _ = row_index(self.segment)
-        changed = residual(self.segment, self.model, self.values, recorded)
+        bridged_too = _between_rows(self.segment, recorded)
+        changed = residual(self.segment, self.model, self.values, bridged_too)
         return projected(self.segment, changed)[valid] - self.unperturbed
 
     def pooled(self, changes: Iterable[Array]) -> Array:
@@ -238,6 +241,20 @@ class _Recording:
                 turned = (recorded[d] + 1j * recorded[q]) * back
                 recorded |= {d: turned.real, q: turned.imag}
         return recorded
+
+
+def _between_rows(segment: Segment, noisy: Signals) -> Signals:
+    """Noisy columns whose noise is read between other rows where the rows themselves are."""
+    between = segment.recorded.get(READ_BETWEEN)
+    if between is None:
+        return noisy
+    lost, row = between == 1.0, np.arange(between.size, dtype=np.float64)
+    columns = dict(noisy)
+    for name, column in noisy.items():
+        if column is not (recorded := segment.recorded.get(name)) and recorded is not None:
+            noise = bridged(row, np.where(lost, np.nan, column - recorded))
+            columns[name] = recorded + np.nan_to_num(noise)
+    return columns
 
 
 def _of_rounding(recording: _Recording, noise: Array) -> Array:

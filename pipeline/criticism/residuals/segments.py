@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.criticism.data.instruments import gains_of
 from pipeline.criticism.data.rounding import dither_of, is_rounded, rounding_step
 from pipeline.criticism.data.segment import UNSMOOTHED, Cache, Segment, joins, with_lines
-from pipeline.criticism.data.traces import PAD, with_values
+from pipeline.criticism.data.traces import PAD, READ_BETWEEN, with_values
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equation_of, equations
 from pipeline.criticism.machine.model import (
@@ -209,13 +209,15 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
     if theta is None or segment.sensors.speed is not None:
         return segment
     policy = machine.policy.sensor_noise
-    if is_rounded(theta, step, policy):
+    lost = segment.recorded.get(READ_BETWEEN, np.zeros(theta.size)) > 0.0
+    if is_rounded(theta[~lost], step, policy):
         evenly = float(np.ptp(np.diff(theta))) < step
         multiples = range(1, 2 if evenly else policy.most_readings + 1)
-        step = max(n * step for n in multiples if is_rounded(theta, n * step, policy))
+        step = max(n * step for n in multiples if is_rounded(theta[~lost], n * step, policy))
     else:
         known = segment.sensors.angle_step_rad
-        step = rounding_step(theta, policy) if known is None else known
+        alone = np.where(lost, np.nan, theta)
+        step = rounding_step(alone, policy) if known is None else known
     readings = 1.0
     if step > 0.0:
         readings = 12.0 * (segment.sensors.noise.get("theta_mech_rad", 0.0) / step) ** 2
