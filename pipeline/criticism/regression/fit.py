@@ -15,8 +15,8 @@ from pipeline.criticism.parameter import Machine, Parameter
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.columns import Column
-from pipeline.criticism.regression.noise_floors import Floor, form_tolerance
-from pipeline.criticism.regression.noise_propagation import noise_floor, noise_growth
+from pipeline.criticism.regression.noise_floors import Floor, form_tolerance, rough_floor
+from pipeline.criticism.regression.noise_propagation import noise_floor, noise_growth, quick_noise
 from pipeline.criticism.regression.parallel import on_each
 
 _SEED = 20260302
@@ -199,6 +199,34 @@ def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[A
     """
     seeds = range(_SEED, _SEED + len(segments))
     return on_each(noise_floor, segments, [(model, values, seed) for seed in seeds])
+
+
+def rough_floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Array, ...]:
+    """What the rows of every segment may be off by in a rough fit.
+
+    Parameters
+    ----------
+    segments
+        The segments.
+    model
+        The model at which noise is propagated.
+    values
+        Orders of magnitude of the parameters.
+
+    Returns
+    -------
+    tuple of array [R]
+        A part of the machine's scale and the noise: by its scale alone, rows of a wave that hold
+        little but the noise of an acceleration would take the inertia away.
+
+    """
+    seeds = range(_SEED, _SEED + len(segments))
+    return on_each(_rough_floor, segments, [(model, values, seed) for seed in seeds])
+
+
+def _rough_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
+    noise = quick_noise(segment, model, values, seed)
+    return np.hypot(rough_floor(segment, model, values), noise)
 
 
 def floors_grown(fit: Fit) -> tuple[Array, ...]:

@@ -22,9 +22,8 @@ from pipeline.criticism.operating import Array, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.regression.bounds import Best, bounded_step
 from pipeline.criticism.regression.columns import Column
-from pipeline.criticism.regression.fit import Fit, floors, floors_grown
+from pipeline.criticism.regression.fit import Fit, floors, floors_grown, rough_floors
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.regression.noise_floors import rough_floor
 from pipeline.criticism.residuals.segments import sparse
 from pipeline.criticism.signals.angle_sensor import both_axes
 
@@ -197,7 +196,8 @@ def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = 
 
     Notes
     -----
-    By its noise floor, an equation that is far off would be given up before the constants are near.
+    By its noise floor alone, an equation that is far off would be given up before the constants are
+    near.
 
     """
     values = start_values(model, model.machine)
@@ -206,7 +206,7 @@ def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = 
             values |= begins(segment, model.machine)
     values |= known or {}
     thinned = tuple(sparse(s, model.policy.cutting.rough_windows) for s in segments)
-    rough = tuple(rough_floor(segment, model, values) for segment in thinned)
+    rough = rough_floors(thinned, model, values)
     fitted = gauss_newton(Fit(thinned, _pinned(model), values, rough, values)).fit
     return replace(fitted, model=model, segments=tuple(segments))
 
