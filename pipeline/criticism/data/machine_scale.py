@@ -403,7 +403,7 @@ def torque_orders(captures: Iterable[Capture], highest: int) -> tuple[int, ...]:
     spectra = []
     for capture in captures:
         if capture.has("theta_mech_rad", "torque_shaft_nm"):
-            signals = capture.arrays("theta_mech_rad", "torque_shaft_nm")
+            signals = capture.finite("theta_mech_rad", "torque_shaft_nm")
             theta, torque = signals["theta_mech_rad"], signals["torque_shaft_nm"]
             spectra.append(_standing_out(theta, torque, highest))
     orders = set().union(*(found for _, found in spectra))

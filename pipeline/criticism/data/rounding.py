@@ -284,6 +284,86 @@ def rounding_error(even: Array, step: float, shift: Array | float) -> Array:
     return (np.round(moved) - moved) * step
 
 
+def readings_error(even: Array, step: float, readings: int, shift: Array | float) -> Array:
+    """What rounding does to samples that are means of readings, taken evenly over each sample.
+
+    Parameters
+    ----------
+    even
+        The signal before it is rounded [n, any unit].
+    step
+        Of the samples [same unit]; a reading is in steps of `readings` times that.
+    readings
+        Readings a sample.
+    shift
+        By which it is moved before it is rounded [steps of a reading].
+
+    Returns
+    -------
+    array [n]
+        Means less smooth [same unit].
+
+    """
+    if readings == 1:
+        return rounding_error(even, step, shift)
+    turned, coarse = np.gradient(even), readings * step
+    places = (np.arange(readings) + 0.5) / readings - 0.5
+    return np.mean(
+        [rounding_error(even + place * turned, coarse, shift) for place in places], axis=0
+    )
+
+
+def are_means(stretches: Sequence[Array], step: float, readings: int, policy: SensorNoise) -> bool:
+    """Whether samples are means of coarser readings, rather than noisy before they were rounded.
+
+    Parameters
+    ----------
+    stretches
+        As recorded [rad], each without a gap.
+    step
+        Of the samples [rad].
+    readings
+        Readings a sample that would make its noise.
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    bool
+        Whether the means predict where in the record third differences are large better than a
+        noise that is the same throughout does, by the likelihood of their power in blocks.
+
+    Notes
+    -----
+    Means of a motion that crosses a step of a reading within a sample have a part of its error, and
+    those of one that stays within it all of it.
+
+    """
+    coarse, powers = readings * step, []
+    for one in stretches:
+        even = smoothed(one, coarse, policy)
+        errors = [readings_error(even, step, readings, shift) for shift in _SHIFTS]
+        blocks = max(one.size // policy.block, 1)
+        if one.size >= policy.block:
+            powers.append(
+                [
+                    np.mean([_block_powers(part, blocks) for part in parts], axis=0)
+                    for parts in ([one], errors)
+                ]
+            )
+    if not powers:
+        return True
+    shown, of_means = np.concatenate(powers, axis=1)
+    of_means = np.maximum(of_means, _FLOATING * max(float(of_means.max()), 1e-300))
+    by_means = np.mean(np.log(of_means) + shown / of_means)
+    return bool(by_means < math.log(max(float(shown.mean()), 1e-300)) + 1.0)
+
+
+def _block_powers(signal: Array, blocks: int) -> list[float]:
+    """Mean square of third differences in blocks of a signal [n]."""
+    return [float(np.mean(part**2)) for part in np.array_split(np.diff(signal, 3), blocks)]
+
+
 def rounding_step(signal: Array, policy: SensorNoise) -> float:
     """The step of a signal whose noise is mostly its rounding.
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.criticism.data.rounding import rounding_error, smoothed, unrounded
+from pipeline.criticism.data.rounding import readings_error, rounding_error, smoothed, unrounded
 from pipeline.criticism.data.segment import (
     UNSMOOTHED,
     Segment,
@@ -248,7 +248,7 @@ class _Recording:
             if sensors.dither_rad:
                 generator = np.random.default_rng([count, number])
                 even = even + sensors.dither_rad * generator.normal(size=even.size)
-            error = _readings_error(even, step, sensors.readings, moved)
+            error = readings_error(even, step, sensors.readings, moved)
             moved_rad = theta + parabolas(error, sensors.parabola)
             yield {**self._in_turned_frame(error), "theta_mech_rad": moved_rad}
 
@@ -332,16 +332,6 @@ def _rounded_speed(
     above = _above_rounding(speed.noise_rad_s, speed.step_rad_s)
     noise = above * generator.normal(size=even.size)
     return noise + rounding_error(even + noise, speed.step_rad_s, shift)
-
-
-def _readings_error(even_rad: Array, step_rad: float, readings: int, shift: Array | float) -> Array:
-    """Error [n, rad] of samples that are means of readings in steps of `readings` times their own,
-    taken evenly over the sample as the shaft turns.
-    """
-    turned, coarse = np.gradient(even_rad), readings * step_rad
-    places = (np.arange(readings) + 0.5) / readings - 0.5
-    errors = [rounding_error(even_rad + place * turned, coarse, shift) for place in places]
-    return np.mean(errors, axis=0)
 
 
 def _before_rounding(segment: Segment, policy: SensorNoise) -> dict[str, Array]:

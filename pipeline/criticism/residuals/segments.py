@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.instruments import gains_of
-from pipeline.criticism.data.rounding import dither_of, is_rounded, rounding_step
+from pipeline.criticism.data.rounding import are_means, dither_of, is_rounded, rounding_step
 from pipeline.criticism.data.segment import UNSMOOTHED, Cache, Segment, joins, with_lines
 from pipeline.criticism.data.traces import PAD, READ_BETWEEN, with_values
 from pipeline.criticism.equation import Equation
@@ -200,8 +200,9 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
 
     A shaft that turns by nearly whole steps a sample does not show the step itself, and its
     rounding is then periodic in the angle, as an electrical order is. A drive that logs means of
-    n readings has its angle in fractions q of the step, with a noise of q √(n/12). A single reading
-    that alternates may seem to be of `_ALTERNATING`. The integral of a rounded speed is in steps as
+    n readings has its angle in fractions q of the step, with a noise of q √(n/12): a noise before
+    the rounding looks alike, but for where it is (`are_means`). A single reading that alternates
+    may seem to be of `_ALTERNATING`. The integral of a rounded speed is in steps as
     well, but its error is a walk.
     """
     theta, step = segment.recorded.get("theta_mech_rad"), machine.encoder_rad
@@ -222,9 +223,10 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
     if step > 0.0:
         readings = 12.0 * (segment.sensors.noise.get("theta_mech_rad", 0.0) / step) ** 2
     count = min(round(readings), policy.most_readings) if readings > _ALTERNATING else 1
-    dither = 0.0
-    if step > 0.0 and count == 1:
-        dither = dither_of(np.split(theta, joins(segment)), step, policy)
+    stretches = np.split(theta, joins(segment))
+    if count > 1 and not are_means(stretches, step, count, policy):
+        count = 1
+    dither = dither_of(stretches, step, policy) if step > 0.0 and count == 1 else 0.0
     sensors = replace(segment.sensors, angle_step_rad=step, readings=count, dither_rad=dither)
     return replace(segment, sensors=sensors)
 

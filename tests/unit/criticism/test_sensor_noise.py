@@ -13,6 +13,7 @@ from pipeline.criticism.data.rounding import (
     coarse_step,
     dither_of,
     is_rounded,
+    readings_error,
     resolution,
     rounding_error,
     rounding_step,
@@ -25,7 +26,7 @@ from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, current_floors_grown, floors
 from pipeline.criticism.regression.goodness import floor_factors
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.criticism.regression.noise_propagation import _readings_error, noise_floor
+from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.residuals.segments import _by_encoder
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
@@ -162,9 +163,23 @@ def test_the_mean_of_rounded_readings_has_their_noise_and_not_that_of_its_fracti
     found = _by_encoder(segment, replace(machine(), encoder_rad=coarse / 6.0)).sensors
     assert found.angle_step_rad == pytest.approx(coarse / 6.0)
     assert 4 <= found.readings <= 7
-    anew = _readings_error(true, coarse / 6.0, found.readings, 0.3)
+    anew = readings_error(true, coarse / 6.0, found.readings, 0.3)
     assert np.std(anew) == pytest.approx(np.std(theta - true), rel=0.15)
     assert np.std(anew) > 2.0 * coarse / 6.0 / np.sqrt(12.0)
+
+
+@pytest.mark.parametrize("sigma", [0.6, 0.9])
+@pytest.mark.parametrize("turns", [0.02, 3.0])
+def test_noise_of_most_of_a_step_before_a_rounding_is_no_mean_of_readings(sigma, turns):
+    """An encoder with its lowest bit in its noise has an error that is alike at every pace."""
+    step, t = 2.0 * np.pi / 2**17, np.arange(6000) / 2000.0
+    moved = turns * np.sin(6.0 * t) + step * np.random.default_rng(7).normal(0.0, sigma, t.size)
+    theta = np.round(moved / step) * step
+    sensors = Sensors({"theta_mech_rad": sensor_noise(theta, SENSORS, steady=True)})
+    segment = replace(log(), recorded={"theta_mech_rad": theta}, sensors=sensors)
+    found = _by_encoder(segment, replace(machine(), encoder_rad=step)).sensors
+    assert found.readings == 1
+    assert found.dither_rad == pytest.approx(sigma * step, rel=0.1)
 
 
 def test_a_rounding_that_beats_with_the_sampling_is_no_mean_of_readings():
