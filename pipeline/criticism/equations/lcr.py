@@ -59,6 +59,28 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     return segment_of(capture, "lcr", "lcr", 1.0, columns, Sensors(noise), channels=channels)
 
 
+def begins(segment: Segment, machine: Machine) -> dict[str, float]:
+    """The winding that the meter shows, where no other test may say how large it is.
+
+    Parameters
+    ----------
+    segment
+        The table.
+    machine
+        Not used.
+
+    Returns
+    -------
+    dict of float
+        Half the mean line values, for both axes [H], and with its channel the resistance [ohm].
+
+    """
+    del machine
+    half = {name: 0.5 * float(np.mean(segment.recorded[name])) for name in segment.channels}
+    known = {"ld_h": half["lab_h"], "lq_h": half["lab_h"]}
+    return known | ({"r_ohm": half["rab_ohm"]} if "rab_ohm" in half else {})
+
+
 def state(segment: Segment, signals: Signals, model: Model, values: Values) -> Operating:
     """A rotor at rest at each angle [n], without current, at the meter's frequency."""
     eps = np.radians(signals["theta_elec_deg"])
@@ -139,4 +161,5 @@ EQUATION = Equation(
     measured=measured,
     predicted=predicted,
     observes=Observes(("r_ohm", "ld_h", "lq_h"), sensors=frozenset({"lcr"}), form="neither"),
+    begins=begins,
 )
