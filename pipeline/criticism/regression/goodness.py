@@ -10,7 +10,8 @@ import numpy as np
 from scipy.special import chdtri, ndtr
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.operating import Array, Flags
+from pipeline.criticism.operating import Array, Flags, Indices
+from pipeline.criticism.policy.regression import Goodness
 from pipeline.criticism.regression.fit import Fit, current_floors_grown
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import (
@@ -226,18 +227,37 @@ def _groups_over_floor(
 ) -> Iterator[tuple[int, float, float, bool]]:
     """Place, χ²/n, size of every group over its floor, and whether that size matters; the floor is
     `noise_ratio` [R] of the scale that rows are divided by.
+
+    A wave of the motor is in more windows than one. In a single one the rounding of an encoder may
+    beat with it, at a pace that is known too badly for its floor to say so.
     """
     policy, residual = system.policy.goodness, system.residual
-    reduced_chi2, counts = system.reduced_chi2(residual / noise_ratio), system.counts
-    for place, (number, channel, _) in enumerate(system.labels):
+    floors = residual / noise_ratio
+    reduced_chi2, counts = system.reduced_chi2(floors), system.counts
+    for place, (number, channel, order) in enumerate(system.labels):
         n, q = counts[place], reduced_chi2[place]
-        if n == 0 or q <= max(1.0 + policy.over, _highest_by_chance(n, policy.chance)):
+        if not _is_over(n, q, policy):
             continue
         in_group = system.group == place
+        if order and not _is_over(*_without_worst(floors, system.window, in_group), policy):
+            continue
         precision = (system.unit * noise_ratio)[in_group] ** -2.0
         size = math.sqrt((q - 1.0) / float(precision.mean()))
         matters = size > material_size(system.segments[number], channel, system.fit, large)
         yield place, float(q), size, matters
+
+
+def _is_over(n: float, reduced_chi2: float, policy: Goodness) -> bool:
+    """Whether χ²/n of n samples is over a floor by more than it may be wrong by, and by chance."""
+    highest = max(1.0 + policy.over, _highest_by_chance(n, policy.chance)) if n else math.inf
+    return reduced_chi2 > highest
+
+
+def _without_worst(floors: Array, window: Indices, rows: Flags) -> tuple[int, float]:
+    """Number and mean square of `rows` of a group, in `floors` [R], without its worst window."""
+    squares, windows = floors[rows] ** 2, window[rows]
+    rest = squares[windows != np.argmax(np.bincount(windows, squares))]
+    return rest.size, float(rest.mean()) if rest.size else 0.0
 
 
 @cache
