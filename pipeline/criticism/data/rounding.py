@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -29,9 +30,14 @@ _KNOWN = 16
 """Values that two neighbours share from which on their spacing is a step: a drive that is switched
 off, or limits its current, shares a few."""
 _SHIFTS = (-0.375, -0.125, 0.125, 0.375)
-_ROUNDS = 3
-"""Parts of a step by which a motion is moved to be rounded anew, evenly spread; rounds in which its
-noise is found: one of 0.4 steps comes out within 5 % after three, but where it hides the beat."""
+_SHARES = np.concatenate([[0.0], np.geomspace(0.05, 3.2, 13)])
+_BETWEEN = 5
+_BLOCKS = 120
+"""Parts of a step by which a motion is moved to be rounded anew, evenly spread; trial noises before
+the rounding [steps], and how many lie between the best two; blocks that are looked at."""
+_UNSEEN, _FAR = 1e-3, 8.0
+"""Power of third differences [steps²] that is none; ratio of two powers from which on all are
+alike: a jump is no noise."""
 _DIGITS = 1e-3
 """Share of a step that the digits of a file may leave where there is none."""
 _FLOATING = 1e-9
@@ -225,25 +231,69 @@ def dither_of(stretches: Sequence[Array], step: float, policy: SensorNoise) -> f
     Returns
     -------
     float
-        Standard deviation [rad] with which the same motion, rounded anew, has the third differences
-        that are recorded. Without noise the error of a rounding is not white where steps and
-        sampling beat.
+        Standard deviation [rad] with which the same motion, rounded anew, has third differences as
+        large as those that are recorded, block by block. Without noise the error of a rounding is
+        not white where steps and sampling beat: there they may be larger than with some, or less.
 
     """
-    noise = _of_differences(stretches, policy) / step
-    passing = step * max(math.sqrt(12.0) * noise, 1.0)
-    even = [smoothed(one, passing, policy) / step for one in stretches]
-    random = np.random.default_rng(len(even))
-    normal = [random.normal(size=one.size) for one in even]
-    power = 0.0
-    for _ in range(_ROUNDS):
-        sigma = math.sqrt(power)
-        noisy = [one + sigma * white for one, white in zip(even, normal, strict=True)]
-        shown = [
-            _of_differences([np.round(one + shift) for one in noisy], policy) for shift in _SHIFTS
-        ]
-        power = max(power + noise**2 - float(np.mean(np.square(shown))), 0.0)
-    return step * math.sqrt(power)
+    blocks = _Blocks.of(stretches, step, policy)
+    shares = _SHARES[np.argsort([blocks.unlikeness_of_noise(share) for share in _SHARES])[:2]]
+    between = np.linspace(shares.min(), shares.max(), _BETWEEN)
+    return step * float(min(between, key=blocks.unlikeness_of_noise))
+
+
+@dataclass(frozen=True, slots=True)
+class _Blocks:
+    """Blocks [B, n] of an angle in steps, evenly spread over its record: as recorded, and as it was
+    before its rounding as far as the record tells.
+    """
+
+    recorded: Array
+    even: Array
+    normal: Array
+
+    @classmethod
+    def of(cls, stretches: Sequence[Array], step: float, policy: SensorNoise) -> _Blocks:
+        """The blocks of a record [rad] without gaps, by its `step` [rad]."""
+        noise = _of_differences(stretches, policy) / step
+        passing = step * max(math.sqrt(12.0) * noise, 1.0)
+        size, pairs = policy.block + 3, []
+        for one in stretches:
+            pair = np.stack([one, smoothed(one, passing, policy)]) / step
+            if one.size >= size:
+                pairs.append(sliding_window_view(pair, size, axis=1)[:, :: policy.block])
+        if not pairs:
+            return cls(*np.zeros((3, 0, size)))
+        recorded, even = np.concatenate(pairs, axis=1)
+        chosen = slice(None, None, max(len(even) // _BLOCKS, 1))
+        normal = np.random.default_rng(len(stretches)).normal(size=even[chosen].shape)
+        return cls(recorded[chosen], even[chosen], normal)
+
+    def unlikeness_of_noise(self, share: float) -> float:
+        """How unlike a noise of a share of a step before the rounding makes the blocks."""
+        noisy = self.even + share * self.normal
+        return self._unlikeness([np.round(noisy + shift) for shift in _SHIFTS])
+
+    def unlikeness_of_means(self, readings: int) -> float:
+        """How unlike means of readings, each in steps of as many of the samples' own, make them."""
+        return self._unlikeness(
+            [
+                self.even + np.apply_along_axis(readings_error, 1, self.even, 1.0, readings, shift)
+                for shift in _SHIFTS
+            ]
+        )
+
+    def _unlikeness(self, made: Sequence[Array]) -> float:
+        """Mean deviance of the power of their third differences, large ones alike."""
+        shown = _third_power(self.recorded) + _UNSEEN
+        like = np.mean([_third_power(one) for one in made], axis=0) + _UNSEEN
+        return float((np.log(like) + np.minimum(shown / like, _FAR)).mean()) if like.size else 0.0
+
+
+def _third_power(blocks: Array) -> Array:
+    """Mean square of third differences in each block [B, n]: [B]."""
+    power: Array = np.square(np.diff(blocks, 3, axis=1)).mean(axis=1)
+    return power
 
 
 def _of_differences(stretches: Sequence[Array], policy: SensorNoise) -> float:
@@ -331,37 +381,17 @@ def are_means(stretches: Sequence[Array], step: float, readings: int, policy: Se
     -------
     bool
         Whether the means predict where in the record third differences are large better than a
-        noise that is the same throughout does, by the likelihood of their power in blocks.
+        noise that is the same throughout does.
 
     Notes
     -----
-    Means of a motion that crosses a step of a reading within a sample have a part of its error, and
-    those of one that stays within it all of it.
+    Means of a motion that crosses steps of a reading within a sample have a part of its error, and
+    those of one that stays within a step all of it.
 
     """
-    coarse, powers = readings * step, []
-    for one in stretches:
-        even = smoothed(one, coarse, policy)
-        errors = [readings_error(even, step, readings, shift) for shift in _SHIFTS]
-        blocks = max(one.size // policy.block, 1)
-        if one.size >= policy.block:
-            powers.append(
-                [
-                    np.mean([_block_powers(part, blocks) for part in parts], axis=0)
-                    for parts in ([one], errors)
-                ]
-            )
-    if not powers:
-        return True
-    shown, of_means = np.concatenate(powers, axis=1)
-    of_means = np.maximum(of_means, _FLOATING * max(float(of_means.max()), 1e-300))
-    by_means = np.mean(np.log(of_means) + shown / of_means)
-    return bool(by_means < math.log(max(float(shown.mean()), 1e-300)) + 1.0)
-
-
-def _block_powers(signal: Array, blocks: int) -> list[float]:
-    """Mean square of third differences in blocks of a signal [n]."""
-    return [float(np.mean(part**2)) for part in np.array_split(np.diff(signal, 3), blocks)]
+    blocks = _Blocks.of(stretches, step, policy)
+    noise = dither_of(stretches, step, policy) / step
+    return blocks.unlikeness_of_means(readings) <= blocks.unlikeness_of_noise(noise)
 
 
 def rounding_step(signal: Array, policy: SensorNoise) -> float:

@@ -271,6 +271,17 @@ def test_noise_before_a_rounding_is_what_the_rounding_alone_does_not_make(pace, 
     assert dither / step == pytest.approx(share, abs=0.1)
 
 
+@pytest.mark.parametrize("share", [0.2, 0.6])
+@pytest.mark.parametrize("paces", [(5.44, 12.49, 14.43), (19.43, 19.25, 18.41)])
+def test_noise_before_a_rounding_is_found_at_a_few_even_paces(share, paces):
+    """A spin at three speeds: near half a step the steps alone are louder than with the noise."""
+    step, random = 2.0 * np.pi / 2**13, np.random.default_rng(2)
+    moved = np.cumsum(np.repeat(paces, 1400))
+    noisy = moved + share * random.standard_normal(moved.size)
+    dither = dither_of([step * np.round(noisy)], step, SENSORS)
+    assert dither / step == pytest.approx(share, abs=0.04)
+
+
 @pytest.mark.parametrize("turns", [0.0, 40.0])
 def test_noise_that_a_filter_made_smooth_is_found_beside_a_motion(turns):
     """Of a filter with gain 1 a slow window sees the noise as it was before; samples do not."""
