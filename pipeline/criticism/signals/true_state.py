@@ -348,10 +348,10 @@ def _in_time(
     points, policy = x.theta_rad.size // segment.size, x.machine.policy.cutting
     speed = np.gradient(x.theta_rad[::points], segment.ts_s)
     bent = bend_s2 * np.gradient(speed, segment.ts_s)
-    if lag_s > 0.0:
-        bent = np.concatenate(
-            [_lagged(part, segment.ts_s / lag_s) for part in np.split(bent, joins(segment))]
-        )
+    if bend_s2:
+        step = segment.ts_s / lag_s if lag_s > 0.0 else math.inf
+        parts = np.split(bent, joins(segment))
+        bent = np.concatenate([_lagged(part, step) for part in parts])
     ahead = late_s * speed + bent
     omega = late_s * np.gradient(x.omega_rad_s, segment.ts_s / points)
     if bend_s2:
@@ -368,11 +368,15 @@ def _in_time(
 
 
 def _lagged(part: Array, step: float) -> Array:
-    """Second differences [n] of what follows without a gap, behind a lag; those of the two samples
-    at either end reach across gaps, and are those of their neighbours instead.
+    """Second differences [n] of what follows without a gap, behind a lag, none of an infinite step;
+    those of the two samples at either end reach across gaps, and are those of their neighbours
+    instead.
     """
     inner = part[2:-2]
-    return lagged(np.pad(inner, 2, mode="edge"), step) if inner.size else part
+    if inner.size == 0:
+        return part
+    known = np.pad(inner, 2, mode="edge")
+    return known if math.isinf(step) else lagged(known, step)
 
 
 def _speed(theta: Array, period: float, finer: int, policy: Cutting) -> Array:
