@@ -356,7 +356,8 @@ def _largest(captures: Iterable[Capture], names: tuple[str, ...]) -> float:
 def _speed(capture: Capture) -> float:
     """The largest speed [rad/s] but for spikes; 0 of an angle that moves by its rounding alone.
 
-    Of a turn by hand without an angle it is that of one turn in its time.
+    Of a spin without either it is the mean one by the phase of its voltages, of a turn by hand that
+    of one turn in its time.
     """
     if capture.has("omega_mech_rad_s"):
         speed = capture.arrays("omega_mech_rad_s")["omega_mech_rad_s"]
@@ -369,6 +370,14 @@ def _speed(capture: Capture) -> float:
                 return 0.0
             speed = np.gradient(theta, columns["t_s"])
             return float(np.nanquantile(np.abs(speed), 0.999))
+    lines = [name for name in LINES_V if capture.has("t_s", name)]
+    if capture.meta.test == "open_circuit" and len(lines) > 1:
+        columns = capture.finite("t_s", *lines)
+        time = columns.pop("t_s")
+        turned = (
+            float(np.ptp(np.unwrap(np.angle(vector_of_lines(columns))))) if time.size > 1 else 0.0
+        )
+        return turned / float(np.ptp(time)) / (capture.meta.pole_pairs or 1) if turned else 0.0
     if capture.meta.test == "hand_turn" and capture.has("t_s"):
         return TURN_RAD / float(np.ptp(capture.arrays("t_s")["t_s"]))
     return 0.0
