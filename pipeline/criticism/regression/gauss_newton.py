@@ -92,6 +92,9 @@ def gauss_newton(
     for _ in range(policy.iterations if system.deviance < most else 0):
         fit = system.fit
         step = bounded_step(_damped(system), system.columns, fit.model, fit.values)
+        if fresh and (farther := _after_whole_step(system, step)) is not None:
+            system = farther
+            continue
         if system.deviance - system.predicted_deviance(step) >= policy.converged:
             halvings = policy.halvings if fresh else 1
             tried, predicted_fall = _tried(system, step, halvings)
@@ -108,6 +111,22 @@ def gauss_newton(
             break
         system, fresh = linear_system(system.fit, before=system), True
     return system if fresh else linear_system(system.fit, before=system)
+
+
+def _after_whole_step(system: LinearSystem, damped: Array) -> LinearSystem | None:
+    """The system after the step that captures ask for, where its `damped` part is a small one of it
+    and it does what they predict; else None.
+
+    A coast knows friction over inertia, and one torque beside it their sizes: along that line no
+    capture's prediction bends, and ten times the inertia is a step as good as any.
+    """
+    policy, fit = system.policy.fit, system.fit
+    whole = bounded_step(_undamped(system), system.columns, fit.model, fit.values)
+    falls = [system.deviance - system.predicted_deviance(step) for step in (damped, whole)]
+    if max(falls[0], policy.converged) >= policy.kept_share * falls[1]:
+        return None
+    tried = linear_system(fit.moved(system.columns, whole), before=system)
+    return tried if system.deviance - tried.deviance >= policy.kept_share * falls[1] else None
 
 
 def _tried(system: LinearSystem, step: Array, halvings: int) -> tuple[LinearSystem, float]:
@@ -152,9 +171,12 @@ def _two_whole_steps(system: LinearSystem, step: Array, shortened: LinearSystem)
 def _damped(system: LinearSystem) -> Best:
     """The best step along some of the columns, none of them far."""
     ridge = _ridge(system.fit, system.columns)
-    normal_equations = replace(
-        system, prior_precision=system.prior_precision + ridge
-    ).normal_equations()
+    return _undamped(replace(system, prior_precision=system.prior_precision + ridge))
+
+
+def _undamped(system: LinearSystem) -> Best:
+    """The best step along some of the columns."""
+    normal_equations = system.normal_equations()
     return lambda live: normal_equations.only(live).best()
 
 

@@ -10,8 +10,10 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.data.segment import rows_where
 from pipeline.criticism.diagnosis import base_fit
+from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown
@@ -22,11 +24,15 @@ from pipeline.criticism.regression.gauss_newton import (
     summed_error,
 )
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.residuals.segments import sparse
+from pipeline.criticism.residuals.segments import segments, sparse
 from pipeline.criticism.selection.refit import floored_anew
+from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
+from pipeline.simulator.bench import campaign
+from pipeline.simulator.design import EXACT, Bench
+from tests.simulated import campaign_of, design
 from tests.unit.criticism.machines import BASE, coasting, fitted, log, machine, with_drag
 
 STRIBECK = Model(machine(), (effects()["stribeck"],))
@@ -247,3 +253,26 @@ def test_a_step_from_far_too_large_an_inertia_is_one_of_its_reciprocal():
     assert moved is not None
     assert [moved.values[name] for name in names] == pytest.approx(wanted.tolist())
     assert fit.moved_over_inertia({name: change / 100.0 for name, change in step.items()}) is None
+
+
+def test_a_torque_beside_a_coast_is_a_whole_step_away_from_a_tenth_of_the_inertia():
+    """A coast knows friction over inertia. Steps of the inertia's own size would need ten, and each
+    seems to win next to nothing.
+    """
+    motor = replace(design("joint-11p"), effects={})
+    plan = (("cogging", "cogging", {"direction": -1}), ("spin_down", "spin_down", {}))
+    made = campaign_of(campaign(motor, Bench(instruments=EXACT, encoder_bits=12), 1, plan))
+    parts = {"cogging": 0.3, "spin_down": 0.15}
+    captures = (
+        replace(one, tables=tuple(t.tail(int(parts[one.meta.test] * t.height)) for t in one.tables))
+        for one in made.captures
+    )
+    short = replace(made, captures=tuple(captures))
+    found = machine_of(short, Constants())
+    cut = segments(short, found)
+    sound = fit_of(cut, model_of(ModelSpec(), found)).system.fit
+    shaft = ("j_kgm2", "b_nm_s_rad", "coulomb_friction.torque_nm")
+    light = {**sound.values, **{name: 0.1 * sound.values[name] for name in shaft}}
+    begun = Fit(cut, sound.model, light, floors(cut, sound.model, light), light)
+    end = gauss_newton(begun).fit.values
+    assert end["j_kgm2"] == pytest.approx(motor.j_rotor_kgm2, rel=0.05)
