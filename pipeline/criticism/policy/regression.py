@@ -29,6 +29,10 @@ class GaussNewton:
     converged : −2 log L
         fall of deviance that is not worth a step
         derived: a twelfth of `selection.tie`
+    far_reach : 1
+        reach of a far step over that of a usual one
+        chosen: two orders of magnitude are what a start may be off by; without any bound, what
+        captures do not know moves as well
     kept_share : 1
         share of its predicted fall that a step must reach for its columns to stay
         chosen: at 1 columns are made anew at every step; much lower, and stale ones gain little
@@ -83,6 +87,7 @@ class GaussNewton:
     halvings: int = 3
     shortening: float = 0.3
     converged: float = 1.0
+    far_reach: float = 100.0
     kept_share: float = 0.9
     pinned: float = 1e-3
     contradicted: float = 2.5758

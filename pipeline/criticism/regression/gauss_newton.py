@@ -92,7 +92,7 @@ def gauss_newton(
     for _ in range(policy.iterations if system.deviance < most else 0):
         fit = system.fit
         step = bounded_step(_damped(system), system.columns, fit.model, fit.values)
-        if fresh and (farther := _after_whole_step(system, step)) is not None:
+        if fresh and (farther := _after_far_step(system, step)) is not None:
             system = farther
             continue
         if system.deviance - system.predicted_deviance(step) >= policy.converged:
@@ -113,19 +113,20 @@ def gauss_newton(
     return system if fresh else linear_system(system.fit, before=system)
 
 
-def _after_whole_step(system: LinearSystem, damped: Array) -> LinearSystem | None:
-    """The system after the step that captures ask for, where its `damped` part is a small one of it
-    and it does what they predict; else None.
+def _after_far_step(system: LinearSystem, damped: Array) -> LinearSystem | None:
+    """The system after a step of a hundred times the reach, where the `damped` one wins less and it
+    does what it predicts; else None.
 
     A coast knows friction over inertia, and one torque beside it their sizes: along that line no
     capture's prediction bends, and ten times the inertia is a step as good as any.
     """
     policy, fit = system.policy.fit, system.fit
-    whole = bounded_step(_undamped(system), system.columns, fit.model, fit.values)
-    falls = [system.deviance - system.predicted_deviance(step) for step in (damped, whole)]
+    far = _damped(system, policy.far_reach)
+    farther = bounded_step(far, system.columns, fit.model, fit.values)
+    falls = [system.deviance - system.predicted_deviance(step) for step in (damped, farther)]
     if max(falls[0], policy.converged) >= policy.kept_share * falls[1]:
         return None
-    tried = linear_system(fit.moved(system.columns, whole), before=system)
+    tried = linear_system(fit.moved(system.columns, farther), before=system)
     return tried if system.deviance - tried.deviance >= policy.kept_share * falls[1] else None
 
 
@@ -168,15 +169,12 @@ def _two_whole_steps(system: LinearSystem, step: Array, shortened: LinearSystem)
     return min(shortened, end, key=lambda one: one.deviance)
 
 
-def _damped(system: LinearSystem) -> Best:
-    """The best step along some of the columns, none of them far."""
-    ridge = _ridge(system.fit, system.columns)
-    return _undamped(replace(system, prior_precision=system.prior_precision + ridge))
-
-
-def _undamped(system: LinearSystem) -> Best:
-    """The best step along some of the columns."""
-    normal_equations = system.normal_equations()
+def _damped(system: LinearSystem, reach: float = 1.0) -> Best:
+    """The best step along some of the columns, none of them much farther than its `reach`."""
+    ridge = _ridge(system.fit, system.columns) / reach**2
+    normal_equations = replace(
+        system, prior_precision=system.prior_precision + ridge
+    ).normal_equations()
     return lambda live: normal_equations.only(live).best()
 
 

@@ -254,10 +254,13 @@ def _is_over(n: float, reduced_chi2: float, policy: Goodness) -> bool:
 
 
 def _without_worst(floors: Array, window: Indices, rows: Flags) -> tuple[int, float]:
-    """Number and mean square of `rows` of a group, in `floors` [R], without its worst window."""
+    """Number and mean square of `rows` of a group, in `floors` [R], without its worst window, if
+    there is another one.
+    """
     squares, windows = floors[rows] ** 2, window[rows]
     rest = squares[windows != np.argmax(np.bincount(windows, squares))]
-    return rest.size, float(rest.mean()) if rest.size else 0.0
+    rest = rest if rest.size else squares
+    return rest.size, float(rest.mean())
 
 
 @cache
