@@ -21,7 +21,6 @@ from pipeline.criticism.data.shaft_angle import ANGLES, shaft_angle, with_angle
 from pipeline.criticism.data.traces import (
     LINES_V,
     even_clock,
-    parabolas,
     smoothed,
     thinned,
     window_between_gaps,
@@ -189,7 +188,7 @@ def _by_voltage(columns: dict[str, Array], machine: Machine, window: int, period
         waves = np.exp(1j * orders * angle[:, None])
         basis, deviation = np.column_stack([waves.real, waves.imag]), upright - angle
         coefficients = np.linalg.lstsq(basis[inside], deviation[inside], rcond=None)[0]
-        angle += parabolas(deviation - basis @ coefficients, short)
+        angle += smoothed(deviation - basis @ coefficients, short)
     columns["theta_mech_rad"] = angle / machine.pole_pairs
     return inside
 

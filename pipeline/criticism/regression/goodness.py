@@ -232,14 +232,16 @@ def _groups_over_floor(
     beat with it, at a pace that is known too badly for its floor to say so.
     """
     policy, residual = system.policy.goodness, system.residual
-    floors = residual / noise_ratio
+    floors, of_segment = residual / noise_ratio, system.segment
     reduced_chi2, counts = system.reduced_chi2(floors), system.counts
     for place, (number, channel, order) in enumerate(system.labels):
         n, q = counts[place], reduced_chi2[place]
         if not _is_over(n, q, policy):
             continue
         in_group = system.group == place
-        if order and not _is_over(*_without_worst(floors, system.window, in_group), policy):
+        in_segment = of_segment == number
+        rest = _without_worst(floors, system.window, in_group, in_segment)
+        if order and not _is_over(*rest, policy):
             continue
         precision = (system.unit * noise_ratio)[in_group] ** -2.0
         size = math.sqrt((q - 1.0) / float(precision.mean()))
@@ -253,14 +255,16 @@ def _is_over(n: float, reduced_chi2: float, policy: Goodness) -> bool:
     return reduced_chi2 > highest
 
 
-def _without_worst(floors: Array, window: Indices, rows: Flags) -> tuple[int, float]:
-    """Number and mean square of `rows` of a group, in `floors` [R], without its worst window, if
-    there is another one.
+def _without_worst(
+    floors: Array, window: Indices, rows: Flags, segment: Flags
+) -> tuple[int, float]:
+    """Number and mean square of `rows` of a group, in `floors` [R], without its worst window; with
+    it where its `segment` [R] has no other.
     """
     squares, windows = floors[rows] ** 2, window[rows]
-    rest = squares[windows != np.argmax(np.bincount(windows, squares))]
-    rest = rest if rest.size else squares
-    return rest.size, float(rest.mean())
+    if np.ptp(window[segment]):
+        squares = squares[windows != np.argmax(np.bincount(windows, squares))]
+    return squares.size, float(squares.mean()) if squares.size else 0.0
 
 
 @cache

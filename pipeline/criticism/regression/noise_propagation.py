@@ -18,6 +18,7 @@ from pipeline.criticism.data.segment import (
     row_index,
 )
 from pipeline.criticism.data.traces import LINES_V, READ_BETWEEN, parabolas
+from pipeline.criticism.data.traces import smoothed as box_mean
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.operating import Array, Indices, Signals, Values
 from pipeline.criticism.policy.sensors import SensorNoise
@@ -211,7 +212,7 @@ class _Recording:
         before, after = of_lines
         error = np.angle(after * np.conj(before)) / self.model.machine.pole_pairs
         width = self.segment.sensors.phase_samples
-        theta: Array = self.segment.recorded["theta_mech_rad"] + parabolas(error, width)
+        theta: Array = self.segment.recorded["theta_mech_rad"] + box_mean(error, width)
         return theta
 
     def roundings(self, count: int) -> Iterator[Array]:
