@@ -240,8 +240,9 @@ def _groups_over_floor(
             continue
         in_group = system.group == place
         in_segment = of_segment == number
-        rest = _without_worst(floors, system.window, in_group, in_segment)
-        if order and not _is_over(*rest, policy):
+        if order and not _is_over(
+            *_without_worst(floors, system.window, in_group, in_segment), policy
+        ):
             continue
         precision = (system.unit * noise_ratio)[in_group] ** -2.0
         size = math.sqrt((q - 1.0) / float(precision.mean()))

@@ -275,6 +275,28 @@ def test_few_samples_are_over_their_floor_by_chance_far_more_often(count, q, tol
     assert bool(over_floor(few)) == told
 
 
+@pytest.mark.parametrize(("windows", "told"), [(1, True), (2, False), (9, False)])
+def test_a_wave_in_one_window_of_several_is_none_of_the_motors(windows, told):
+    """At the pace of one window an encoder's steps may beat with it; a slow turn has but one."""
+    running = log()
+    fit = Fit((running,), Model(machine(), ()), dict(BASE), (unit_floor(running),), dict(BASE))
+    system = linear_system(fit)
+    place = next(n for n, (_, name, order) in enumerate(system.labels) if name == "vq_v" and order)
+    window = np.repeat(np.arange(windows), 2)
+    residual = np.where(window == 0, 30.0, 1.0)
+    one = replace(
+        system,
+        group=np.full(window.size, place),
+        window=window,
+        residual=residual,
+        noise_ratio=np.ones(window.size),
+        unit=np.ones(window.size),
+    )
+    assert bool(over_floor(one)) == told
+    both = replace(one, residual=np.where(window < 2, 30.0, 1.0))
+    assert over_floor(both)
+
+
 def test_a_capture_left_out_is_predicted_from_the_others():
     """As a fit to the others alone predicts it, which is not as the fit to all of them has it."""
     segments = tuple(log(noise=1.0, seed=n) for n in (5, 6, 7))
