@@ -74,6 +74,9 @@ class Selection:
     form_error : 1
         share of an effect of the same hook that its form may be wrong by
         chosen: windage that only takes up what the formula of Stribeck friction leaves is not there
+    informed_share : 1
+        share of the information on an effect from which on a capture is one that tells of it
+        chosen: what a capture adds to a hundred times as much is nothing
     least_u : standard uncertainties
         distance from zero that some amplitude of a named effect must have
         chosen: 95 %
@@ -150,6 +153,7 @@ class Selection:
     held_out_penalties: float = 0.5
     same_hook_penalties: float = 3.0
     form_error: float = 0.05
+    informed_share: float = 0.01
     least_u: float = 2.0
     most_penalties: float = 4.0
     floor_ratio: float = 1.5

@@ -328,6 +328,31 @@ class LinearSystem:
         """
         return self.residual + self.matrix[:, places] @ step
 
+    def informed(self, places: Indices) -> int:
+        """Weak samples of the captures that tell of some columns.
+
+        Parameters
+        ----------
+        places
+            Of the columns [k].
+
+        Returns
+        -------
+        int
+            All samples of a segment that has its share of the columns' information; two at least.
+
+        References
+        ----------
+        Berger, Bayarri and Pericchi, Econometric Reviews 33 (2014) 197, the effective sample size,
+        doi:10.1080/07474938.2013.807157.
+
+        """
+        squares = self.matrix[:, places] ** 2
+        shares = (squares / np.maximum(squares.sum(axis=0), 1e-300)).max(axis=1)
+        of_segment = np.bincount(self.segment, shares, len(self.segments))
+        rows = np.bincount(self.segment, minlength=len(self.segments))
+        return max(int(rows[of_segment > self.policy.selection.informed_share].sum()), 2)
+
     def covariance(self, places: Indices) -> Array:
         """Covariance of parameters when they are fitted together.
 

@@ -52,9 +52,10 @@ def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
     by one, and with them the terms that to first order are worth less than `tangent_penalties`.
 
     """
-    penalty = math.log(max(system.size, 2))
     for name in names:
         effect = system.fit.effect(name)
+        own = system.place(f"{name}.{p.name}" for p in effect.parameters_of(system.fit.machine))
+        penalty = math.log(system.informed(own))
         spare = _spare(system, effect, penalty)
         if not spare:
             continue

@@ -151,12 +151,12 @@ def score_all(
 
     """
     scoring, policy = _Scoring.of(system, significant), system.policy.selection
-    penalty = math.log(float(system.size))
     searched_of = {c.effect.name: searched(offered, c.effect) for c in offered}
     best: dict[str, tuple[Score, Indices]] = {}
     for candidate, places in placed(system, offered):
         score = scoring.score(candidate, places, policy.quick)
-        cost = paid_for(candidate.effect, system.fit.machine, score) * penalty
+        count = paid_for(candidate.effect, system.fit.machine, score)
+        cost = count * math.log(system.informed(places))
         cost += searched_of[candidate.effect.name]
         if score is not None and score.fall > policy.quick_penalties * cost:
             score = scoring.score(candidate, places, policy.thorough)
