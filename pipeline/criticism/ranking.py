@@ -76,11 +76,12 @@ def _ranked_added(
     passed_over = _passed_over(steps, effect.name, steps[-1].added)
     alternatives = alternatives_to(effect.name, wide, offered, passed_over)
     dof = effect.dof(wide.fit.machine)
-    loss = _loss(wide, effect, dof)
+    cost = dof * math.log(wide.informed(wide.place(effect.named(wide.fit.machine))))
+    loss = _loss(wide, effect, cost)
     parameters = _parameters(steps[-1], effect, ladder.held_out[-1])
     return RankedEffect(
         effect=effect.name,
-        score=loss - dof * math.log(wide.size),
+        score=loss - cost,
         held_out_drop=_share_of_fall(steps, ladder.held_out, effect.name),
         p_value=_p_value(loss, dof),
         confused_with=alternatives,
@@ -92,13 +93,13 @@ def _ranked_added(
     )
 
 
-def _loss(last: LinearSystem, effect: Effect, dof: int) -> float:
+def _loss(last: LinearSystem, effect: Effect, cost: float) -> float:
     """Rise of deviance without a found effect: to first order, or of a refit where that says that
     the effect is not worth its parameters. The linear step says little where parameters are
     strongly correlated.
     """
     loss = loss_without(last, (effect.name,))
-    if loss > dof * math.log(last.size):
+    if loss > cost:
         return loss
     return max(loss, gauss_newton(last.fit.without(effect.name)).deviance - last.deviance)
 

@@ -33,7 +33,9 @@ ARITHMETIC = {
     "machine/iron.py": {"PARALLEL"},  # a choice of an effect
     "machine/inverter.py": {
         "_OTHERS",
-        "_ROUNDS",
+        "_SHARES",
+        "_BETWEEN",
+        "_BLOCKS",
         "_SHARP",
         "_SHORT",
         "_SIN_120",
@@ -75,7 +77,9 @@ ARITHMETIC = {
         "_DIGITS",
         "_MOST_DECIMALS",
         "_SHIFTS",
-        "_ROUNDS",
+        "_SHARES",
+        "_BETWEEN",
+        "_BLOCKS",
     },
     "data/machine_scale.py": {"_BINS_AN_ORDER", "_SAME_ANGLE"},  # twice Nyquist; rounding
     "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight

@@ -35,9 +35,6 @@ _BETWEEN = 5
 _BLOCKS = 120
 """Parts of a step by which a motion is moved to be rounded anew, evenly spread; trial noises before
 the rounding [steps], and how many lie between the best two; blocks that are looked at."""
-_UNSEEN, _FAR = 1e-3, 8.0
-"""Power of third differences [steps²] that is none; ratio of two powers from which on all are
-alike: a jump is no noise."""
 _DIGITS = 1e-3
 """Share of a step that the digits of a file may leave where there is none."""
 _FLOATING = 1e-9
@@ -245,12 +242,13 @@ def dither_of(stretches: Sequence[Array], step: float, policy: SensorNoise) -> f
 @dataclass(frozen=True, slots=True)
 class _Blocks:
     """Blocks [B, n] of an angle in steps, evenly spread over its record: as recorded, and as it was
-    before its rounding as far as the record tells.
+    before its rounding as far as the record shows.
     """
 
     recorded: Array
     even: Array
     normal: Array
+    burst: float
 
     @classmethod
     def of(cls, stretches: Sequence[Array], step: float, policy: SensorNoise) -> _Blocks:
@@ -263,11 +261,11 @@ class _Blocks:
             if one.size >= size:
                 pairs.append(sliding_window_view(pair, size, axis=1)[:, :: policy.block])
         if not pairs:
-            return cls(*np.zeros((3, 0, size)))
+            return cls(*np.zeros((3, 0, size)), policy.burst)
         recorded, even = np.concatenate(pairs, axis=1)
         chosen = slice(None, None, max(len(even) // _BLOCKS, 1))
         normal = np.random.default_rng(len(stretches)).normal(size=even[chosen].shape)
-        return cls(recorded[chosen], even[chosen], normal)
+        return cls(recorded[chosen], even[chosen], normal, policy.burst)
 
     def unlikeness_of_noise(self, share: float) -> float:
         """How unlike a noise of a share of a step before the rounding makes the blocks."""
@@ -284,10 +282,11 @@ class _Blocks:
         )
 
     def _unlikeness(self, made: Sequence[Array]) -> float:
-        """Mean deviance of the power of their third differences, large ones alike."""
-        shown = _third_power(self.recorded) + _UNSEEN
-        like = np.mean([_third_power(one) for one in made], axis=0) + _UNSEEN
-        return float((np.log(like) + np.minimum(shown / like, _FAR)).mean()) if like.size else 0.0
+        """Mean deviance of the power of their third differences; a jump is as bad as any."""
+        shown = _third_power(self.recorded) + _DIGITS
+        like = np.mean([_third_power(one) for one in made], axis=0) + _DIGITS
+        apart = np.log(like) + np.minimum(shown / like, self.burst)
+        return float(apart.mean()) if apart.size else 0.0
 
 
 def _third_power(blocks: Array) -> Array:

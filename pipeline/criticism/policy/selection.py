@@ -75,7 +75,7 @@ class Selection:
         share of an effect of the same hook that its form may be wrong by
         chosen: windage that only takes up what the formula of Stribeck friction leaves is not there
     informed_share : 1
-        share of the information on an effect from which on a capture is one that tells of it
+        share of the information on an effect from which on a capture shows it
         chosen: what a capture adds to a hundred times as much is nothing
     least_u : standard uncertainties
         distance from zero that some amplitude of a named effect must have

@@ -329,7 +329,7 @@ class LinearSystem:
         return self.residual + self.matrix[:, places] @ step
 
     def informed(self, places: Indices) -> int:
-        """Weak samples of the captures that tell of some columns.
+        """Weak samples of the captures that show some columns.
 
         Parameters
         ----------

@@ -47,14 +47,15 @@ def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
 
     Notes
     -----
-    A term is worth its parameters when −2 log L falls by more than ln n a parameter. All terms that
-    to first order are not are left out in one refit. Where that loses too much, they are tried one
-    by one, and with them the terms that to first order are worth less than `tangent_penalties`.
+    A term is worth its parameters when −2 log L falls by more than ln n a parameter, n the rows of
+    the captures that show the effect. All terms that to first order are not are left out in one
+    refit. Where that loses too much, they are tried one by one, and with them the terms that to
+    first order are worth less than `tangent_penalties`.
 
     """
     for name in names:
         effect = system.fit.effect(name)
-        own = system.place(f"{name}.{p.name}" for p in effect.parameters_of(system.fit.machine))
+        own = system.place(effect.named(system.fit.machine))
         penalty = math.log(system.informed(own))
         spare = _spare(system, effect, penalty)
         if not spare:
@@ -269,7 +270,8 @@ def without_superfluous(system: LinearSystem, base: int) -> LinearSystem:
     """
     factor = system.policy.selection.most_penalties
     for effect in system.fit.model.effects[base:-1]:
-        penalty = effect.dof(system.fit.machine) * math.log(system.size)
+        own = system.place(effect.named(system.fit.machine))
+        penalty = effect.dof(system.fit.machine) * math.log(system.informed(own))
         if material(system.fit, effect) and loss_without(system, (effect.name,)) > factor * penalty:
             continue
         tried = gauss_newton(system.fit.without(effect.name), before=system)

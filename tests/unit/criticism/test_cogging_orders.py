@@ -71,6 +71,21 @@ def test_one_coast_shows_cogging_and_its_size_over_the_inertia(name, seed, order
     assert math.hypot(*parts) * motor.j_rotor_kgm2 == pytest.approx(size_nm, rel=0.05)
 
 
+@pytest.mark.parametrize("name", ["servo-ipm", pytest.param("gimbal-5208", marks=pytest.mark.slow)])
+def test_a_slow_turn_beside_a_torque_map_shows_its_cogging(name):
+    """Its parameters paid for all rows of the map, which tell nothing of them: -8 of evidence."""
+    motor = design(name)
+    motor = replace(motor, effects={"cogging": motor.effects["cogging"]})
+    plan = (
+        ("cogging_cw", "cogging", {"direction": 1}),
+        ("torque_map_slow", "torque_map", {"speed": 0.2}),
+    )
+    one = campaign_of(campaign(motor, Bench(instruments=EXACT), 1, plan))
+    result = pipeline.diagnose(pipeline.Recordings({one.motor_id: one}))[one.motor_id]
+    assert result.missing == ("cogging",)
+    assert result.ranking[0].score > 0.0
+
+
 def test_orders_are_those_that_magnets_and_slots_make():
     """A slow turn decides; without one, p, 2p, the slots, their LCM and its double may be there,
     and what logs show where it is a multiple of them.
