@@ -33,9 +33,7 @@ ARITHMETIC = {
     "machine/iron.py": {"PARALLEL"},  # a choice of an effect
     "machine/inverter.py": {
         "_OTHERS",
-        "_SHARES",
-        "_BETWEEN",
-        "_BLOCKS",
+        "_ROUNDS",
         "_SHARP",
         "_SHORT",
         "_SIN_120",

@@ -261,7 +261,8 @@ class _Blocks:
             if one.size >= size:
                 pairs.append(sliding_window_view(pair, size, axis=1)[:, :: policy.block])
         if not pairs:
-            return cls(*np.zeros((3, 0, size)), policy.burst)
+            none = np.zeros((0, size))
+            return cls(none, none, none, policy.burst)
         recorded, even = np.concatenate(pairs, axis=1)
         chosen = slice(None, None, max(len(even) // _BLOCKS, 1))
         normal = np.random.default_rng(len(stretches)).normal(size=even[chosen].shape)
