@@ -122,7 +122,7 @@ def even_clock(
         if not finite.all() and finite.any():
             columns[name] = np.interp(time, time[finite], column[finite])
             keep &= finite
-    uneven = np.abs(np.diff(time) - period).max() > policy.clock_even * period
+    uneven = not _is_even(time, policy)
     clock = _counts(time, columns, policy) if uneven else None
     if clock:
         period, number = clock
@@ -179,11 +179,18 @@ def on_counts(capture: Capture, name: str, policy: Cutting) -> Array:
     """
     table = capture.tables[capture.table_of("t_s", name)]
     time, column = table["t_s"].to_numpy(), table[name].to_numpy()
-    period = float(np.median(np.diff(time)))
-    uneven = np.abs(np.diff(time) - period).max() > policy.clock_even * period
     known = np.isfinite(column)
-    clock = _counts(time[known], {name: column[known]}, policy) if uneven else None
+    if not _rises(table) or known.sum() < _SHORTEST or _is_even(time, policy):
+        return column
+    clock = _counts(time[known], {name: column[known]}, policy)
     return column if clock is None else _placed(column[known], clock[1])
+
+
+def _is_even(time: Array, policy: Cutting) -> bool:
+    """Whether a clock [n, s] is even within a thousandth of its period."""
+    steps = np.diff(time)
+    period = float(np.median(steps))
+    return bool(np.abs(steps - period).max() <= policy.clock_even * period)
 
 
 def _counts(

@@ -232,8 +232,8 @@ def _groups_over_floor(
     beat with it, at a pace that is known too badly for its floor to say so.
     """
     policy, residual = system.policy.goodness, system.residual
-    floors, of_segment = residual / noise_ratio, system.segment
-    reduced_chi2, counts = system.reduced_chi2(floors), system.counts
+    in_floors, of_segment = residual / noise_ratio, system.segment
+    reduced_chi2, counts = system.reduced_chi2(in_floors), system.counts
     for place, (number, channel, order) in enumerate(system.labels):
         n, q = counts[place], reduced_chi2[place]
         if not _is_over(n, q, policy):
@@ -241,7 +241,7 @@ def _groups_over_floor(
         in_group = system.group == place
         in_segment = of_segment == number
         if order and not _is_over(
-            *_without_worst(floors, system.window, in_group, in_segment), policy
+            *_without_worst(in_floors, system.window, in_group, in_segment), policy
         ):
             continue
         precision = (system.unit * noise_ratio)[in_group] ** -2.0
@@ -257,12 +257,12 @@ def _is_over(n: float, reduced_chi2: float, policy: Goodness) -> bool:
 
 
 def _without_worst(
-    floors: Array, window: Indices, rows: Flags, segment: Flags
+    in_floors: Array, window: Indices, rows: Flags, segment: Flags
 ) -> tuple[int, float]:
-    """Number and mean square of `rows` of a group, in `floors` [R], without its worst window; with
-    it where its `segment` [R] has no other.
+    """Number and mean square of a group's `rows` [R], in floors [R], without its worst window, where
+    the `segment` [R] has another.
     """
-    squares, windows = floors[rows] ** 2, window[rows]
+    squares, windows = in_floors[rows] ** 2, window[rows]
     if np.ptp(window[segment]):
         squares = squares[windows != np.argmax(np.bincount(windows, squares))]
     return squares.size, float(squares.mean()) if squares.size else 0.0
