@@ -259,7 +259,7 @@ def _is_over(n: float, reduced_chi2: float, policy: Goodness) -> bool:
 def _without_worst(
     in_floors: Array, window: Indices, rows: Flags, segment: Flags
 ) -> tuple[int, float]:
-    """Number and mean square of a group's `rows` [R], in floors [R], without its worst window, where
+    """Number and mean square of a group's `rows` [R], in floors [R], without its worst window where
     the `segment` [R] has another.
     """
     squares, windows = in_floors[rows] ** 2, window[rows]

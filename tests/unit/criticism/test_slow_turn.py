@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
@@ -65,6 +67,16 @@ def orders_of(*turns: Capture) -> list[int]:
 
 def test_a_turn_that_ends_a_sample_before_it_comes_round_is_a_whole_one():
     assert orders_of(slow_turn("a.csv", 0.06)) == [ORDER]
+
+
+def test_a_turn_that_lacks_values_has_the_spectrum_of_the_others():
+    whole = slow_turn("a.csv", 0.06)
+    (table,) = whole.tables
+    lacks = np.random.default_rng(1).uniform(size=table.height) < 0.02
+    holes = table.with_columns(
+        theta_mech_rad=np.where(lacks, np.nan, table["theta_mech_rad"].to_numpy())
+    )
+    assert orders_of(replace(whole, tables=(holes,))) == [ORDER]
 
 
 @pytest.mark.parametrize("counts", [3000, 4000, 5000, 10_000, 65_536])

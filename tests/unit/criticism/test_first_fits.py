@@ -1,0 +1,77 @@
+"""Where fits begin of motors that few tests, or coarse sensors, show."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.machine.model import BEND_SPEED, LAG_SPEED
+from pipeline.criticism.regression.gauss_newton import rough_fit
+from pipeline.criticism.residuals.residual import residual
+from pipeline.criticism.residuals.segments import segments
+from pipeline.criticism.selection.requested_model import fit_of
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.simulator.bench import campaign
+from pipeline.simulator.design import EXACT, Bench
+from pipeline.simulator.truth import truth
+from tests.simulated import campaign_of, design
+
+MOTOR = replace(design("gimbal-5208"), effects={})
+TRUE = truth(MOTOR)["constants"]
+MOTION = ("theta_mech_rad", "omega_mech_rad_s")
+DRIVE = ("drive_0", "drive", {})
+
+
+def recorded(*plan, gone: tuple[str, ...] = (), **bench) -> Campaign:
+    made = campaign_of(campaign(MOTOR, Bench(instruments=EXACT, **bench), 2, plan))
+    captures = (
+        replace(one, tables=tuple(t.drop(gone, strict=False) for t in one.tables))
+        for one in made.captures
+    )
+    return replace(made, captures=tuple(captures))
+
+
+def base(found: Campaign):
+    """Values of the standard model, fitted."""
+    machine = machine_of(found, Constants())
+    return fit_of(segments(found, machine), model_of(ModelSpec(), machine)).system.fit.values
+
+
+@pytest.mark.parametrize("noise_rad", [0.0, 5e-4])
+def test_a_rough_fit_has_the_inertia_of_a_coarse_and_noisy_encoder(noise_rad):
+    """By the machine's scale alone the noise of an acceleration took nine tenths of it away."""
+    found = recorded(DRIVE, encoder_bits=11, encoder_noise_rad=noise_rad)
+    machine = machine_of(found, Constants())
+    rough = rough_fit(segments(found, machine), model_of(ModelSpec(), machine))
+    assert 0.7 < rough.values["j_kgm2"] / MOTOR.j_rotor_kgm2 < 1.4
+
+
+def test_a_meter_beside_a_spin_gives_resistance_and_inductances():
+    values = base(recorded(("lcr", "lcr", {}), ("open_circuit", "open_circuit", {})))
+    assert values["r_ohm"] == pytest.approx(TRUE["r_phase_ohm"], rel=0.02)
+    assert values["ld_h"] == pytest.approx(TRUE["ld_h"], rel=0.05)
+    assert values["lq_h"] == pytest.approx(TRUE["lq_h"], rel=0.05)
+
+
+def test_a_spin_whose_voltages_alone_show_its_speed_gives_the_flux():
+    values = base(recorded(("open_circuit", "open_circuit", {}), gone=MOTION))
+    assert values["psi_wb"] == pytest.approx(TRUE["psi_pm_wb"], rel=0.01)
+
+
+def test_gaps_of_a_thinned_log_bend_no_speed():
+    """A lag far shorter than a row is none."""
+    found = recorded(DRIVE, gone=("theta_mech_rad",))
+    machine = machine_of(found, Constants())
+    model = model_of(ModelSpec(), machine)
+    (log,) = (one for one in segments(found, machine) if one.kind == "dq")
+    values = {**rough_fit((log,), model).values, BEND_SPEED: 1e-7}
+    at_once, soon = (
+        residual(log, model, {**values, LAG_SPEED: lag * log.ts_s}) for lag in (0.0, 1e-3)
+    )
+    assert np.abs(at_once - soon).max() < 1e-3 * np.abs(at_once).max()
