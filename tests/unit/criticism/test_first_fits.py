@@ -22,14 +22,17 @@ from pipeline.simulator.design import EXACT, Bench
 from pipeline.simulator.truth import truth
 from tests.simulated import campaign_of, design
 
-MOTOR = replace(design("gimbal-5208"), effects={})
-TRUE = truth(MOTOR)["constants"]
+GIMBAL = "gimbal-5208"
 MOTION = ("theta_mech_rad", "omega_mech_rad_s")
 DRIVE = ("drive_0", "drive", {})
 
 
-def recorded(*plan, gone: tuple[str, ...] = (), **bench) -> Campaign:
-    made = campaign_of(campaign(MOTOR, Bench(instruments=EXACT, **bench), 2, plan))
+def sound(motor: str):
+    return replace(design(motor), effects={})
+
+
+def recorded(motor: str, *plan, gone: tuple[str, ...] = (), **bench) -> Campaign:
+    made = campaign_of(campaign(sound(motor), Bench(instruments=EXACT, **bench), 2, plan))
     captures = (
         replace(one, tables=tuple(t.drop(gone, strict=False) for t in one.tables))
         for one in made.captures
@@ -43,30 +46,36 @@ def base(found: Campaign):
     return fit_of(segments(found, machine), model_of(ModelSpec(), machine)).system.fit.values
 
 
-@pytest.mark.parametrize("noise_rad", [0.0, 5e-4])
-def test_a_rough_fit_has_the_inertia_of_a_coarse_and_noisy_encoder(noise_rad):
+@pytest.mark.parametrize(
+    ("motor", "bits", "noise_rad"), [(GIMBAL, 11, 3e-4), ("joint-11p", 17, 1.5e-3)]
+)
+def test_a_rough_fit_has_the_inertia_of_a_coarse_or_noisy_encoder(motor, bits, noise_rad):
     """By the machine's scale alone the noise of an acceleration took nine tenths of it away."""
-    found = recorded(DRIVE, encoder_bits=11, encoder_noise_rad=noise_rad)
+    found = recorded(motor, DRIVE, encoder_bits=bits, encoder_noise_rad=noise_rad, pwm_hz=20e3)
     machine = machine_of(found, Constants())
     rough = rough_fit(segments(found, machine), model_of(ModelSpec(), machine))
-    assert 0.7 < rough.values["j_kgm2"] / MOTOR.j_rotor_kgm2 < 1.4
+    assert 0.7 < rough.values["j_kgm2"] / sound(motor).j_rotor_kgm2 < 1.4
 
 
 def test_a_meter_beside_a_spin_gives_resistance_and_inductances():
-    values = base(recorded(("lcr", "lcr", {}), ("open_circuit", "open_circuit", {})))
-    assert values["r_ohm"] == pytest.approx(TRUE["r_phase_ohm"], rel=0.02)
-    assert values["ld_h"] == pytest.approx(TRUE["ld_h"], rel=0.05)
-    assert values["lq_h"] == pytest.approx(TRUE["lq_h"], rel=0.05)
+    motor, spin = "servo-15kw", ("open_circuit", "open_circuit", {})
+    values, true = base(recorded(motor, ("lcr", "lcr", {}), spin)), truth(sound(motor))["constants"]
+    assert values["r_ohm"] == pytest.approx(true["r_phase_ohm"], rel=0.02)
+    assert values["ld_h"] == pytest.approx(true["ld_h"], rel=0.05)
+    assert values["lq_h"] == pytest.approx(true["lq_h"], rel=0.05)
 
 
 def test_a_spin_whose_voltages_alone_show_its_speed_gives_the_flux():
-    values = base(recorded(("open_circuit", "open_circuit", {}), gone=MOTION))
-    assert values["psi_wb"] == pytest.approx(TRUE["psi_pm_wb"], rel=0.01)
+    motor, spin = "drone-2306", ("open_circuit", "open_circuit", {})
+    values = base(recorded(motor, spin, gone=MOTION, pwm_hz=30e3))
+    assert values["psi_wb"] == pytest.approx(
+        truth(sound(motor))["constants"]["psi_pm_wb"], rel=0.01
+    )
 
 
 def test_gaps_of_a_thinned_log_bend_no_speed():
     """A lag far shorter than a row is none."""
-    found = recorded(DRIVE, gone=("theta_mech_rad",))
+    found = recorded(GIMBAL, DRIVE, gone=("theta_mech_rad",))
     machine = machine_of(found, Constants())
     model = model_of(ModelSpec(), machine)
     (log,) = (one for one in segments(found, machine) if one.kind == "dq")
