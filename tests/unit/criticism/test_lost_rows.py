@@ -10,13 +10,18 @@ import pytest
 
 import pipeline
 from pipeline.criticism.data.machine_scale import encoder_step, machine_of
+from pipeline.criticism.data.segment import Cache, row_index
+from pipeline.criticism.data.traces import READ_BETWEEN
+from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.regression.noise_propagation import noise_floor
 from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import campaign
 from pipeline.simulator.design import EXACT, Bench
 from tests.simulated import campaign_of, design
+from tests.unit.criticism.machines import BASE, log, machine
 
 PLAN = (("drive_0", "drive", {}), ("spin_down", "spin_down", {}))
 
@@ -64,6 +69,20 @@ def test_logs_of_a_row_or_without_a_clock_show_no_step():
         assert (
             encoder_step(replace(one, captures=(replace(drive, tables=(short,)),)), DEFAULT) == 0.0
         )
+
+
+def test_a_row_that_is_read_between_others_repeats_their_noise():
+    """A cubic counts rows beside a lost one 5/3 times and the next 5/6: 35/18 more a lost row."""
+    whole, share = log(noise=1.0), 0.1
+    random = np.random.default_rng(4)
+    apart = np.zeros(whole.size)
+    apart[2:-2:4] = random.uniform(size=apart[2:-2:4].size) < 4.0 * share
+    holes = replace(whole, recorded={**whole.recorded, READ_BETWEEN: apart}, cache=Cache())
+    group, _, valid, groups = row_index(whole)
+    mean = group[valid] == groups.index(("vq_v", 0))
+    floors = [noise_floor(one, Model(machine(), ()), BASE, 1)[mean] for one in (whole, holes)]
+    power = [float(np.mean(floor**2)) for floor in floors]
+    assert power[1] / power[0] == pytest.approx(1.0 + 35.0 / 18.0 * apart.mean(), rel=0.06)
 
 
 @pytest.mark.parametrize(
