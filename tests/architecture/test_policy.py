@@ -74,11 +74,9 @@ ARITHMETIC = {
         "_FLOATING",
         "_DIGITS",
         "_MOST_DECIMALS",
-        "_SHIFTS",
-        "_SHARES",
-        "_BETWEEN",
-        "_BLOCKS",
     },
+    # the grid of a search for a noise; digits of a file
+    "data/encoder_noise.py": {"_SHIFTS", "_SHARES", "_BETWEEN", "_BLOCKS", "_NONE"},
     "data/machine_scale.py": {"_BINS_AN_ORDER", "_SAME_ANGLE"},  # twice Nyquist; rounding
     "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight
     "design/experiments.py": {"_SEED"},

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -29,12 +27,6 @@ a turn wide: a wider spacing misses it, a finer one costs time."""
 _KNOWN = 16
 """Values that two neighbours share from which on their spacing is a step: a drive that is switched
 off, or limits its current, shares a few."""
-_SHIFTS = (-0.375, -0.125, 0.125, 0.375)
-_SHARES = np.concatenate([[0.0], np.geomspace(0.05, 3.2, 13)])
-_BETWEEN = 5
-_BLOCKS = 120
-"""Parts of a step by which a motion is moved to be rounded anew, evenly spread; trial noises before
-the rounding [steps], and how many lie between the best two; blocks that are looked at."""
 _DIGITS = 1e-3
 """Share of a step that the digits of a file may leave where there is none."""
 _FLOATING = 1e-9
@@ -213,104 +205,6 @@ def scatter(signal: Array, step: float, policy: SensorNoise) -> float:
     return min(noise, alone) if noise <= policy.smooth_share * alone else noise
 
 
-def dither_of(stretches: Sequence[Array], step: float, policy: SensorNoise) -> float:
-    """White noise of an angle before it was rounded.
-
-    Parameters
-    ----------
-    stretches
-        As recorded [rad], each without a gap.
-    step
-        Of the rounding [rad].
-    policy
-        Constants of judgement.
-
-    Returns
-    -------
-    float
-        Standard deviation [rad] with which the same motion, rounded anew, has third differences as
-        large as those that are recorded, block by block. Without noise the error of a rounding is
-        not white where steps and sampling beat: there they may be larger than with some, or less.
-
-    """
-    blocks = _Blocks.of(stretches, step, policy)
-    shares = _SHARES[np.argsort([blocks.unlikeness_of_noise(share) for share in _SHARES])[:2]]
-    between = np.linspace(shares.min(), shares.max(), _BETWEEN)
-    return step * float(min(between, key=blocks.unlikeness_of_noise))
-
-
-@dataclass(frozen=True, slots=True)
-class _Blocks:
-    """Blocks [B, n] of an angle in steps, evenly spread over its record: as recorded, and as it was
-    before its rounding as far as the record shows.
-    """
-
-    recorded: Array
-    even: Array
-    normal: Array
-    burst: float
-
-    @classmethod
-    def of(cls, stretches: Sequence[Array], step: float, policy: SensorNoise) -> _Blocks:
-        """The blocks of a record [rad] without gaps, by its `step` [rad]."""
-        noise = _of_differences(stretches, policy) / step
-        passing = step * max(math.sqrt(12.0) * noise, 1.0)
-        size, pairs = policy.block + 3, []
-        for one in stretches:
-            pair = np.stack([one, smoothed(one, passing, policy)]) / step
-            if one.size >= size:
-                pairs.append(sliding_window_view(pair, size, axis=1)[:, :: policy.block])
-        if not pairs:
-            none = np.zeros((0, size))
-            return cls(none, none, none, policy.burst)
-        recorded, even = np.concatenate(pairs, axis=1)
-        chosen = slice(None, None, max(len(even) // _BLOCKS, 1))
-        normal = np.random.default_rng(len(stretches)).normal(size=even[chosen].shape)
-        return cls(recorded[chosen], even[chosen], normal, policy.burst)
-
-    def unlikeness_of_noise(self, share: float) -> float:
-        """How unlike a noise of a share of a step before the rounding makes the blocks."""
-        noisy = self.even + share * self.normal
-        return self._unlikeness([np.round(noisy + shift) for shift in _SHIFTS])
-
-    def unlikeness_of_means(self, readings: int) -> float:
-        """How unlike means of readings, each in steps of as many of the samples' own, make them."""
-        return self._unlikeness(
-            [
-                self.even + np.apply_along_axis(readings_error, 1, self.even, 1.0, readings, shift)
-                for shift in _SHIFTS
-            ]
-        )
-
-    def _unlikeness(self, made: Sequence[Array]) -> float:
-        """Mean deviance of the power of their third differences; a jump is as bad as any."""
-        shown = _third_power(self.recorded) + _DIGITS
-        like = np.mean([_third_power(one) for one in made], axis=0) + _DIGITS
-        apart = np.log(like) + np.minimum(shown / like, self.burst)
-        return float(apart.mean()) if apart.size else 0.0
-
-
-def _third_power(blocks: Array) -> Array:
-    """Mean square of third differences in each block [B, n]: [B]."""
-    power: Array = np.square(np.diff(blocks, 3, axis=1)).mean(axis=1)
-    return power
-
-
-def _of_differences(stretches: Sequence[Array], policy: SensorNoise) -> float:
-    """Noise level of an angle by third differences of blocks, none of them across a gap.
-
-    Neighbouring ones of white noise σ² have the covariance −15 σ²; that of a motion is positive.
-    """
-    blocks = [
-        block
-        for one in stretches
-        for block in np.array_split(np.diff(one, 3), max(one.size // policy.block, 1))
-    ]
-    powers = [-float(np.mean(block[1:] * block[:-1])) for block in blocks if block.size > 1]
-    middle = float(np.quantile(powers, policy.steady[0])) if powers else 0.0
-    return math.sqrt(max(middle, 0.0) / 15.0)
-
-
 def rounding_error(even: Array, step: float, shift: Array | float) -> Array:
     """What rounding does to a signal.
 
@@ -361,37 +255,6 @@ def readings_error(even: Array, step: float, readings: int, shift: Array | float
     return np.mean(
         [rounding_error(even + place * turned, coarse, shift) for place in places], axis=0
     )
-
-
-def are_means(stretches: Sequence[Array], step: float, readings: int, policy: SensorNoise) -> bool:
-    """Whether samples are means of coarser readings, rather than noisy before they were rounded.
-
-    Parameters
-    ----------
-    stretches
-        As recorded [rad], each without a gap.
-    step
-        Of the samples [rad].
-    readings
-        Readings a sample that would make its noise.
-    policy
-        Constants of judgement.
-
-    Returns
-    -------
-    bool
-        Whether the means predict where in the record third differences are large better than a
-        noise that is the same throughout does.
-
-    Notes
-    -----
-    Means of a motion that crosses steps of a reading within a sample have a part of its error, and
-    those of one that stays within a step all of it.
-
-    """
-    blocks = _Blocks.of(stretches, step, policy)
-    noise = dither_of(stretches, step, policy) / step
-    return blocks.unlikeness_of_means(readings) <= blocks.unlikeness_of_noise(noise)
 
 
 def rounding_step(signal: Array, policy: SensorNoise) -> float:

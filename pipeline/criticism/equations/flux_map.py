@@ -37,7 +37,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
     """
     names = ("id_a", "iq_a", *LINKAGES)
-    columns = capture.arrays(*names)
+    columns = capture.finite(*names)
     policy = machine.policy.tables
     noise = _axes_noise(columns, names[:2], policy) | _axes_noise(columns, names[2:], policy)
     if not all(noise.values()):

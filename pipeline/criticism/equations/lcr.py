@@ -42,7 +42,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 
     """
     names = ["theta_elec_deg", "lab_h"] + [n for n in ("rab_ohm", "freq_hz") if capture.has(n)]
-    columns = capture.arrays(*names)
+    columns = capture.finite(*names)
     angle = 2 * np.radians(columns["theta_elec_deg"])
     basis = np.stack([np.ones(angle.size), np.cos(angle), np.sin(angle)], axis=1)
     if angle.size < 6:

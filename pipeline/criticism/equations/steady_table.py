@@ -41,7 +41,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     """
     if capture.has("id_a", "iq_a", "psi_d_wb", "psi_q_wb"):
         return None
-    columns = capture.arrays("id_a", "omega_mech_rad_s", "vq_v")
+    columns = capture.finite("id_a", "omega_mech_rad_s", "vq_v")
     levels = set_levels(columns["id_a"], machine.policy.tables)
     count = int(levels.max(initial=0)) + 1
     freedom = columns["vq_v"].size - 2 * count

@@ -197,8 +197,7 @@ def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[A
         Seeds are fixed, so the same input gives the same floors.
 
     """
-    seeds = range(_SEED, _SEED + len(segments))
-    return on_each(noise_floor, segments, [(model, values, seed) for seed in seeds])
+    return on_each(noise_floor, segments, _seeded(segments, model, values))
 
 
 def rough_floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Array, ...]:
@@ -220,8 +219,13 @@ def rough_floors(segments: Sequence[Segment], model: Model, values: Values) -> t
         little but the noise of an acceleration would take the inertia away.
 
     """
-    seeds = range(_SEED, _SEED + len(segments))
-    return on_each(_rough_floor, segments, [(model, values, seed) for seed in seeds])
+    return on_each(_rough_floor, segments, _seeded(segments, model, values))
+
+
+def _seeded(
+    segments: Sequence[Segment], model: Model, values: Values
+) -> list[tuple[Model, Values, int]]:
+    return [(model, values, _SEED + n) for n in range(len(segments))]
 
 
 def _rough_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:

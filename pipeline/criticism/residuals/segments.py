@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.criticism.data.encoder_noise import readings_and_noise
 from pipeline.criticism.data.instruments import gains_of
-from pipeline.criticism.data.rounding import are_means, dither_of, is_rounded, rounding_step
+from pipeline.criticism.data.rounding import is_rounded, rounding_step
 from pipeline.criticism.data.segment import UNSMOOTHED, Cache, Segment, joins, with_lines
 from pipeline.criticism.data.traces import PAD, READ_BETWEEN, with_values
 from pipeline.criticism.equation import Equation
@@ -201,8 +202,8 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
     A shaft that turns by nearly whole steps a sample does not show the step itself, and its
     rounding is then periodic in the angle, as an electrical order is. A drive that logs means of
     n readings has its angle in fractions q of the step, with a noise of q √(n/12): a noise before
-    the rounding looks alike, but for where it is (`are_means`). A single reading that alternates
-    may seem to be of `_ALTERNATING`. The integral of a rounded speed is in steps as
+    the rounding looks alike, but for where it is (`readings_and_noise`). A single reading that
+    alternates may seem to be of `_ALTERNATING`. The integral of a rounded speed is in steps as
     well, but its error is a walk.
     """
     theta, step = segment.recorded.get("theta_mech_rad"), machine.encoder_rad
@@ -223,10 +224,10 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
     if step > 0.0:
         readings = 12.0 * (segment.sensors.noise.get("theta_mech_rad", 0.0) / step) ** 2
     count = min(round(readings), policy.most_readings) if readings > _ALTERNATING else 1
-    stretches = np.split(theta, joins(segment))
-    if count > 1 and not are_means(stretches, step, count, policy):
-        count = 1
-    dither = dither_of(stretches, step, policy) if step > 0.0 and count == 1 else 0.0
+    dither = 0.0
+    if step > 0.0:
+        stretches = np.split(theta, joins(segment))
+        count, dither = readings_and_noise(stretches, step, count, policy)
     sensors = replace(segment.sensors, angle_step_rad=step, readings=count, dither_rad=dither)
     return replace(segment, sensors=sensors)
 

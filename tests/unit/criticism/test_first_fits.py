@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
 from pipeline.criticism.data.machine_scale import machine_of
@@ -63,6 +64,21 @@ def test_a_meter_beside_a_spin_gives_resistance_and_inductances():
     assert values["r_ohm"] == pytest.approx(true["r_phase_ohm"], rel=0.02)
     assert values["ld_h"] == pytest.approx(true["ld_h"], rel=0.05)
     assert values["lq_h"] == pytest.approx(true["lq_h"], rel=0.05)
+
+
+@pytest.mark.parametrize(("test", "column"), [("lcr", "lab_h"), ("flux_map", "psi_d_wb")])
+def test_a_table_that_lacks_a_value_has_its_other_rows(test, column):
+    found = recorded("servo-ipm", (test, test, {}), DRIVE)
+    (table,) = found.of(test)
+    (rows,) = table.tables
+    holes = np.where(np.arange(rows.height) == 3, np.nan, rows[column].to_numpy())
+    lacks = replace(table, tables=(rows.with_columns(pl.Series(column, holes)),))
+    captures = tuple(lacks if one is table else one for one in found.captures)
+    machine = machine_of(replace(found, captures=captures), Constants())
+    cut = segments(replace(found, captures=captures), machine)
+    (segment,) = (one for one in cut if one.test == test)
+    assert segment.size == rows.height - 1
+    assert all(np.isfinite(signal).all() for signal in segment.recorded.values())
 
 
 def test_a_spin_whose_voltages_alone_show_its_speed_gives_the_flux():

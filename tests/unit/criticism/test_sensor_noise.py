@@ -8,10 +8,10 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.criticism.data.encoder_noise import readings_and_noise
 from pipeline.criticism.data.machine_scale import encoder_step
 from pipeline.criticism.data.rounding import (
     coarse_step,
-    dither_of,
     is_rounded,
     readings_error,
     resolution,
@@ -267,7 +267,7 @@ def test_noise_before_a_rounding_is_what_the_rounding_alone_does_not_make(pace, 
     step, samples = 2.0 * np.pi / 2**14, np.arange(12000)
     moved = pace * samples + 3.0 * np.sin(samples / 400.0)
     noisy = moved + share * np.random.default_rng(5).standard_normal(samples.size)
-    dither = dither_of([step * np.round(noisy)], step, SENSORS)
+    _, dither = readings_and_noise([step * np.round(noisy)], step, 1, SENSORS)
     assert dither / step == pytest.approx(share, abs=0.1)
 
 
@@ -278,7 +278,7 @@ def test_noise_before_a_rounding_is_found_at_a_few_even_paces(share, paces):
     step, random = 2.0 * np.pi / 2**13, np.random.default_rng(2)
     moved = np.cumsum(np.repeat(paces, 1400))
     noisy = moved + share * random.standard_normal(moved.size)
-    dither = dither_of([step * np.round(noisy)], step, SENSORS)
+    _, dither = readings_and_noise([step * np.round(noisy)], step, 1, SENSORS)
     assert dither / step == pytest.approx(share, abs=0.04)
 
 
