@@ -28,7 +28,7 @@ MARKS: tuple[Mark, ...] = (
 @cache
 def recorder_digest(world: str) -> str:
     """8 hex digits of a digest of what makes a world's captures."""
-    names = ("lanes.py", "programmes.py", "recording.py", f"with_{world}.py")
+    names = ("damage.py", "lanes.py", "programmes.py", "recording.py", f"with_{world}.py")
     parts = [syntax_of((HERE / name).read_bytes(), "tests.benchmark.worlds") for name in names]
     return hashlib.sha256("".join(part.digest for part in parts).encode()).hexdigest()[:8]
 

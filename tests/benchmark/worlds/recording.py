@@ -25,6 +25,7 @@ WORLDS: Mapping[str, str] = {
     "mujoco": "mujoco",
     "gym": "gym-electric-motor",
     "maker": "",
+    "drawn": "",
 }
 """Worlds, and the package that each needs; none where the plant is this project's simulator."""
 

@@ -16,9 +16,11 @@ Found = Sequence[tuple[WorldCase, Mapping[str, Any]]]
 
 def cases(name: str, draw: int = 1) -> list[WorldCase]:
     """Every case of a world: nulls, each effect at two sizes, pairs, and what no library has; on
-    three motors and stations, which are others at each `draw`.
+    three motors and stations, which are others at each `draw`. A world may draw its own.
     """
     place, found = world(name), []
+    if hasattr(place, "drawn"):
+        return list(place.drawn(draw))
     seeds = range(MOTORS * (draw - 1) + 1, MOTORS * draw + 1)
     for programme, effects in place.EFFECTS.items():
         found += [WorldCase(name, programme, seed) for seed in seeds]
