@@ -11,6 +11,11 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _REACH = 2
 """Samples at either side that a cubic goes through; it needs four."""
+_BY_ITSELF = 0.2
+"""Scatter of stamps [periods] to which each may be numbered by itself; of any stamps it is 0.29."""
+_PARTS, _PART, _FAR = 8, 64, 0.2
+"""Parts of a record that its clock is looked for in, stamps of each, and how far from the median
+step [its logarithm]."""
 
 
 def counted(time: Array, missing: float, most_scatter: float) -> tuple[float, Indices] | None:
@@ -34,7 +39,9 @@ def counted(time: Array, missing: float, most_scatter: float) -> tuple[float, In
     Notes
     -----
     Two counts are tried: one in which a long step stands for missing samples, whose numbers are
-    left out, and one in which it does not. The one with less scatter counts.
+    left out, and one in which it does not. The one with less scatter counts. Of stamps that scatter
+    a count goes wrong once and stays so: where neither count is even, every stamp is numbered by
+    itself, on the clock that most of them agree with.
 
     Examples
     --------
@@ -53,7 +60,40 @@ def counted(time: Array, missing: float, most_scatter: float) -> tuple[float, In
         scatter = float(np.std(since - first - period * number)) / period
         ends.append((scatter, float(period), number.astype(np.int64)))
     scatter, period, number = min(ends, key=lambda end: end[0])
+    if scatter > _BY_ITSELF and (alone := _numbered(since)) is not None:
+        return alone
     return None if scatter > most_scatter else (period, number)
+
+
+def _numbered(since: Array) -> tuple[float, Indices] | None:
+    """Period and number of each stamp [n, s from the first] on the clock that most agree with; None
+    where they agree with none, or too many have one number.
+    """
+    usual, length = float(np.median(np.diff(since))), min(_PART, since.size)
+    starts = np.unique(np.linspace(0, since.size - length, _PARTS).round().astype(np.int64))
+    parts = since[starts[:, None] + np.arange(length)]
+    periods = usual * np.exp(np.linspace(-_FAR, _FAR, 2 * round(_FAR * 4 * length) + 1))
+    turns = np.exp(2j * np.pi * parts[:, None, :] / periods[:, None])
+    period = float(periods[np.argmax(np.abs(turns.mean(axis=2)).mean(axis=0))])
+    first, size = 0.0, length
+    while True:
+        number = np.rint((since[:size] - first) / period)
+        period, first = np.polyfit(number, since[:size], 1)
+        if size == since.size:
+            break
+        size = min(2 * size, since.size)
+    number = np.rint((since - first) / period)
+    # of two stamps of one number one is its neighbour's: the earlier one came late, or the later
+    # one early
+    twice = np.flatnonzero(np.diff(number) < 1.0)
+    late = twice[number[twice] - np.append(-np.inf, number)[twice] > 1.0]
+    number[late] -= 1.0
+    early = np.setdiff1d(twice, late) + 1
+    number[early[np.append(number, np.inf)[early + 1] - number[early] > 1.0]] += 1.0
+    scatter = float(np.std(since - first - period * number)) / period
+    if scatter > _BY_ITSELF or np.any(np.diff(number) < 1.0):
+        return None
+    return float(period), (number - number[0]).astype(np.int64)
 
 
 def clearest_ratio(time: Array, number: Indices, columns: Iterable[Array]) -> float:
@@ -98,6 +138,6 @@ def _roughness(signal: Array, at: Array) -> float:
                 weight *= (at[inner] - at[moved[other]]) / (at[moved[n]] - at[moved[other]])
         foretold += weight * signal[moved[n]]
     error = np.abs(signal[inner] - foretold)
-    moving = error[error > 0.0]
-    rounding = 1e-12 * float(np.max(np.abs(signal), initial=0.0))
-    return max(float(np.median(moving)) if moving.size else 0.0, rounding, 1e-300)
+    rounding = max(1e-12 * float(np.max(np.abs(signal), initial=0.0)), 1e-300)
+    moving = error[error > rounding]
+    return float(np.median(moving)) if moving.size else rounding

@@ -10,7 +10,7 @@ from pipeline.contracts.clocks import stamps_counted
 from pipeline.criticism.data.drive_log import drive_log
 from pipeline.criticism.data.traces import even_clock, window_between_gaps
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.numerics.clocks import counted
+from pipeline.numerics.clocks import clearest_ratio, counted
 from pipeline.records.capture import Capture, CaptureMeta, Mask
 from tests.unit.criticism.machines import machine
 
@@ -159,3 +159,32 @@ def test_a_capture_is_counted_where_its_angle_shows_that_only_the_stamps_are_une
     assert stamps_counted(unevenly)[0] is unevenly
     resting = log(np.sort(stamps), 0.3 + 0.0 * even)
     assert stamps_counted(resting)[0] is resting
+
+
+def test_a_temperature_in_tenths_says_nothing_of_the_clock():
+    """It stands still but for a step or two: what floating point leaves there is no motion."""
+    even, stamps = instants(scatter=0.15)
+    number = np.arange(stamps.size)
+    for degrees in (np.full(stamps.size, 25.0), np.where(number < 2000, 25.0, 25.1)):
+        assert 0.5 < clearest_ratio(stamps, number, [degrees]) < 2.0
+    assert clearest_ratio(stamps, number, [degrees, angle(even)]) < 0.5
+
+
+@pytest.mark.parametrize(("scatter", "wrong"), [(0.1, 0.0), (0.16, 2e-3)])
+def test_stamps_that_scatter_are_numbered_though_a_tenth_of_the_rows_is_lost(scatter, wrong):
+    """A count from step to step goes wrong once in some hundred rows, and stays so."""
+    random = np.random.default_rng(3)
+    number = np.flatnonzero(random.uniform(size=8000) > 0.1)
+    number = number[(number < 2000) | (number > 2266)]
+    stamps = np.sort(PERIOD * (number + scatter * random.standard_normal(number.size)))
+    clock = counted(stamps, 1.6, 0.5)
+    assert clock is not None
+    period, counts = clock
+    assert period == pytest.approx(PERIOD, rel=1e-4)
+    assert np.mean(counts - counts[0] != number - number[0]) <= wrong
+    assert (np.diff(counts) > 0).all()
+
+
+def test_stamps_without_a_clock_are_not_numbered():
+    stamps = np.cumsum(np.random.default_rng(4).exponential(PERIOD, 4000))
+    assert counted(stamps, 1.6, 0.5) is None
