@@ -329,8 +329,9 @@ def _turns_at(segment: Segment, freq_hz: float, policy: MainsHum) -> bool:
     theta = segment.recorded.get("theta_mech_rad")
     if theta is None:
         return False
-    time = clock(segment)
-    speed = np.gradient(theta, time) / (2.0 * math.pi)
+    # a log that was thinned to windows which overlap has rows twice
+    time, once = np.unique(clock(segment), return_index=True)
+    speed = np.gradient(theta[once], time) / (2.0 * math.pi)
     mean = float(np.abs(speed.mean()))
     duration = float(time[-1] - time[0])
     if mean * duration < 0.5 or float(speed.std()) > policy.speed_share * mean:

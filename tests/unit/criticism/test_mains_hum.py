@@ -101,6 +101,14 @@ def test_hum_is_found_in_a_thinned_log():
     assert hum.rms == pytest.approx(0.1, rel=0.02)
 
 
+def test_windows_of_a_thinned_log_may_overlap():
+    """Rows come twice then, and from one window to the next no time goes by."""
+    recorded = [cut_to_windows(one, 50.0, 401) for one in logs(0.1)]
+    assert min(np.diff(recorded[0].recorded["t_s"])) == 0.0
+    found = hum_of(recorded, PLAIN, BASE)
+    assert [(hum.signal, hum.freq_hz) for hum in found] == [("vq_v", 50.0)]
+
+
 def with_bump(one, middle_s, width_s):
     """The log with 50 Hz in vq_v that comes and goes."""
     time = np.arange(one.size) * one.ts_s
