@@ -43,7 +43,7 @@ class Cells:
 
 
 def holding_cells(capture: Capture, policy: Policy) -> Cells | None:
-    """A holding current averaged in cells of angle and sense.
+    """A holding current averaged in cells of angle and sense, but for those where it turns back.
 
     Parameters
     ----------
@@ -59,9 +59,10 @@ def holding_cells(capture: Capture, policy: Policy) -> Cells | None:
 
     Notes
     -----
-    The noise of a cell's mean comes from the scatter within cells about a straight line, with its
-    correlation from sample to sample; a loop that holds does not repeat better than that. Where few
-    cells have rows enough it comes from the differences between neighbours.
+    Where a rotor turns back, friction is of neither sense until it has moved. The noise of a cell's
+    mean comes from the scatter within cells about a straight line, with its correlation from sample
+    to sample; a loop that holds does not repeat better than that. Where few cells have rows enough
+    it comes from the differences between neighbours.
 
     """
     if not capture.has("theta_mech_rad", "iq_a"):
@@ -70,8 +71,14 @@ def holding_cells(capture: Capture, policy: Policy) -> Cells | None:
     finite = np.isfinite(columns["theta_mech_rad"]) & np.isfinite(columns["iq_a"])
     theta, current = columns["theta_mech_rad"][finite], columns["iq_a"][finite]
     rows, spread = [], []
+    number = np.floor(theta / TURN_RAD * policy.tables.cells).astype(np.int64)
     for part, sense in passes(theta):
-        cells, residuals = _cells(theta[part], current[part], policy.tables)
+        ends = (part.start, part.stop - 1)
+        turned = [number[end] for end in ends if 0 < end < theta.size - 1]
+        inside = part.start + np.flatnonzero(~np.isin(number[part], turned))
+        if not inside.size:
+            continue
+        cells, residuals = _cells(theta[inside], current[inside], number[inside], policy.tables)
         rows.append(np.column_stack([cells, np.full(cells.shape[0], float(sense))]))
         spread += residuals
     if not rows or sum(len(r) for r in rows) < policy.tables.sectors:
@@ -82,9 +89,10 @@ def holding_cells(capture: Capture, policy: Policy) -> Cells | None:
     return Cells(table[:, 0], table[:, 1], table[:, 2], sector, noise)
 
 
-def _cells(theta: Array, current: Array, policy: Tables) -> tuple[Array, list[Array]]:
-    """Mean angle and current [K, 2] of the cells of one pass, and the scatter in each."""
-    number = np.floor(theta / TURN_RAD * policy.cells).astype(np.int64)
+def _cells(
+    theta: Array, current: Array, number: Indices, policy: Tables
+) -> tuple[Array, list[Array]]:
+    """Mean angle and current [K, 2] of the cells of one pass by number, and the scatter in each."""
     order = np.argsort(number, kind="stable")
     edges = np.flatnonzero(np.diff(number[order])) + 1
     means, residuals = [], []
@@ -92,7 +100,7 @@ def _cells(theta: Array, current: Array, policy: Tables) -> tuple[Array, list[Ar
         means.append((theta[rows].mean(), current[rows].mean()))
         if rows.size >= policy.cell_rows:
             residuals.append(_about_a_line(theta[rows], current[rows]))
-    return np.array(means), residuals
+    return np.array(means).reshape(-1, 2), residuals
 
 
 def _about_a_line(theta: Array, current: Array) -> Array:

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+
+import numpy as np
 
 import pipeline
+from pipeline.criticism.data.holding_cells import holding_cells
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.simulator.bench import campaign
 from pipeline.simulator.design import EXACT, Bench
 from pipeline.simulator.truth import truth
@@ -27,3 +32,16 @@ def test_holding_currents_alone_name_the_cogging_with_its_size() -> None:
     size = math.hypot(*(wave.value for wave in waves))
     assert abs(size - true["cogging_amplitude_nm"]) < 0.02 * true["cogging_amplitude_nm"]
     assert all(wave.u < 0.02 * size for wave in waves)
+
+
+def test_a_cell_where_the_rotor_turns_back_is_of_neither_sense() -> None:
+    """It holds there with the current of both: one cell of 720 was 60 floors off."""
+    motor = replace(design("gimbal-5208"), effects={})
+    (held,) = campaign_of(campaign(motor, Bench(), 2, (("h", "holding_current", {}),))).captures
+    cells = holding_cells(held, DEFAULT)
+    assert cells is not None
+    up, down = (cells.iq_a[cells.sense == sense] for sense in (1.0, -1.0))
+    for one in (up, down):
+        assert np.abs(one - np.median(one)).max() < 0.1 * abs(np.median(up) - np.median(down))
+    both, last = cells.theta_mech_rad, held.tables[0]["theta_mech_rad"].max()
+    assert both.max() < last
