@@ -39,7 +39,7 @@ _LINES_A = ("ia_a", "ib_a", "ic_a")
 
 
 _BINS_AN_ORDER = 4
-"""Bins of angle for a wave of the highest order of a spectrum: twice what Nyquist needs."""
+"""Bins of angle that a wave surely stands out of: twice what Nyquist needs."""
 _SAME_ANGLE = 1e-7
 """Difference of two readings of one angle [turn], by rounding of their numbers."""
 
@@ -420,9 +420,9 @@ def torque_orders(captures: Iterable[Capture], highest: int) -> tuple[int, ...]:
 
 
 def _standing_out(theta: Array, torque: Array, highest: int) -> tuple[int, set[int]]:
-    """The highest order that a capture's angles show, and the orders that stand out."""
+    """The highest order that would stand out of a capture's angles, and those that do."""
     bins, turns = _even_bins(theta, _BINS_AN_ORDER * highest), max(int(np.ptp(theta) / TURN_RAD), 1)
-    seen = min(highest, bins // _BINS_AN_ORDER)
+    seen, shown = bins // _BINS_AN_ORDER, min(highest, (bins - 1) // 2)
     if seen < 1:
         return 0, set()
     place = np.floor((theta - theta.min()) / TURN_RAD * bins + 0.5).astype(np.int64)
@@ -430,7 +430,7 @@ def _standing_out(theta: Array, torque: Array, highest: int) -> tuple[int, set[i
     place = place[inside] % bins
     count = np.maximum(np.bincount(place, minlength=bins), 1)
     mean = np.bincount(place, torque[inside], minlength=bins) / count
-    spectrum = np.abs(np.fft.rfft(mean))[1 : seen + 1]
+    spectrum = np.abs(np.fft.rfft(mean))[1 : shown + 1]
     floor = float(np.median(spectrum))
     return seen, {int(k) + 1 for k in np.flatnonzero(spectrum > 6.0 * floor)}
 

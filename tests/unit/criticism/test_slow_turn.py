@@ -65,6 +65,15 @@ def orders_of(*turns: Capture) -> list[int]:
     return [k for k in found if k % POLE_PAIRS == 0 or k % SLOTS == 0]
 
 
+def test_a_second_wave_counts_of_which_an_encoder_has_few_lines_a_wave():
+    """Each of 540 waves a turn has less than four of 2000 lines: of four it would stand out."""
+    first, second = (slow_turn("a.csv", 0.06, order=k, counts=2000) for k in (ORDER, 2 * ORDER))
+    (table,), (other,) = first.tables, second.tables
+    both = table["torque_shaft_nm"] + 0.3 * other["torque_shaft_nm"]
+    whole = replace(first, tables=(table.with_columns(torque_shaft_nm=both),))
+    assert orders_of(whole) == [ORDER, 2 * ORDER]
+
+
 def test_a_turn_that_ends_a_sample_before_it_comes_round_is_a_whole_one():
     assert orders_of(slow_turn("a.csv", 0.06)) == [ORDER]
 
