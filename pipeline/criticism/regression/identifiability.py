@@ -170,8 +170,8 @@ def known_by(system: LinearSystem, held_out: HeldOut, sizes: Array) -> Known:
 
 
 def significantly_nonzero(system: LinearSystem, held_out: HeldOut, least: float) -> set[str]:
-    """Parameters that differ significantly from zero, as they are or over a constant that no motor
-    is without.
+    """Parameters that differ significantly from zero, as they are or over or times a constant that
+    no motor is without.
 
     Parameters
     ----------
@@ -186,8 +186,9 @@ def significantly_nonzero(system: LinearSystem, held_out: HeldOut, least: float)
     -------
     set of str
         Names. A coast shows that there is windage though it shows no more than windage over
-        inertia. And a spring that is softer for less inertia behind it is at least as soft as it is
-        with most of the inertia behind it.
+        inertia, and a torque that inductances fall though it shows no more than the share by which
+        they do times an inductance. And a spring that is softer for less inertia behind it is at
+        least as soft as it is with most of the inertia behind it.
 
     """
     fit = known(system, held_out)
@@ -199,9 +200,10 @@ def significantly_nonzero(system: LinearSystem, held_out: HeldOut, least: float)
         gradient = _towards_zero(fit.identified.covariance, values, n, inward)
         if fit.excludes_zero(values[n], gradient, least) or any(
             fit.excludes_zero(
-                values[n] / values[j], _ratio_gradient(values, n, j), least, bent=True
+                values[n] * values[j] ** power, _by_constant(values, n, j, power), least, bent=True
             )
             for j in below
+            for power in (-1, 1)
             if j != n
         ):
             sure.add(column.name)
@@ -332,11 +334,11 @@ def _towards_zero(covariance: Array, values: Array, one: int, inward: Array) -> 
     return gradient
 
 
-def _ratio_gradient(values: Array, one: int, other: int) -> Array:
-    """Gradient [own] of a parameter over another one."""
+def _by_constant(values: Array, one: int, other: int, power: int) -> Array:
+    """Gradient [own] of a parameter times a power of another one."""
     gradient = np.zeros(values.size)
-    gradient[one] = 1.0 / values[other]
-    gradient[other] = -values[one] / values[other] ** 2
+    gradient[one] = values[other] ** power
+    gradient[other] = power * values[one] * values[other] ** (power - 1)
     return gradient
 
 

@@ -6,12 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline import Recordings, diagnose
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.regression.cross_validation import leave_out
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.identifiability import product_nonzero, significantly_nonzero
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.acceptance import sure_amplitudes
+from pipeline.simulator.bench import CAMPAIGN, campaign
+from pipeline.simulator.design import Bench
+from pipeline.simulator.effects import parameters
+from tests.simulated import campaign_of, design
 from tests.unit.criticism.machines import fitted, with_drag
 
 
@@ -53,3 +58,19 @@ def test_what_shows_as_a_product_only_is_there() -> None:
     assert product_nonzero(tied, held_out, names, 2.0)
     assert not product_nonzero(tied, held_out, names, 1e4)
     assert not product_nonzero(tied, held_out, (names[0], "compliance.share"), 2.0)
+
+
+def test_inductances_that_fall_by_an_unknown_share_fall() -> None:
+    """Torque maps show L_d - L_q alone, so what part of an inductance is lost stays open."""
+    motor = design("joint-11p")
+    size = {"cross_saturation": parameters("cross_saturation", motor)["size"]}
+    plan = tuple(p for p in CAMPAIGN if p[0].startswith(("open_circuit_f", "torque_map_")))
+    made = campaign(replace(motor, effects={}).having(**size), Bench(noise_scale=0.3), 5, plan)
+    logs = campaign_of(made)
+    kept = [one.tables[0].drop("vd_v", "vq_v", strict=False) for one in logs.captures]
+    captures = (replace(c, tables=(t,)) for c, t in zip(logs.captures, kept, strict=True))
+    blind = replace(logs, captures=tuple(captures))
+    found = diagnose(Recordings({blind.motor_id: blind}))[blind.motor_id]
+    assert (found.verdict, found.missing) == ("missing", ("cross_saturation",))
+    assert found.ladder[0].held_out > 5.0
+    assert found.ladder[-1].held_out < 1.0
