@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from pipeline.criticism.machine.model import COAST_SHARES, CURVED, EARLY_S, EARLY_SHARES, Model
 from pipeline.criticism.operating import Values
 from pipeline.criticism.regression.columns import Column
@@ -40,7 +38,8 @@ def is_valid(column: Column, made_at: Values, fit: Fit) -> bool:
     if column.name in shares or any(abs(now[n] - made_at.get(n, 0.0)) > far for n in shares):
         return False
     early = any(one.get(n, 0.0) for one in (now, made_at) for n in EARLY_SHARES)
-    if early and abs(now[EARLY_S] / made_at.get(EARLY_S, math.inf) - 1.0) > far:
+    early_s = made_at.get(EARLY_S, 0.0)
+    if early and abs(now[EARLY_S] - early_s) > far * early_s:
         return False
     if column.name == "j_kgm2":
         return abs(now["j_kgm2"] / made_at["j_kgm2"] - 1.0) < far

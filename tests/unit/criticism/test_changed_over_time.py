@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from pipeline.criticism.diagnosis import base_fit, diagnose
 from pipeline.criticism.machine.model import EARLY_S, EARLY_SHARES
-from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.column_validity import is_valid
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.selection.free_shares import with_changing_friction
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.simulator.catalogue import with_effects
+from tests.unit.criticism.machines import fitted, log
 from tests.unit.estimation.test_drag_over_time import COASTS, DRIVES, plain, recorded, relaxing
 
 
@@ -71,3 +74,14 @@ def test_the_diagnosis_says_what_changed_and_names_no_other_friction(course):
     assert "viscous friction is" in note
     assert all(f"{stem}.mcap" in note for stem in COASTS[1:])
     assert "record several coasts from different speeds" in note
+
+
+def test_a_column_is_old_from_before_friction_had_a_time_constant() -> None:
+    """It was none in the fit that the column is of, and nothing was divided by it since."""
+    fit = fitted([log(noise=1.0)])
+    share = EARLY_SHARES[0]
+    later = replace(fit, values={**fit.values, share: 1e-6, EARLY_S: 2.0})
+    (column,) = (one for one in linear_system(fit).columns if one.name == "psi_wb")
+    before, since = {**fit.values, share: 0.0, EARLY_S: 0.0}, {**later.values, EARLY_S: 2.0}
+    assert not is_valid(column, before, later)
+    assert is_valid(column, since, later)
