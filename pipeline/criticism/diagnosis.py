@@ -339,7 +339,8 @@ def _temperature_note(end: SearchResult) -> tuple[str, ...]:
 def _verdict_of(end: SearchResult, not_excited: Sequence[Unexcited]) -> Verdict:
     """The verdict at the end of the ladder; `not_excited` are effects that nothing shows."""
     if end.freed or not end.ladder.explains(end.remainders):
-        return "insufficient" if _may_be_observer_noise(end) else "unknown"
+        unrecorded = _may_be_observer_noise(end) or _may_be_unlogged_current(end)
+        return "insufficient" if unrecorded else "unknown"
     last = end.ladder.steps[-1]
     if any(of_motor(last.system, name) for name in last.added):
         return "missing"
@@ -358,3 +359,13 @@ def _may_be_observer_noise(end: SearchResult) -> bool:
         left_over.capture in by_observer and not left_over.signal.endswith("_v")
         for left_over in end.remainders
     )
+
+
+def _may_be_unlogged_current(end: SearchResult) -> bool:
+    """Whether all that is left is of torque maps without their d current: a map steps through both,
+    and whatever is missed there may be of the one that is not known.
+    """
+    last = end.ladder.steps[-1].system
+    maps = {s.capture for s in last.segments if s.test == "torque_map" and "id_a" not in s.recorded}
+    left = {left_over.capture for left_over in end.remainders}
+    return not end.freed and bool(left) and left <= maps
