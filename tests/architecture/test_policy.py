@@ -62,6 +62,7 @@ ARITHMETIC = {
     "data/segment.py": {"PAIR_RAD"},  # a turn
     # the grid of a search for a step; rounding; of a fixed point
     "data/rounding.py": {
+        "_BITS",
         "_LOOKED_AT",
         "_STEPS",
         "_FIRST_WINDOW",
@@ -76,7 +77,7 @@ ARITHMETIC = {
         "_MOST_DECIMALS",
     },
     # the grid of a search for a noise; digits of a file
-    "data/encoder_noise.py": {"_SHIFTS", "_SHARES", "_BETWEEN", "_BLOCKS", "_NONE"},
+    "data/encoder_noise.py": {"_SHIFTS", "_SHARES", "_BETWEEN", "_BLOCKS", "_NONE", "_FREE"},
     "data/machine_scale.py": {"_BINS_AN_ORDER", "_SAME_ANGLE"},  # twice Nyquist; rounding
     "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight
     "design/experiments.py": {"_SEED"},

@@ -14,11 +14,15 @@ from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.sensors import SensorNoise
 
 _SHIFTS = (-0.375, -0.125, 0.125, 0.375)
-_SHARES = np.concatenate([[0.0], np.geomspace(0.05, 3.2, 13)])
+_SHARES = np.concatenate([[0.0], 0.0125 * 2.0 ** (0.5 * np.arange(27))])
 _BETWEEN = 5
 _BLOCKS = 120
 """Parts of a step by which a motion is moved to be rounded anew, evenly spread; trial noises before
-the rounding [steps], and how many lie between the best two; blocks that are looked at."""
+the rounding, up to a hundred [steps], and how many lie between the best two; blocks that are looked
+at.
+"""
+_FREE = 2.2
+"""Third differences of white noise that are as good as one independent number."""
 _NONE = 1e-3
 """Power of third differences [steps²] that the digits of a file may leave where there is none."""
 
@@ -56,12 +60,49 @@ def readings_and_noise(
 
     """
     blocks = _Blocks.of(stretches, step, policy)
+    if not blocks.recorded.size:
+        return 1, 0.0
     shares = _SHARES[np.argsort([blocks.unlikeness_of_noise(share) for share in _SHARES])[:2]]
     between = np.linspace(shares.min(), shares.max(), _BETWEEN)
     share = float(min(between, key=blocks.unlikeness_of_noise))
-    if readings > 1 and blocks.unlikeness_of_means(readings) <= blocks.unlikeness_of_noise(share):
+    if readings > 1 and blocks.unlikeness_of_means(readings) < blocks.unlikeness_of_noise(share):
         return readings, 0.0
     return 1, step * share
+
+
+def shared_noise(
+    records: Sequence[Sequence[Array]], step: float, alone: Sequence[float], policy: SensorNoise
+) -> list[float]:
+    """Noise of one encoder in each of its records.
+
+    Parameters
+    ----------
+    records
+        Stretches of each record [rad], each without a gap.
+    step
+        Of their samples [rad].
+    alone
+        Noise of each record by itself [rad], by `readings_and_noise`.
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    list of float
+        Standard deviation before the rounding [rad]: that of all records together, where a record's
+        own is not likelier by more than `policy.own_noise`. A spin at one speed hardly shows it,
+        and a drive at many does.
+
+    """
+    everything = [stretch for stretches in records for stretch in stretches]
+    _, together = readings_and_noise(everything, step, 1, policy)
+    noises = []
+    for stretches, own in zip(records, alone, strict=True):
+        blocks = _Blocks.of(stretches, step, policy)
+        unlike = [blocks.unlikeness_of_noise(noise / step) for noise in (together, own)]
+        less = (unlike[0] - unlike[1]) * blocks.recorded.size / _FREE
+        noises.append(together if less < policy.own_noise else own)
+    return noises
 
 
 @dataclass(frozen=True, slots=True)

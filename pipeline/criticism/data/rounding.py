@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -11,6 +12,8 @@ from pipeline.criticism.data.traces import parabolas
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.sensors import SensorNoise
 
+_BITS = 6, 24
+"""Bits of encoders that are tried, from the first to before the last."""
 _LOOKED_AT = 2000
 """Third differences, or samples of a part, that are looked at: enough for a mean to 2 %."""
 _STEPS = 600
@@ -275,15 +278,24 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
 
     Notes
     -----
-    Third differences d of a rounded signal are whole steps q, so that their phase e^{j2πd/q} stays
-    at 1 at the right q, even where a number format has rounded it once more. Where a format keeps a
-    number of digits, small angles have more decimals: they are looked at first, for multiples of a
-    coarse decimal may lie near those of a fraction of q. Parts of the record, longer and longer,
-    give q sharply enough to separate 4000 steps a turn from 4096.
+    An encoder of 2^n steps is found at any motion, as its values themselves are multiples of one.
+    Of another, third differences d are whole steps q, so that their phase e^{j2πd/q} stays at 1 at
+    the right q, even where a number format has rounded it once more. Where a format keeps a number
+    of digits, small angles have more decimals: they are looked at first, for multiples of a coarse
+    decimal may lie near those of a fraction of q. Parts of the record, longer and longer, give q
+    sharply enough to separate 4000 steps a turn from 4096.
 
     """
     if signal.size < policy.block + 3:
         return 0.0
+    known = signal[np.isfinite(signal)]
+    binary = (2.0 * math.pi / 2.0**bits for bits in range(*_BITS))
+    whole = (step for step in binary if is_rounded(known, step, policy))
+    return next(whole, 0.0) or _by_differences(signal, policy)
+
+
+def _by_differences(signal: Array, policy: SensorNoise) -> float:
+    """The step of a signal that moves by some steps from sample to sample, 0 of another."""
     differences = np.diff(signal, 3)
     seen = np.isfinite(differences)
     largest = sliding_window_view(np.abs(signal), 4).max(axis=1)[seen]
@@ -314,7 +326,7 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     high = [n for n in peaks if together[n] >= least]
     if not high:
         return 0.0
-    step, parts = _sharpened(signal, float(steps[high[-1]]), policy.together)
+    step, parts = _borne_out(signal, [float(steps[n]) for n in reversed(high)], policy)
     # an encoder has 2^n steps a turn, or 4 times its lines
     bits = math.log2(2.0 * math.pi / step)
     for count in (2.0 ** round(bits), float(round(2.0**bits))):
@@ -344,6 +356,22 @@ def _decimal(signal: Array) -> float:
         if np.mean(np.abs(scaled - np.round(scaled)) < _FLOATING * 10.0**decimals) > 0.5:
             return float(10.0**-decimals)
     return 0.0
+
+
+def _borne_out(signal: Array, rough: Sequence[float], policy: SensorNoise) -> tuple[float, Array]:
+    """The largest of some rough steps that the signal itself goes in, sharpened, and the parts of
+    the signal that do; the largest is the first.
+
+    Its differences may be multiples of more: of two steps, where a shaft turns by half a step more
+    or less than whole ones from sample to sample. One that is too rough to be sharpened is tried as
+    a multiple of another.
+    """
+    ends = [_sharpened(signal, step, policy.together) for step in rough]
+    step, parts = max(ends, key=lambda end: float(_coherence(end[1], np.array(end[:1]))[0]))
+    multiples = step * np.round(np.array(rough) / step)
+    multiples = np.append(multiples[multiples > step], step)
+    coherence = _coherence(parts, multiples)
+    return float(multiples[coherence >= policy.high * coherence[-1]][0]), parts
 
 
 def _sharpened(signal: Array, step: float, together: float) -> tuple[float, Array]:

@@ -123,7 +123,8 @@ class Instrument:
         How long before its motion the currents and voltages of a row are [samples]: 0.5 where they
         are means up to the instant at which the motion is read, else 0.
     single
-        Whether its voltages, stated as held from one row to the next, are of one PWM period each.
+        What `timing` is stated to be of voltages that are taken as of one PWM period each; empty
+        where they are taken as stated.
 
     """
 
@@ -139,7 +140,7 @@ class Instrument:
     snapshots: bool = False
     waves: bool = True
     behind: float = 0.0
-    single: bool = False
+    single: str = ""
 
     @property
     def commanded(self) -> bool:

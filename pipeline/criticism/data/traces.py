@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 LINES_V = ("vab_v", "vbc_v", "vca_v")
 PAD = 24
-"""Samples kept on either side of a window that is cut out: what differences and smoothing of a
-speed reach over."""
+"""Fewest samples kept on either side of a window that is cut out."""
 READ_BETWEEN = "read_between"
 """Column of the rows that were lost, or lack their angle, and are read between others."""
 _SHORTEST = 24
@@ -265,8 +264,27 @@ def decimated(signal: Array, factor: int) -> Array:
     return signal[:n].reshape(-1, factor).mean(axis=1)
 
 
+def pad_of(period: float, policy: Cutting) -> int:
+    """Samples kept on either side of a window that is cut out.
+
+    Parameters
+    ----------
+    period
+        Sample period [s].
+    policy
+        Length of the mean that makes a speed.
+
+    Returns
+    -------
+    int
+        What differences, and the smoothing of a speed, reach over.
+
+    """
+    return max(PAD, round(0.5 * policy.speed_s / period) + 3)
+
+
 def thinned(
-    columns: Mapping[str, Array], keep: Flags, length: int, most: int, pad: int = PAD
+    columns: Mapping[str, Array], keep: Flags, length: int, most: int, pad: int
 ) -> tuple[dict[str, Array], Indices]:
     """Signals cut to an even selection of windows.
 

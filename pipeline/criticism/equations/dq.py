@@ -20,7 +20,7 @@ from pipeline.criticism.data.shaft_angle import (
     with_angle,
     with_smooth_angle,
 )
-from pipeline.criticism.data.traces import PAD, even_clock, thinned, window_between_gaps
+from pipeline.criticism.data.traces import even_clock, pad_of, thinned, window_between_gaps
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.operating import Array, Complex, Operating, Signals, Values
@@ -110,7 +110,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     logged = capture.meta.test == "drive" and len(channels) > 2
     full = {**columns, "good": keep.astype(float)} if logged else None
     log = whole_log(columns, period, policy)
-    columns, starts = thinned(columns, keep, window, most, PAD + 2 * every)
+    columns, starts = thinned(columns, keep, window, most, pad_of(period, policy) + 2 * every)
     if not starts.size:
         return None
     weak = projection(columns["theta_mech_rad"], starts, window, orders)
@@ -363,7 +363,7 @@ EQUATION = Equation(
         frozenset(
             {
                 *("voltage_jumps", "instants"),
-                *("torque_jumps", "encoder_lines", "standstill", "pulses"),
+                *("current_jumps", "torque_jumps", "encoder_lines", "standstill", "pulses"),
             }
         ),
     ),

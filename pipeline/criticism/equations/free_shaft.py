@@ -13,6 +13,7 @@ from pipeline.criticism.data.shaft_angle import shaft_angle, with_angle
 from pipeline.criticism.data.traces import (
     decimated,
     even_clock,
+    pad_of,
     smoothed,
     thinned,
     window_between_gaps,
@@ -70,7 +71,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     keep = keep & _coasts(columns["theta_mech_rad"], window, machine.policy)
     sensors = prepared(columns, period, machine.policy, speed)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
-    columns, starts = thinned(columns, keep, window, policy.windows)
+    columns, starts = thinned(columns, keep, window, policy.windows, pad_of(period, policy))
     weak = projection(
         columns["theta_mech_rad"], starts, window, slow_orders(machine), cycles=2.0, margin=4.0
     )

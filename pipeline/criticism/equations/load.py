@@ -8,7 +8,7 @@ from pipeline.criticism.data.drive_log import in_time
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.sensors import TEMPERATURES, prepared, with_slow_columns
 from pipeline.criticism.data.shaft_angle import shaft_angle, with_angle, with_smooth_angle
-from pipeline.criticism.data.traces import PAD, even_clock, thinned, window_between_gaps
+from pipeline.criticism.data.traces import even_clock, pad_of, thinned, window_between_gaps
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.operating import Array, Operating, Signals, Values
@@ -54,7 +54,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     sensors = with_smooth_angle(capture, columns, sensors, machine, window)
     sensors, every = with_slow_columns(capture, columns, sensors, period, machine.policy)
     columns["t_s"] = period * np.arange(size, dtype=np.float64)
-    cut_out, starts = thinned(columns, keep, window, policy.windows, PAD + 2 * every)
+    pad = pad_of(period, policy) + 2 * every
+    cut_out, starts = thinned(columns, keep, window, policy.windows, pad)
     by_angle = "omega_mech_rad_s" not in angle
     orders = machine.electrical_orders if by_angle else ()
     weak = projection(cut_out["theta_mech_rad"], starts, window, orders)
@@ -148,7 +149,10 @@ EQUATION = Equation(
         torque_in=TORQUE,
     ),
     recorder="log",
-    sensing=Sensing(_reading, frozenset({"torque_jumps", "encoder_lines", "standstill", "pulses"})),
+    sensing=Sensing(
+        _reading,
+        frozenset({"current_jumps", "torque_jumps", "encoder_lines", "standstill", "pulses"}),
+    ),
     use=Use(turns=True, warms=frozenset({"flux"}), angle_maps=True),
     # behind the voltage of the same log
     rank=1,

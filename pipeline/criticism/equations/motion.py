@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, Unthinned, segment_of
-from pipeline.criticism.data.traces import READ_BETWEEN, thinned, window_between_gaps
+from pipeline.criticism.data.traces import READ_BETWEEN, pad_of, thinned, window_between_gaps
 from pipeline.criticism.data.unlogged_load import rests, runs_free
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
@@ -74,7 +74,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     each = 1 if steady.all() else 2
     window = window_between_gaps(log.period_s, log.keep & steady, policy, each)
     full = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
-    pad = max(policy.motion_pad, reach(log.period_s, machine.policy.torsion))
+    pad = max(pad_of(log.period_s, policy), reach(log.period_s, machine.policy.torsion))
     # a window needs the rows that show what its current does between them
     pad = max(pad, -(-(machine.policy.ripple.rows - window) // 2))
     moves = log.keep & steady & ~rests(shaft["theta_mech_rad"], window, policy)

@@ -21,6 +21,7 @@ from pipeline.criticism.data.shaft_angle import ANGLES, shaft_angle, with_angle
 from pipeline.criticism.data.traces import (
     LINES_V,
     even_clock,
+    pad_of,
     smoothed,
     thinned,
     window_between_gaps,
@@ -83,7 +84,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         samples = _phase_samples(window, period, policy)
         sensors = replace(sensors, noise=noise, phase_samples=samples)
     columns["t_s"] = period * np.arange(keep.size, dtype=np.float64)
-    columns, starts = thinned(columns, keep, window, policy.windows)
+    columns, starts = thinned(columns, keep, window, policy.windows, pad_of(period, policy))
     orders, margin = machine.electrical_orders, policy.wave_samples
     weak = projection(columns["theta_mech_rad"], starts, window, orders, margin=margin)
     weak = weak.only(_steady(weak, columns["theta_mech_rad"], policy))

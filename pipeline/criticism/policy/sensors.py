@@ -85,6 +85,9 @@ class SensorNoise:
     in_step : 1
         coherence that it then needs
         chosen: noise of 0.07 steps comes to it
+    own_noise : deviance
+        by which a record's own noise of its encoder must be likelier than that of all records
+        chosen: as two effects that tie
     most_readings : 1
         readings of an encoder at the most whose mean a drive logs as one
         chosen: drives control at 8 to 100 kHz and log at 100 Hz and more
@@ -115,4 +118,5 @@ class SensorNoise:
     undithered: float = 0.45
     moving: float = 16.0
     in_step: float = 0.9
+    own_noise: float = 12.0
     most_readings: int = 128

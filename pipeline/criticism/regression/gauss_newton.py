@@ -16,6 +16,7 @@ import numpy as np
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment, rows_where
+from pipeline.criticism.data.traces import pad_of
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import PHYSICAL, Model, base_of, zero
 from pipeline.criticism.operating import Array, Values
@@ -225,7 +226,8 @@ def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = 
         if (begins := equation_of(segment).begins) is not None:
             values |= begins(segment, model.machine)
     values |= known or {}
-    thinned = tuple(sparse(s, model.policy.cutting.rough_windows) for s in segments)
+    cutting = model.policy.cutting
+    thinned = tuple(sparse(s, cutting.rough_windows, pad_of(s.ts_s, cutting)) for s in segments)
     rough = rough_floors(thinned, model, values)
     fitted = gauss_newton(Fit(thinned, _pinned(model), values, rough, values)).fit
     return replace(fitted, model=model, segments=tuple(segments))

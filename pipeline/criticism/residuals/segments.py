@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.encoder_noise import readings_and_noise
+from pipeline.criticism.data.encoder_noise import readings_and_noise, shared_noise
 from pipeline.criticism.data.instruments import gains_of
 from pipeline.criticism.data.rounding import is_rounded, rounding_step
 from pipeline.criticism.data.segment import UNSMOOTHED, Cache, Segment, joins, with_lines
-from pipeline.criticism.data.traces import PAD, READ_BETWEEN, with_values
+from pipeline.criticism.data.traces import READ_BETWEEN, with_values
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equation_of, equations
 from pipeline.criticism.machine.model import (
@@ -23,6 +23,7 @@ from pipeline.criticism.machine.model import (
     OPEN_FLUX,
     UNLOGGED_AT_REST,
 )
+from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import THERMOMETER, TRANSDUCER, UNLOGGED, Machine
 from pipeline.criticism.residuals.observability import hooks_in
 from pipeline.numerics.coast_setups import Limits, Setup, coast_setups
@@ -65,6 +66,7 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
             gain = gains[recorded.path]
             cut = (_by_encoder(s, machine) for s in _cut(capture, machine))
             cut_segments += [_by_instruments(segment, gain) for segment in cut]
+    cut_segments = _with_shared_noise(cut_segments, machine)
     cut_segments = _from_one_zero(cut_segments, machine)
     kinds = {segment.kind for segment in cut_segments}
     # what other captures can predict is held out as a whole
@@ -226,13 +228,36 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
     count = min(round(readings), policy.most_readings) if readings > _ALTERNATING else 1
     dither = 0.0
     if step > 0.0:
-        stretches = np.split(theta, joins(segment))
-        count, dither = readings_and_noise(stretches, step, count, policy)
+        count, dither = readings_and_noise(_angles(segment), step, count, policy)
     sensors = replace(segment.sensors, angle_step_rad=step, readings=count, dither_rad=dither)
     return replace(segment, sensors=sensors)
 
 
-def sparse(segment: Segment, windows: int) -> Segment:
+def _with_shared_noise(found: Sequence[Segment], machine: Machine) -> list[Segment]:
+    """Segments with the noise of their encoder before its rounding as all of them show it, in the
+    same steps.
+    """
+    with_noise = list(found)
+    single = [n for n, one in enumerate(found) if one.sensors.readings == 1]
+    for step in {step for n in single if (step := found[n].sensors.angle_step_rad)}:
+        places = [n for n in single if found[n].sensors.angle_step_rad == step]
+        if len(places) == 1:
+            continue
+        alone = [found[n].sensors.dither_rad for n in places]
+        records = [_angles(found[n]) for n in places]
+        noises = shared_noise(records, step, alone, machine.policy.sensor_noise)
+        for n, noise in zip(places, noises, strict=True):
+            with_noise[n] = replace(found[n], sensors=replace(found[n].sensors, dither_rad=noise))
+    return with_noise
+
+
+def _angles(segment: Segment) -> list[Array]:
+    """Stretches of the recorded angle [rad], before any smoothing, each without a gap."""
+    theta = segment.recorded.get(UNSMOOTHED, segment.recorded.get("theta_mech_rad"))
+    return [] if theta is None else np.split(theta, joins(segment))
+
+
+def sparse(segment: Segment, windows: int, pad: int) -> Segment:
     """The same segment with a few of its windows only, for a first, rough fit.
 
     Parameters
@@ -241,6 +266,8 @@ def sparse(segment: Segment, windows: int) -> Segment:
         The segment.
     windows
         How many windows are kept.
+    pad
+        Samples on either side of each that are kept as well.
 
     Returns
     -------
@@ -253,10 +280,10 @@ def sparse(segment: Segment, windows: int) -> Segment:
         return segment
     chosen = np.linspace(0, weak.starts.size - 1, windows).round().astype(np.int64)
     starts = weak.starts[chosen]
-    rows = starts[:, None] - PAD + np.arange(weak.length + 2 * PAD)[None, :]
+    rows = starts[:, None] - pad + np.arange(weak.length + 2 * pad)[None, :]
     rows = np.clip(rows, 0, segment.size - 1).ravel()
     cut = {name: column[rows] for name, column in segment.recorded.items()}
-    moved = PAD + (weak.length + 2 * PAD) * np.arange(windows)
+    moved = pad + (weak.length + 2 * pad) * np.arange(windows)
     thin = replace(weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen])
     blocks = None if segment.blocks is None else segment.blocks[chosen]
     short = replace(segment, recorded=cut, weak=thin, blocks=blocks, cache=Cache())

@@ -49,8 +49,8 @@ _STATOR = (
     "rotor is in it; in the shaft it would miss by more"
 )
 _SINGLE = (
-    "voltages of {} captures, stated as held from one row to the next, are taken as those of one "
-    "PWM period each, which explains them better"
+    "voltages of {} captures, stated as held from one row to the next or as means about a row, are "
+    "taken as those of one PWM period each, which explains them better"
 )
 _SAMPLED = (
     "voltages of {} captures are taken in the rotor frame of the sampling instant, which explains "
@@ -149,7 +149,7 @@ def reading_notes(fit: Fit) -> tuple[str, ...]:
         for note, applies in (
             (_SAMPLED, is_sampled),
             (_MEANS, segment.instrument.behind != 0.0),
-            (_SINGLE, segment.instrument.single),
+            (_SINGLE, bool(segment.instrument.single)),
             (_STATOR, segment.instrument.stator),
             (_DELAYED, delayed and not is_sampled and _has_held_vectors(segment, share)),
         ):
@@ -212,13 +212,13 @@ def _may_hold_means(segment: Segment, slower_share: float) -> bool:
 
 
 def _may_be_single(segment: Segment, slower_share: float) -> bool:
-    """Whether voltages that are stated as held from row to row may be of one PWM period each: in a
-    log that is slower than its PWM.
+    """Whether voltages that are stated as held from row to row, or as means about a row, may be of
+    one PWM period each: in a log that is slower than its PWM.
     """
     instrument, pwm_s = segment.instrument, segment.fixed.get("pwm_s", 0.0)
     slow = 0.0 < pwm_s < slower_share * segment.ts_s
     return "vd_v" in segment.channels and (
-        instrument.single or (slow and instrument.timing == "held")
+        bool(instrument.single) or (slow and instrument.timing != "instant")
     )
 
 
@@ -233,8 +233,8 @@ def _of_other_rows(segment: Segment) -> Segment:
 
 
 def _of_other_hold(machine: Machine, segment: Segment) -> Segment:
-    single = not segment.instrument.single
-    timing = "instant" if single else "held"
+    stated, timing = segment.instrument.single, segment.instrument.timing
+    single, timing = ("", stated) if stated else (timing, "instant")
     instrument = replace(
         segment.instrument, single=single, timing=timing, points=1, snapshots=False
     )

@@ -90,7 +90,7 @@ def test_ends_with_other_floors_do_not_compare_by_their_deviance(monkeypatch):
     winding = ("vd_v", "vq_v")
     segments = (
         replace(log(seed=1, noise=1.0), channels=winding),
-        sparse(log(seed=2, noise=1.0), 2),
+        sparse(log(seed=2, noise=1.0), 2, 24),
     )
     lost = astray(segments)
 

@@ -60,15 +60,15 @@ def test_the_step_of_an_encoder_is_seen_beside_rows_that_are_read_between_others
         assert segment.sensors.readings == 1
 
 
-def test_logs_of_a_row_or_without_a_clock_show_no_step():
+def test_a_log_of_a_row_shows_no_step_and_one_without_a_clock_its_own():
     """They are not used, and stand beside others."""
     one = recorded("gimbal-5208", 13, 3, without_rows)
     (drive,) = one.of("drive")
     (table,) = drive.tables
-    for short in (table.head(1), table.head(400).with_columns(t_s=pl.lit(0.0))):
-        assert (
-            encoder_step(replace(one, captures=(replace(drive, tables=(short,)),)), DEFAULT) == 0.0
-        )
+    timeless = table.head(400).with_columns(t_s=pl.lit(0.0))
+    for short, step in ((table.head(1), 0.0), (timeless, 2.0 * np.pi / 2**13)):
+        alone = replace(one, captures=(replace(drive, tables=(short,)),))
+        assert encoder_step(alone, DEFAULT) == step
 
 
 def test_a_row_that_is_read_between_others_repeats_their_noise():

@@ -98,7 +98,7 @@ def test_every_hundredth_row_of_a_log_holds_no_voltage_until_the_next() -> None:
     assert isinstance(base, BaseFit)
     fit = by_best_readings(base.system).fit
     (drive,) = (s.instrument for s in fit.segments if "vd_v" in s.channels)
-    assert (drive.single, drive.behind) == (True, 0.0)
+    assert (drive.single, drive.behind) == ("held", 0.0)
     assert "one PWM period each" in reading_notes(fit)[0]
 
 

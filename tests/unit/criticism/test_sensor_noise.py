@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.data.encoder_noise import readings_and_noise
+from pipeline.criticism.data.encoder_noise import readings_and_noise, shared_noise
 from pipeline.criticism.data.machine_scale import encoder_step
 from pipeline.criticism.data.rounding import (
     coarse_step,
@@ -85,6 +85,25 @@ def test_a_shaft_that_turns_by_nearly_whole_steps_a_sample_shows_its_step():
     theta = np.round(np.round(moved / step) * step, 8)
     assert np.median(np.abs(np.diff(theta, 3))) < 1e-3 * step
     assert rounding_step(theta, SENSORS) == pytest.approx(step, rel=1e-9)
+
+
+def test_a_shaft_that_turns_by_half_a_step_more_or_less_has_no_step_of_two():
+    """Its counts go 103, 104, 103, 104: third differences are whole multiples of two, but a few."""
+    step, row = 2.0 * np.pi / 4096, np.arange(1651)
+    theta = np.round(103.49 * row + 1e-4 * row**1.2) * step
+    third = np.round(np.diff(theta, 3) / step)
+    assert np.mean(third % 2 == 0) > 0.95
+    assert rounding_step(theta, SENSORS) == pytest.approx(step, rel=1e-9)
+
+
+def test_a_shaft_that_jerks_by_many_steps_a_row_shows_them():
+    """Third differences of a light rotor in rows of a millisecond are thirty steps, and no beat."""
+    step, random = 2.0 * np.pi / 2**11, np.random.default_rng(3)
+    moved = np.cumsum(np.cumsum(0.03 * random.normal(size=1000)))
+    theta = np.round(moved / step) * step
+    assert np.std(np.diff(theta, 3)) > 10.0 * step
+    assert rounding_step(theta, SENSORS) == pytest.approx(step, rel=1e-9)
+    assert rounding_step(moved, SENSORS) == 0.0
 
 
 def test_rows_that_lack_their_angle_hide_no_step():
@@ -280,6 +299,31 @@ def test_noise_before_a_rounding_is_found_at_a_few_even_paces(share, paces):
     noisy = moved + share * random.standard_normal(moved.size)
     _, dither = readings_and_noise([step * np.round(noisy)], step, 1, SENSORS)
     assert dither / step == pytest.approx(share, abs=0.04)
+
+
+def test_noise_of_many_steps_is_found() -> None:
+    """Of an encoder of 17 bits a noise of half a milliradian is ten of its steps."""
+    step, random = 2.0 * np.pi / 2**17, np.random.default_rng(6)
+    moved = 3.4 * np.arange(8000) + 10.0 * random.standard_normal(8000)
+    _, noise = readings_and_noise([step * np.round(moved)], step, 1, SENSORS)
+    assert noise / step == pytest.approx(10.0, rel=0.1)
+
+
+def test_a_spin_has_the_noise_that_a_drive_shows_of_their_encoder() -> None:
+    """At thirds of a step a sample a noise of a twentieth makes no other reading."""
+    step, random = 2.0 * np.pi / 2**11, np.random.default_rng(7)
+    rows = np.arange(5000)
+    spin, drive = 4.0 / 3.0 * rows, 900.0 * np.sin(rows / 500.0)
+    loud = drive + 2.0 * random.standard_normal(rows.size)
+    paths = (spin, drive, loud)
+    noisy = [one + 0.05 * random.standard_normal(rows.size) for one in paths]
+    records = [[step * np.round(one)] for one in noisy]
+    alone = [readings_and_noise(one, step, 1, SENSORS)[1] for one in records]
+    assert alone[0] < 0.02 * step
+    shared = shared_noise(records[:2], step, alone[:2], SENSORS)
+    assert np.array(shared) / step == pytest.approx([0.05, 0.05], abs=0.02)
+    of_each = shared_noise(records, step, alone, SENSORS)
+    assert of_each[2] / step == pytest.approx(2.0, rel=0.1)
 
 
 @pytest.mark.parametrize("turns", [0.0, 40.0])
