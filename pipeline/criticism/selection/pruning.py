@@ -23,6 +23,7 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import NormalEquations
+from pipeline.criticism.regression.reported import reported_parameters
 from pipeline.criticism.residuals.channels import of_acceleration
 from pipeline.criticism.selection.acceptance import sure_amplitudes
 from pipeline.criticism.selection.choices import better_of
@@ -240,15 +241,22 @@ def unsure_effect(wide: LinearSystem, base: int) -> tuple[str, LinearSystem] | N
     Notes
     -----
     One may be unsure as long as another stands for it as well, so they go one at a time. One that
-    takes most of an error is there, however badly its size is known.
+    takes most of an error is there, however badly its size is known. An error of a sensor is a size
+    and nothing else: one that would be reported without any is not there.
 
     """
     added = wide.fit.model.effects[base:]
     if not added:
         return None
     system = wide.only(np.arange(wide.model_column_count))
-    held_out = leave_out(system)
-    unsure = [e.name for e in added if not sure_amplitudes(system, held_out, e)]
+    held_out, machine = leave_out(system), wide.fit.model.machine
+    reported = reported_parameters(system, held_out)
+    unsure = [
+        e.name
+        for e in added
+        if not sure_amplitudes(system, held_out, e)
+        or (e.hook == "sensor" and not any(reported[name].known for name in e.named(machine)))
+    ]
     for name in sorted(unsure, key=lambda name: loss_without(system, (name,))):
         without = gauss_newton(system.fit.without(name), before=system)
         chi2 = [fitted.reduced_chi2(fitted.residual) for fitted in (without, system)]

@@ -8,8 +8,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline import Recordings, diagnose
 from pipeline.contracts.schemas import check_tables
 from pipeline.records.capture import Capture, CaptureMeta
+from tests.benchmark.worlds import with_drawn
+from tests.benchmark.worlds.case import WorldCase
 from tests.benchmark.worlds.damage import CURRENTS, KINDS, VOLTAGES, Columns, damaged
 from tests.benchmark.worlds.table import cases
 from tests.benchmark.worlds.with_drawn import EACH, campaign, draw_of
@@ -130,3 +133,16 @@ def test_what_is_drawn_does_not_hang_on_what_is_hidden_and_comes_again_as_the_sa
     assert [c.path for c in plain.captures] == [c.path for c in one.captures]
     names = {word for c in one.captures for word in (c.path, *c.meta.extra.values())}
     assert not any(effect in word for effect in case.effects for word in names)
+
+
+@pytest.mark.slow
+def test_an_error_of_a_sensor_without_a_size_is_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An eccentric encoder in one torque map of 1 kHz had a clock 10 % off and a `torque_scale`."""
+    case = WorldCase("drawn", "rows", 542, {"angle_eccentricity": 1.0})
+    drawn = draw_of(case)
+    bench = replace(drawn.bench, encoder_bits=13, encoder_noise_rad=0.0, jitter_s=0.0)
+    thinned = replace(drawn, bench=bench, damage=KINDS["rows"]["milliseconds"])
+    monkeypatch.setattr(with_drawn, "draw_of", lambda _: thinned)
+    found = with_drawn.campaign(case)
+    diagnosis = diagnose(Recordings({found.motor_id: found}))[found.motor_id]
+    assert not set(diagnosis.missing) - set(case.effects)
