@@ -264,7 +264,7 @@ def decimated(signal: Array, factor: int) -> Array:
     return signal[:n].reshape(-1, factor).mean(axis=1)
 
 
-def pad_of(period: float, policy: Cutting) -> int:
+def pad_of(period: float, policy: Cutting, least: int = PAD) -> int:
     """Samples kept on either side of a window that is cut out.
 
     Parameters
@@ -273,6 +273,8 @@ def pad_of(period: float, policy: Cutting) -> int:
         Sample period [s].
     policy
         Length of the mean that makes a speed.
+    least
+        Fewest of them.
 
     Returns
     -------
@@ -280,7 +282,7 @@ def pad_of(period: float, policy: Cutting) -> int:
         What differences, and the smoothing of a speed, reach over.
 
     """
-    return max(PAD, round(0.5 * policy.speed_s / period) + 3)
+    return max(least, round(0.5 * policy.speed_s / period) + 3)
 
 
 def thinned(

@@ -74,7 +74,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     each = 1 if steady.all() else 2
     window = window_between_gaps(log.period_s, log.keep & steady, policy, each)
     full = {**shaft, "good": log.keep.astype(float)} if capture.meta.test == "drive" else None
-    pad = max(pad_of(log.period_s, policy), reach(log.period_s, machine.policy.torsion))
+    pad = pad_of(log.period_s, policy, policy.motion_pad)
+    pad = max(pad, reach(log.period_s, machine.policy.torsion))
     # a window needs the rows that show what its current does between them
     pad = max(pad, -(-(machine.policy.ripple.rows - window) // 2))
     moves = log.keep & steady & ~rests(shaft["theta_mech_rad"], window, policy)

@@ -33,6 +33,9 @@ class Cutting:
     windows_motion : windows
         windows of a shaft's motion at the most
         chosen: a bound of the cost, which goes with them
+    motion_pad : samples
+        samples kept at either side of a window of a shaft's motion at least
+        derived: the angle's second difference, and a mean of its speed, need a few
     rough_windows : windows
         windows of a segment in a rough fit
         chosen: enough to meet a sound J to a tenth
@@ -222,6 +225,7 @@ class Cutting:
     windows: int = 48
     windows_drive: int = 32
     windows_motion: int = 160
+    motion_pad: int = 8
     rough_windows: int = 12
     temperature_s: float = 0.05
     speed_s: float = 0.002
