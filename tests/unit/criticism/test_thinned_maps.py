@@ -34,7 +34,11 @@ def found(tests: tuple[str, ...], dyno_hz: float, **effects: float) -> pipeline.
 
 
 @pytest.mark.parametrize(
-    ("test", "dyno_hz"), [("torque_map_backward", 3.0), ("torque_map_slow", 0.0)]
+    ("test", "dyno_hz"),
+    [
+        ("torque_map_backward", 3.0),
+        pytest.param("torque_map_slow", 0.0, marks=pytest.mark.slow),
+    ],
 )
 def test_a_sound_motor_is_quiet_whatever_falls_between_two_rows(test, dyno_hz) -> None:
     """A dynamometer that gives way takes the torque of a step as acceleration, at an instant that
