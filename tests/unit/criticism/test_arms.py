@@ -66,6 +66,7 @@ def test_the_weight_of_a_light_arm_is_named() -> None:
     assert found.ladder[-1].held_out < 1.5
 
 
+@pytest.mark.slow
 def test_friction_of_a_gear_is_named_beside_the_weight_of_its_arm() -> None:
     """A twentieth of a weight, by which its sine might be wrong, was as large as the friction."""
     (found,) = pipeline.diagnose(arm(20.0, 1.5, share=0.05), constants=KT).motors.values()

@@ -82,6 +82,7 @@ def test_an_encoder_that_was_mounted_again_has_another_zero():
     assert found.difference == pytest.approx(0.03, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_large_change_is_that_of_a_fit_of_either_part():
     """A disc that doubles the inertia was told as half of it: acceleration goes with 1/J."""
     sound = replace(design("servo-ipm"), effects={})

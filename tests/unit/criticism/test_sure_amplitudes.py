@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from pipeline import Recordings, diagnose
 from pipeline.criticism.library.registry import effects
@@ -60,6 +61,7 @@ def test_what_shows_as_a_product_only_is_there() -> None:
     assert not product_nonzero(tied, held_out, (names[0], "compliance.share"), 2.0)
 
 
+@pytest.mark.slow
 def test_inductances_that_fall_by_an_unknown_share_fall() -> None:
     """Torque maps show L_d - L_q alone, so what part of an inductance is lost stays open."""
     motor = design("joint-11p")
