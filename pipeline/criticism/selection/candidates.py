@@ -123,13 +123,16 @@ def placed(wide: LinearSystem, offered: Sequence[Candidate]) -> Iterator[tuple[C
     Yields
     ------
     tuple of Candidate and array
-        Indices into `wide.columns`.
+        Indices into `wide.columns`. A candidate that the system was not widened with is left out.
 
     """
+    names = [column.name for column in wide.columns]
     first = wide.model_columns.size
     for candidate in offered:
-        yield candidate, np.arange(first, first + len(candidate.columns))
-        first += len(candidate.columns)
+        end = first + len(candidate.columns)
+        if names[first:end] == [column.name for column in candidate.columns]:
+            yield candidate, np.arange(first, end)
+            first = end
 
 
 def searched(offered: Sequence[Candidate], effect: Effect) -> float:

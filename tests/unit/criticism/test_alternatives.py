@@ -14,7 +14,7 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.selection.alternatives import alternatives_to
-from pipeline.criticism.selection.candidates import candidates, widened
+from pipeline.criticism.selection.candidates import candidates, placed, widened
 from pipeline.criticism.selection.stepwise import search
 from tests.unit.criticism.machines import (
     BASE,
@@ -22,6 +22,7 @@ from tests.unit.criticism.machines import (
     asking_for,
     curved,
     fitted,
+    log,
     machine,
     with_drag,
 )
@@ -164,3 +165,17 @@ def test_what_noise_in_a_speed_loop_looks_like_needs_a_remainder_that_is_reporte
     fit = fitted((with_drag(drag), with_drag(drag, 6)))
     assert not significant_groups(search(fit, {})[0].system).any()
     assert search(fit, library)[-1].added == (() if coupling else ("windage",))
+
+
+def test_candidates_that_a_system_was_not_widened_with_have_no_place() -> None:
+    """The end of the tutorial: a diagnosis counted the columns of one candidate too many."""
+    fit = fitted([log(noise=1.0)])
+    offered = candidates(effects(), fit.model)
+    missing = next(one for one in offered if one.effect.name == "windage")
+    some = tuple(one for one in offered if one.effect.name != "windage")
+    wide = widened(fit, some)
+    found = list(placed(wide, offered))
+    assert [one for one, _ in found] == list(some)
+    assert missing in offered
+    for one, places in found:
+        assert [wide.columns[n].name for n in places] == [c.name for c in one.columns]
