@@ -8,6 +8,7 @@ from itertools import pairwise
 
 from pipeline.criticism.data.machine_scale import PAIRLESS, PARAMETERS, machine_of
 from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.shaft_angle import ANGLES
 from pipeline.criticism.discovery.changed_constants import Change
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
@@ -363,9 +364,11 @@ def _may_be_observer_noise(end: SearchResult) -> bool:
 
 def _may_be_unlogged_current(end: SearchResult) -> bool:
     """Whether all that is left is of torque maps without their d current: a map steps through both,
-    and whatever is missed there may be of the one that is not known.
+    and whatever is missed there may be of the one that is not known. A curve over the angle alone
+    is of no current.
     """
     last = end.ladder.steps[-1].system
     maps = {s.capture for s in last.segments if s.test == "torque_map" and "id_a" not in s.recorded}
     left = {left_over.capture for left_over in end.remainders}
-    return not end.freed and bool(left) and left <= maps
+    of_angle = end.sketch is not None and ANGLES.issuperset(end.sketch.variables)
+    return not (end.freed or of_angle) and bool(left) and left <= maps

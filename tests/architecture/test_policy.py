@@ -76,8 +76,9 @@ ARITHMETIC = {
         "_DIGITS",
         "_MOST_DECIMALS",
     },
+    "data/sensors.py": {"FREE"},  # of third differences
     # the grid of a search for a noise; digits of a file
-    "data/encoder_noise.py": {"_SHIFTS", "_SHARES", "_BETWEEN", "_BLOCKS", "_NONE", "_FREE"},
+    "data/encoder_noise.py": {"_SHIFTS", "_SHARES", "_BETWEEN", "_BLOCKS", "_NONE"},
     "data/machine_scale.py": {"_BINS_AN_ORDER", "_SAME_ANGLE"},  # twice Nyquist; rounding
     "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight
     "design/experiments.py": {"_SEED"},

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from pipeline.criticism.data.rounding import readings_error, smoothed
+from pipeline.criticism.data.sensors import FREE
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.sensors import SensorNoise
 
@@ -21,8 +22,6 @@ _BLOCKS = 120
 the rounding, up to a hundred [steps], and how many lie between the best two; blocks that are looked
 at.
 """
-_FREE = 2.2
-"""Third differences of white noise that are as good as one independent number."""
 _NONE = 1e-3
 """Power of third differences [steps²] that the digits of a file may leave where there is none."""
 
@@ -100,7 +99,7 @@ def shared_noise(
     for stretches, own in zip(records, alone, strict=True):
         blocks = _Blocks.of(stretches, step, policy)
         unlike = [blocks.unlikeness_of_noise(noise / step) for noise in (together, own)]
-        less = (unlike[0] - unlike[1]) * blocks.recorded.size / _FREE
+        less = (unlike[0] - unlike[1]) * blocks.recorded.size / FREE
         noises.append(together if less < policy.own_noise else own)
     return noises
 

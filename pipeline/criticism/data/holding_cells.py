@@ -100,7 +100,7 @@ def _cells(
         means.append((theta[rows].mean(), current[rows].mean()))
         if rows.size >= policy.cell_rows:
             residuals.append(_about_a_line(theta[rows], current[rows]))
-    return np.array(means).reshape(-1, 2), residuals
+    return np.array(means), residuals
 
 
 def _about_a_line(theta: Array, current: Array) -> Array:

@@ -21,6 +21,8 @@ from pipeline.records.row_means import slower_rows
 
 TEMPERATURES = ("temp_winding_degc", "temp_magnet_degc")
 CURRENTS, TORQUE = ("id_a", "iq_a"), "torque_shaft_nm"
+FREE = 2.2
+"""Third differences of white noise that are as good as one independent number."""
 
 
 def prepared(
@@ -237,7 +239,7 @@ def _of_blocks(third: Array, width: int, quantile: tuple[float, ...]) -> float:
     """
     blocks = third[: third.size // width * width].reshape(-1, width)
     # Wilson and Hilferty's quantile of chi-square with the samples that third differences leave
-    spread, (share, deviate) = 2.0 / (9.0 * width / 2.2), quantile
+    spread, (share, deviate) = 2.0 / (9.0 * width / FREE), quantile
     below = (1.0 - spread + deviate * math.sqrt(spread)) ** 3
     return math.sqrt(float(np.quantile((blocks**2).mean(axis=1), share)) / (20.0 * below))
 

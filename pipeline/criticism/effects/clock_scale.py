@@ -25,7 +25,7 @@ EFFECT = Effect(
     "crystal's rate",
     parameters=(
         # a recorder without a crystal is good to some percent
-        Parameter("gain", "1", 0.02, 0.002, low=-0.05, high=0.05),
+        Parameter("gain", "1", 0.02, 0.002, low=-0.1, high=0.1),
         choice(
             "of",
             (_TURNING, _LOG, _OPEN, _SHAFT, _STEP, _OPEN + _SHAFT, _TURNING + _STEP),

@@ -442,7 +442,7 @@ def test_no_more_of_an_effect_is_named_than_there_can_be(part, possible):
     clock = effects()["clock_scale"]
     model = Model(machine(), (clock,))
     (gain, _) = clock.parameters
-    assert gain.high == 0.05
+    assert gain.high == 0.1
     values = {**BASE, "clock_scale.gain": part * gain.high, "clock_scale.of": 7.0}
     assert material(Fit((), model, values, (), values), clock) is possible
 

@@ -8,15 +8,16 @@ import pytest
 
 import pipeline
 from pipeline.simulator.bench import CAMPAIGN, campaign
-from pipeline.simulator.design import EXACT, Bench
+from pipeline.simulator.design import EXACT, Bench, Motor
+from pipeline.simulator.outside import with_unknown
 from tests.simulated import campaign_of, design
 
 MAP = "torque_map_backward"
+SOUND = replace(design("joint-11p"), effects={})
 
 
-def found(*gone: str, **effects: float) -> pipeline.Diagnosis:
+def found(*gone: str, motor: Motor = SOUND) -> pipeline.Diagnosis:
     """Of a motor by one torque map, some columns of it not recorded."""
-    motor = replace(design("joint-11p"), effects={}).having(**effects)
     plan = tuple(step for step in CAMPAIGN if step[0] == MAP)
     made = campaign_of(campaign(motor, Bench(instruments=EXACT), 2, plan))
     (log,) = made.captures
@@ -32,6 +33,16 @@ def test_what_a_map_misses_without_its_d_current_is_insufficient(gone: tuple[str
     assert (diagnosis.verdict, diagnosis.missing) == ("insufficient", ())
     assert any(left.matters for left in diagnosis.remainder)
     assert any("id_a that was not recorded" in note for note in diagnosis.notes)
+
+
+def test_what_goes_with_the_angle_alone_is_of_no_current() -> None:
+    """A tight spot of the shaft is no effect of the library, and as unknown as in a whole log."""
+    diagnosis = found(
+        "id_a", motor=with_unknown(replace(design("servo-ipm"), effects={}), "tight_spot", 3.0)
+    )
+    assert diagnosis.verdict == "unknown"
+    assert diagnosis.unknown is not None
+    assert diagnosis.unknown.variables == ("theta_mech_rad",)
 
 
 def test_a_whole_map_misses_nothing_and_needs_no_note() -> None:
