@@ -3,7 +3,8 @@
 `search_ladder` adds effects to the requested model step by step (`selection.stepwise`), drops
 unsupported steps, and describes what no effect explains. No effect can explain an order of the
 angle that no equation observes, or an instrument that drifts. Where either is found, the search is
-repeated with it in the model, and the last result is reported.
+repeated with it in the model, and the last result is reported. So it is with torque read at the
+other place, where that leaves nothing.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from pipeline.criticism.selection.drift import drifting_segments
 from pipeline.criticism.selection.free_shares import friction_notes, share_notes
 from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.order_scan import orders_left
+from pipeline.criticism.selection.other_readings import at_other_place
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of
 from pipeline.criticism.selection.stepwise import LadderStep, search
 from pipeline.criticism.selection.truncation import SHAFT, contradiction, explained, truncated
@@ -176,7 +178,7 @@ def search_ladder(
         start, wider = base, replace(machine, load_orders=orders)
         if orders:
             start = fit_of(segments(campaign, wider), model_of(model, wider))
-        return _without_parts_of_a_curve(ladder_from(start, library))
+        return _from_other_place(_without_parts_of_a_curve(ladder_from(start, library)), library)
 
     ladder, sketch, gain = _by_orders(search_again, name)
     remainders, notes = ladder.remainders, []
@@ -307,6 +309,23 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
     held_out = in_common([r.system for r in kept], errors[: len(kept)])
     cut = {step.added[-1]: contradiction(step) for step in steps[len(kept) :]}
     return Ladder(start, kept, list(held_out), remainders, cut | unconfirmed)
+
+
+def _from_other_place(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder:
+    """The ladder with torque read at the other place, stator or shaft, where that leaves nothing
+    and this does.
+
+    What an effect hides may be more than the friction and inertia that discriminate the places,
+    and beside the wrong inertia it has no size to be named with.
+    """
+    system = ladder.base.system
+    if ladder.explains(ladder.remainders) or (elsewhere := at_other_place(system)) is None:
+        return ladder
+    if elsewhere.deviance >= system.deviance - system.policy.selection.tie:
+        return ladder
+    start = BaseFit(elsewhere, ladder.base.hum)
+    other = _without_parts_of_a_curve(ladder_from(start, library))
+    return other if other.explains(other.remainders) else ladder
 
 
 def _without_parts_of_a_curve(ladder: Ladder) -> Ladder:

@@ -27,6 +27,7 @@ from operator import attrgetter
 import numpy as np
 
 from pipeline.criticism.data.segment import Cache, Segment
+from pipeline.criticism.operating import Flags
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
@@ -174,19 +175,38 @@ def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
             yield gauss_newton(replace(system.fit, segments=read))
     if any(ripples(segment) for segment in system.segments):
         yield gauss_newton(replace(system.fit, segments=tuple(map(_other_lines, system.segments))))
-    torques = np.array([channel == TORQUE for _, channel, _ in system.labels], dtype=bool)
-    if np.any(torques & significant_groups(system)):
-        moved = (_at_other_place(s) if _reads_torque(s) else s for s in system.segments)
-        # only the inertia's column is another there
-        kept = np.flatnonzero([column.name != "j_kgm2" for column in system.columns])
-        fit = replace(system.fit, segments=tuple(moved))
-        elsewhere = gauss_newton(fit, before=system.only(kept))
-        # what neither place explains is an effect's, and no coupling shows at the stator; the
-        # deviance is logarithmic, so what it spoils in other captures counts by its power
-        if clears(
-            system, torques, *(one.reduced_chi2(one.residual) for one in (system, elsewhere))
-        ):
-            yield elsewhere
+    elsewhere = at_other_place(system)
+    # what neither place explains is an effect's, and no coupling shows at the stator; the
+    # deviance is logarithmic, so what it spoils in other captures counts by its power
+    if elsewhere is not None and clears(
+        system,
+        _of_torque(system),
+        *(one.reduced_chi2(one.residual) for one in (system, elsewhere)),
+    ):
+        yield elsewhere
+
+
+def at_other_place(system: LinearSystem) -> LinearSystem | None:
+    """The fit with every torque read at the other place: at the stator, or in the shaft.
+
+    Parameters
+    ----------
+    system
+        A fit.
+
+    Returns
+    -------
+    LinearSystem or None
+        None where no torque is missed.
+
+    """
+    if not np.any(_of_torque(system) & significant_groups(system)):
+        return None
+    moved = (_at_other_place(s) if _reads_torque(s) else s for s in system.segments)
+    # only the inertia's column is another there
+    kept = np.flatnonzero([column.name != "j_kgm2" for column in system.columns])
+    fit = replace(system.fit, segments=tuple(moved))
+    return gauss_newton(fit, before=system.only(kept))
 
 
 def _has_held_vectors(segment: Segment, slower_share: float) -> bool:
@@ -245,6 +265,11 @@ def _of_other_hold(machine: Machine, segment: Segment) -> Segment:
 def _other_lines(segment: Segment) -> Segment:
     instrument = segment.instrument
     return replace(segment, instrument=replace(instrument, waves=not instrument.waves))
+
+
+def _of_torque(system: LinearSystem) -> Flags:
+    """Which groups of rows [G] are of a transducer's torque."""
+    return np.array([channel == TORQUE for _, channel, _ in system.labels], dtype=bool)
 
 
 def _reads_torque(segment: Segment) -> bool:

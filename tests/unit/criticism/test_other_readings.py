@@ -49,6 +49,18 @@ def test_the_place_of_a_transducer_is_told_and_is_no_effect(place, hidden, tests
     assert [note[: len(told[0])] for note in notes] == told
 
 
+def test_what_neither_place_explains_does_not_hide_the_place():
+    """An unbalance of more torque than friction and inertia: J at its bound, and `unknown`."""
+    motor = replace(design("servo-ipm"), effects={})
+    heavy = motor.having(unbalance=2.0 * motor.torque_coulomb_nm)
+    plan = tuple(step for step in CAMPAIGN if step[0] in TESTS)
+    recorded = campaign_of(campaign(heavy, PLACES["at the stator"], 5, plan))
+    result = diagnose(recorded, ModelSpec(), Constants())
+    assert (result.verdict, result.missing) == ("missing", ("unbalance",))
+    assert result.constants["j_rotor_kgm2"].value == pytest.approx(motor.j_rotor_kgm2, rel=0.1)
+    assert any("read at the stator" in note for note in result.notes)
+
+
 @pytest.mark.slow
 def test_an_encoder_off_its_centre_is_not_taken_for_torque_read_at_the_stator():
     """J θ″ of 0.1 mrad of run-out misses by more than a torque without any inertia does."""
