@@ -107,7 +107,8 @@ def even_clock(
     Notes
     -----
     A clock that is even within a thousandth is taken as it is. Of another one it is found out
-    whether the samples came unevenly, and are interpolated, or only their stamps, and are counted.
+    whether the samples came unevenly, and are interpolated, or only their stamps, and are counted:
+    then rows are read between others by their number, as their stamps are off.
 
     """
     home = capture.table_of("t_s", *names)
@@ -116,6 +117,7 @@ def even_clock(
     time = columns.pop("t_s")
     period = float(np.median(np.diff(time)))
     lacks = _lacks_angle(capture.tables[home], names)
+    recorded = {name: _recorded(capture.tables[home], name, c) for name, c in columns.items()}
     for name, column in columns.items():
         finite = np.isfinite(column)
         if not finite.all() and finite.any():
@@ -126,12 +128,12 @@ def even_clock(
     if clock:
         period, number = clock
         even = np.arange(number[-1] + 1)
-        there, recorded = np.zeros((2, even.size), dtype=bool)
-        there[number], recorded[number] = True, keep
-        columns = {name: _filled(_placed(column, number)) for name, column in columns.items()}
+        there, kept = np.zeros((2, even.size), dtype=bool)
+        there[number], kept[number] = True, keep
+        columns = {name: _filled(_placed(column, number)) for name, column in recorded.items()}
         single, lost = np.zeros((2, even.size), dtype=bool)
-        lost[1:-1] = ~there[1:-1] & recorded[:-2] & recorded[2:]
-        single[number], keep = lacks, recorded | lost
+        lost[1:-1] = ~there[1:-1] & kept[:-2] & kept[2:]
+        single[number], keep = lacks, kept | lost
         lacks = single | lost
     elif uneven:
         even = time[0] + period * np.arange(round((time[-1] - time[0]) / period) + 1)
@@ -147,6 +149,13 @@ def even_clock(
     if np.any(lacks & keep):
         columns[READ_BETWEEN] = (lacks & keep).astype(np.float64)
     return period, columns, keep
+
+
+def _recorded(table: pl.DataFrame, name: str, column: Array) -> Array:
+    """A column [n] without what was read between its rows by their stamps, NaN there."""
+    if name not in table.columns:
+        return column
+    return np.where(np.isfinite(table[name].to_numpy()), column, np.nan)
 
 
 def _lacks_angle(table: pl.DataFrame, names: Iterable[str]) -> Flags:
