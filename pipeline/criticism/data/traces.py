@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pipeline.criticism.data.kept_digits import at_largest_step
 from pipeline.criticism.operating import Array, Flags, Indices
 from pipeline.criticism.policy.captures import Cutting
 from pipeline.numerics.clocks import clearest_ratio, counted
@@ -31,7 +32,7 @@ _SHORTEST = 24
 
 def with_values(capture: Capture) -> Capture | None:
     """The capture without columns that hold no value at the samples of its richest table, in rows
-    that no gate set aside.
+    that no gate set aside; those of a log each at one step.
 
     Parameters
     ----------
@@ -56,10 +57,12 @@ def with_values(capture: Capture) -> Capture | None:
     ]
     if all(set(names) <= {"t_s"} for names in names_of):
         return None
-    if all(len(names) == len(t.columns) for names, t in zip(names_of, capture.tables, strict=True)):
-        return capture
-    tables = tuple(t.select(names) for names, t in zip(names_of, capture.tables, strict=True))
-    return replace(capture, tables=tables)
+    tables = tuple(
+        at_largest_step(t if len(names) == len(t.columns) else t.select(names))
+        for names, t in zip(names_of, capture.tables, strict=True)
+    )
+    same = all(one is other for one, other in zip(tables, capture.tables, strict=True))
+    return capture if same else replace(capture, tables=tables)
 
 
 def _rises(table: pl.DataFrame) -> bool:
