@@ -76,7 +76,7 @@ ARITHMETIC = {
         "_DIGITS",
         "_MOST_DECIMALS",
     },
-    "data/kept_digits.py": {"_MOST", "_LOOKED_AT", "_FLOATING"},  # digits of a file
+    "data/kept_digits.py": {"_MOST", "_LOOKED_AT", "_DISTINCT", "_FLOATING"},  # digits of a file
     "data/sensors.py": {"FREE"},  # of third differences
     # the grid of a search for a noise; digits of a file
     "data/encoder_noise.py": {"_SHIFTS", "_SHARES", "_BETWEEN", "_BLOCKS", "_NONE"},

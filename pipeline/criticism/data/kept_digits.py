@@ -11,6 +11,8 @@ _MOST = 7
 """Digits beyond which the steps of the largest values are below any sensor's noise."""
 _LOOKED_AT = 200
 """Values that are looked at first: most columns keep more digits, which one of these shows."""
+_DISTINCT = 16
+"""Values of a decade from which on their digits are a file's: a few are what was asked for."""
 _FLOATING = 1e-9
 """Share of a value that is rounding of floating-point numbers."""
 
@@ -59,24 +61,33 @@ def largest_step(column: Array) -> float:
     Returns
     -------
     float
-        [same unit]; 0 where its values have more than seven digits.
+        [same unit]; 0 where its values have more than seven digits, or are too few to show it. The
+        largest are those of the last decade that has enough.
 
     Examples
     --------
-    >>> largest_step(np.array([1.23456, 98.7654, 1234.57]))
+    >>> largest_step(np.array([float(f"{x:.6g}") for x in np.geomspace(1.0, 5000.0, 101)]))
     0.01
 
     """
     values = np.abs(column[np.isfinite(column) & (column != 0.0)])
     few = values[:: max(values.size // _LOOKED_AT, 1)]
-    for digits in range(1, _MOST + 1):
-        if _has(few, digits) and _has(values, digits):
-            decade = np.floor(np.log10(values.max(initial=0.0) or 1.0))
-            return float(10.0 ** (decade - digits + 1)) if values.size else 0.0
-    return 0.0
+    counts = range(1, _MOST + 1)
+    digits = next((n for n in counts if _has(few, n) and _has(values, n)), 0)
+    if not digits:
+        return 0.0
+    distinct = np.unique(values)
+    decades, numbers = np.unique(_decade(distinct), return_counts=True)
+    known = decades[numbers >= _DISTINCT]
+    return float(10.0 ** (known[-1] - digits + 1)) if known.size else 0.0
 
 
 def _has(values: Array, digits: int) -> bool:
     """Whether positive values [n] have no more digits than that."""
-    steps = 10.0 ** (np.floor(np.log10(values) + _FLOATING) - digits + 1)
+    steps = 10.0 ** (_decade(values) - digits + 1)
     return bool(np.all(np.abs(values - steps * np.round(values / steps)) <= _FLOATING * values))
+
+
+def _decade(values: Array) -> Array:
+    decade: Array = np.floor(np.log10(values) + _FLOATING)
+    return decade

@@ -58,25 +58,32 @@ def resolution(signal: Array, policy: SensorNoise) -> float:
     -----
     A rounded signal that came unevenly and was put on an even clock has values between its steps.
     Where two neighbours are the same it has none: the step is that of such values, if there are
-    `_KNOWN` of them.
+    `_KNOWN` of them. Steps that a file has rounded once more are no multiples of any: of as many
+    values that have as many samples each, the step is the least distance.
 
     """
+    values = np.unique(signal)
     same = np.unique(signal[1:][np.diff(signal) == 0.0])
-    return _spacing(np.unique(signal), policy) or (
-        _spacing(same, policy) if same.size >= _KNOWN else 0.0
-    )
+    of_neighbours = _spacing(same, policy) if same.size >= _KNOWN else 0.0
+    settled = _KNOWN <= values.size <= signal.size / _KNOWN
+    least = min(_gaps(values).tolist(), default=0.0) if settled else 0.0
+    return _spacing(values, policy) or of_neighbours or least
 
 
 def _spacing(values: Array, policy: SensorNoise) -> float:
     """The least distance of ascending values [n], of which most are whole multiples; else 0."""
-    gaps = np.diff(values)
-    # what floating point makes of equal numbers is no step
-    gaps = gaps[gaps > _FLOATING * np.abs(values).max(initial=0.0)]
+    gaps = _gaps(values)
     if gaps.size == 0:
         return 0.0
     steps = gaps / gaps.min()
     multiples = np.abs(steps - np.round(steps)) < policy.whole
     return float(gaps.min()) if multiples.mean() > policy.mostly else 0.0
+
+
+def _gaps(values: Array) -> Array:
+    """Distances of ascending values [n], without those that floating point makes of equal ones."""
+    gaps = np.diff(values)
+    return gaps[gaps > _FLOATING * np.abs(values).max(initial=0.0)]
 
 
 def coarse_step(signal: Array, sigma: float, policy: SensorNoise) -> float:

@@ -69,6 +69,7 @@ def searches(monkeypatch):
     monkeypatch.setattr(search, "orders_left", lambda *_: made.seen)
     monkeypatch.setattr(search, "drifting_segments", lambda *_: () if made.drifts else None)
     monkeypatch.setattr(search, "gauss_newton", lambda *_: None)
+    monkeypatch.setattr(search, "at_other_place", lambda _: None)
     return made
 
 
@@ -192,7 +193,7 @@ def test_trailing_parts_of_a_curve_are_left_out_where_something_is_left(
         fit = Fit((), Model(machine(), ()), {}, (), {})
         steps = tuple(SimpleNamespace(added=names, system=None, fit=fit) for names in added)
         held_out = [SimpleNamespace(total=error)] * 3
-        return search.Ladder(SimpleNamespace(hum=()), steps, held_out, (), {})
+        return search.Ladder(SimpleNamespace(system=None, hum=()), steps, held_out, (), {})
 
     monkeypatch.setattr(search, "ladder_from", ladder)
     monkeypatch.setattr(search, "_sketched", lambda *_, **__: (None, 0.0))
