@@ -12,7 +12,7 @@ from pipeline.criticism.data.hysteresis import play_lag, with_travel
 from pipeline.criticism.data.locked_waves import LockedWaves
 from pipeline.criticism.data.rounding import coarse_step, step_of_differences
 from pipeline.criticism.data.segment import Sensors, SpeedSensor
-from pipeline.criticism.data.traces import READ_BETWEEN, smoothed
+from pipeline.criticism.data.traces import READ_BETWEEN, shows_acceleration, smoothed
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.sensors import SensorNoise
@@ -91,14 +91,17 @@ def with_slow_columns(
     -------
     sensors : Sensors
         With white noise of the rows that is as loud in means as that of a slower column's samples,
-        for a current with what straight lines miss of it; and the instants of a slower torque.
+        with what straight lines miss of it; and of a slower torque its instants instead, where the
+        angle shows the acceleration at these.
     rows : int
         Rows from one sample of such a torque to the next; 0 of any other.
 
     Notes
     -----
     Straight lines miss u (1 − u)/2 of a second difference d at a part u of the way: in the mean
-    square d²/120. Nothing is known of what a current does faster than its samples.
+    square d²/120. Nothing is known of what a current does faster than its samples. A torque's own
+    instants miss nothing, but the noise of an acceleration there makes the inertia smaller than it
+    is: windows average it, samples do not.
 
     """
     rows = capture.arrays("t_s", *(set(columns) & capture.columns), masked=False)["t_s"]
@@ -110,8 +113,12 @@ def with_slow_columns(
         count = max(round(float(np.median(np.diff(slow["t_s"]))) / period), 1)
         missed = float(np.std(np.diff(slow[name], 2))) / math.sqrt(120.0)
         if name == TORQUE:
-            every, missed = count, 0.0
-            sensors = replace(sensors, torque_s=slow["t_s"] - rows[0])
+            every, span = count, max(round(0.25 * count), 1)
+            sensors = replace(sensors, rows_a_torque=count)
+            theta = columns.get("theta_mech_rad", np.zeros(rows.size))
+            if shows_acceleration(theta, count, span, policy.cutting):
+                missed = 0.0
+                sensors = replace(sensors, torque_s=slow["t_s"] - rows[0], torque_span=span)
             at = (slow["t_s"] - rows[0]) / period
             driving = [
                 np.interp(at, np.arange(columns[n].size), columns[n])

@@ -439,3 +439,84 @@ def parabolas(signal: Array, width: int) -> Array:
     middle = np.convolve(signal, weights[0][::-1], mode="valid")
     first, last = basis @ (weights @ start), basis @ (weights @ end)
     return np.concatenate([first[:half], middle, last[half + 1 :]])
+
+
+def quiet_acceleration(theta_rad: Array, period: float, span: int) -> Array:
+    """Acceleration of an angle by differences of the fourth order over some samples.
+
+    Parameters
+    ----------
+    theta_rad
+        Angle [n].
+    period
+        Of its samples [s].
+    span
+        Samples from one that is taken to the next.
+
+    Returns
+    -------
+    array [n, rad/s²]
+        0 at both ends.
+
+    """
+    if theta_rad.size <= 4 * span:
+        return np.zeros(theta_rad.size)
+    near = theta_rad[span : -3 * span] + theta_rad[3 * span : -span]
+    far = theta_rad[: -4 * span] + theta_rad[4 * span :]
+    second = (16.0 * near - far - 30.0 * theta_rad[2 * span : -2 * span]) / 12.0
+    return np.pad(second, 2 * span) / (span * period) ** 2
+
+
+def acceleration_error(theta_rad: Array, period: float, span: int) -> Array:
+    """What an acceleration that is differenced over some samples may be off by.
+
+    Parameters
+    ----------
+    theta_rad
+        Angle [n].
+    period
+        Of its samples [s].
+    span
+        Samples from one that is taken to the next.
+
+    Returns
+    -------
+    array [n, rad/s²]
+        What differences over twice as many are off from it: its noise, little of a smooth motion,
+        and of a jump as much as there is.
+
+    """
+    near, far = (quiet_acceleration(theta_rad, period, n * span) for n in (1, 2))
+    return near - far
+
+
+def shows_acceleration(theta_rad: Array, every: int, span: int, policy: Cutting) -> bool:
+    """Whether an angle is fine enough for the acceleration at every so-manieth of its samples.
+
+    Parameters
+    ----------
+    theta_rad
+        Angle [n].
+    every
+        Samples from one of these to the next.
+    span
+        Samples that it is differenced over there.
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    bool
+        Whether the power of what it is off by is less than a share of that of its means from one to
+        the next: by as much an inertia comes out too low.
+
+    References
+    ----------
+    Fuller, Measurement Error Models, Wiley, 1987, ch. 1 (attenuation), doi:10.1002/9780470316665.
+
+    """
+    error = acceleration_error(theta_rad, 1.0, span)
+    means = (
+        theta_rad[2 * every :] - 2.0 * theta_rad[every:-every] + theta_rad[: -2 * every]
+    ) / every**2
+    return float(np.mean(error**2)) < policy.attenuated * float(np.mean(means**2))

@@ -123,6 +123,9 @@ class Cutting:
     clock_gap : periods
         distance of two samples that nothing is interpolated across
         chosen: one sample is missing there
+    attenuated : 1
+        power of what an acceleration is off by at a sample of a slower torque, over its own
+        derived: an inertia comes out low by that share [Fuller, Measurement Error Models, ch. 1]
     encoder_share : 1
         share by which two logs may differ on the encoder's step
         chosen: the next encoder has half of it or twice
@@ -254,6 +257,7 @@ class Cutting:
     clock_ratio: float = 2.0
     clock_even: float = 1e-3
     clock_gap: float = 1.5
+    attenuated: float = 0.01
     encoder_share: float = 0.02
     highest_order: int = 400
     harmonics: int = 3

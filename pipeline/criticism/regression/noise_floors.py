@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment, projected, row_index
+from pipeline.criticism.data.traces import acceleration_error
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, evaluate, zero
@@ -277,7 +278,27 @@ def _of_torque(segment: Segment, model: Model, values: Values) -> Array | float:
     if "torque_jumps" in errors:
         jumps = _jumps(segment, ("torque_shaft_nm",), policy)
         total = np.hypot(total, jumps[:, None])
+        total = np.hypot(total, _of_slow_torque(segment, values)[:, None])
     return total / reported_unit(segment, values)
+
+
+def _of_slow_torque(segment: Segment, values: Values) -> Array:
+    """Torque [W] by which the inertia's is off at the samples of a torque that is slower than the
+    rows, as weak samples: rows in between do not average what the acceleration is off by there.
+    """
+    sensors, theta = segment.sensors, segment.recorded["theta_mech_rad"]
+    if not sensors.torque_span or segment.instrument.stator or sensors.held_speed:
+        return np.zeros(segment.windows.starts.size)
+    error = values["j_kgm2"] * acceleration_error(theta, segment.ts_s, sensors.torque_span)
+    return _spread(segment, math.sqrt(sensors.rows_a_torque) * error)
+
+
+def _spread(segment: Segment, error: Array) -> Array:
+    """Weak samples [W] of errors [n] of rows that are not of one sign."""
+    weak = segment.windows
+    rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
+    spread: Array = np.sqrt((error[rows] ** 2) @ (weak.functions[0, 0] ** 2))
+    return spread
 
 
 def _of_pulses(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
@@ -352,18 +373,23 @@ def _jumps(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array
     """Error [W] that a jump of signals may make, as weak samples: a quarter of it for a sample.
 
     A log says what a voltage, current or torque was at its samples, not when within a period it
-    changed.
+    changed. A sample of a torque that is slower than the rows is in as many of them.
     """
-    weak = segment.windows
     there = [name for name in names if name in segment.recorded]
     noise = math.hypot(*(segment.sensors.noise[name] for name in there))
-    bends = [np.diff(segment.recorded[name], 2) for name in there]
-    bend = np.zeros(segment.size)
+    every = segment.sensors.rows_a_torque if "torque_shaft_nm" in there else 1
+    bends = [_bends(segment.recorded[name], every) for name in there]
     # a jump bends the line twice, there and back
-    bend[1:-1] = np.sqrt(sum(one**2 for one in bends)) / math.sqrt(2.0)
+    bend = np.sqrt(every * sum(one**2 for one in bends)) / math.sqrt(2.0)
     bend[bend < policy.jump * noise] = 0.0
-    rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
-    return policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
+    return policy.jump_periods * _spread(segment, bend)
+
+
+def _bends(signal: Array, every: int) -> Array:
+    """Second differences [n] of a signal over so many rows, 0 at both ends."""
+    bends = np.zeros(signal.size)
+    bends[every:-every] = signal[2 * every :] - 2.0 * signal[every:-every] + signal[: -2 * every]
+    return bends
 
 
 def _spikes(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array:

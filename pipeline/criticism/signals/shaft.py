@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment, clock
+from pipeline.criticism.data.traces import quiet_acceleration
 from pipeline.criticism.machine.coenergy import air_gap_torque
 from pipeline.criticism.machine.model import (
     EARLY_S,
@@ -257,13 +258,12 @@ def sensed_torque(
 
 def _acceleration(segment: Segment, theta_rad: Array) -> Array:
     """Acceleration [n, rad/s²] of an angle [n]. Beside a torque that is slower than the rows it is
-    differenced over a quarter of that one's period: windows do not average its noise at samples.
+    differenced over more of them: windows do not average its noise at samples.
     """
-    at_s = segment.sensors.torque_s
-    if at_s is None:
+    span = segment.sensors.torque_span
+    if not span:
         return second_difference(theta_rad, segment.ts_s)
-    span = max(round(0.25 * float(np.median(np.diff(at_s))) / segment.ts_s), 1)
-    return _quiet_acceleration(theta_rad, segment.ts_s, span)
+    return quiet_acceleration(theta_rad, segment.ts_s, span)
 
 
 def _at_samples(segment: Segment, torque_nm: Array) -> Array:
@@ -367,18 +367,6 @@ def second_difference(theta: Array, period: float) -> Array:
 
     """
     return np.pad(np.diff(theta, 2), 1) / period**2
-
-
-def _quiet_acceleration(theta: Array, period: float, span: int) -> Array:
-    """Acceleration [n, rad/s²] of an angle [n, rad] by differences of the fourth order over `span`
-    samples of a period [s]; 0 at both ends.
-    """
-    if theta.size <= 4 * span:
-        return np.zeros(theta.size)
-    near = theta[span : -3 * span] + theta[3 * span : -span]
-    far = theta[: -4 * span] + theta[4 * span :]
-    second = (16.0 * near - far - 30.0 * theta[2 * span : -2 * span]) / 12.0
-    return np.pad(second, 2 * span) / (span * period) ** 2
 
 
 def averaged(fine: Array, finer: int) -> Array:

@@ -1,0 +1,75 @@
+"""Logs of a drive whose torque is on a slower clock than its currents."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pipeline
+from pipeline.criticism.data.traces import acceleration_error, quiet_acceleration
+from pipeline.simulator.bench import CAMPAIGN, campaign
+from pipeline.simulator.design import Bench
+from pipeline.simulator.effects import parameters
+from tests.simulated import campaign_of, design
+
+TESTS = ("drive_0", "torque_map_slow", "spin_down_forward", "open_circuit_forward", "resistance_ab")
+
+
+def found(name: str, every: int, **effects: float) -> pipeline.Diagnosis:
+    """Of a motor by five captures, their torque in every so-manieth row alone."""
+    motor = replace(design(name), effects={}).having(**effects)
+    plan = tuple(step for step in CAMPAIGN if step[0] in TESTS)
+    made = campaign_of(campaign(motor, Bench(), 5, plan))
+    captures = []
+    for log in made.captures:
+        table = log.tables[0]
+        tables = log.tables
+        if "torque_shaft_nm" in table.columns:
+            slow = table.select("t_s", "torque_shaft_nm").gather_every(every)
+            tables = (table.drop("torque_shaft_nm"), slow)
+        captures.append(replace(log, tables=tables))
+    whole = replace(made, captures=tuple(captures))
+    return pipeline.diagnose(pipeline.Recordings({"m": whole}))["m"]
+
+
+@pytest.mark.parametrize(
+    ("name", "every"),
+    [
+        ("gimbal-5208", 10),
+        pytest.param("gimbal-5208", 2, marks=pytest.mark.slow),
+        pytest.param("servo-ipm", 20, marks=pytest.mark.slow),
+        pytest.param("joint-11p", 10, marks=pytest.mark.slow),
+    ],
+)
+def test_a_sound_motor_is_quiet_whatever_the_clock_of_its_torque(name: str, every: int) -> None:
+    """The noise of an acceleration at single samples made an inertia that multiplies it smaller,
+    and the floor with it: J was a hundredth, at 31 floors.
+    """
+    diagnosis = found(name, every)
+    assert (diagnosis.verdict, diagnosis.missing) == ("adequate", ())
+    inertia = diagnosis.constants["j_rotor_kgm2"]
+    assert inertia.value == pytest.approx(design(name).j_rotor_kgm2, rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["torque_lag", "load_dependent_friction", "angle_eccentricity"])
+def test_what_a_log_of_two_clocks_shows_is_named(name: str) -> None:
+    size = parameters(name, replace(design("servo-ipm"), effects={}))["size"]
+    diagnosis = found("servo-ipm", 5, **{name: size})
+    assert (diagnosis.verdict, diagnosis.missing) == ("missing", (name,))
+
+
+def test_an_acceleration_is_sure_of_a_smooth_motion_and_unsure_of_a_jump() -> None:
+    period, span = 1e-4, 3
+    t = period * np.arange(2000)
+    smooth = 3.0 * t**2 + 0.01 * np.sin(200.0 * t)
+    true = 6.0 - 400.0 * np.sin(200.0 * t)
+    inner = slice(4 * span, -4 * span)
+    assert quiet_acceleration(smooth, period, span)[inner] == pytest.approx(true[inner], abs=0.1)
+    assert np.abs(acceleration_error(smooth, period, span)[inner]).max() < 1.0
+    late = np.maximum(t - 0.1, 0.0)
+    error = acceleration_error(50.0 * late**2, period, span)
+    assert np.abs(error[1000 - span : 1000 + span]).max() > 15.0
+    assert np.abs(error[4 * span : 900]).max() < 1e-4
