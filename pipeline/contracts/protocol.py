@@ -13,11 +13,23 @@ from pipeline.records.finding import Finding
 
 
 @dataclass(frozen=True, slots=True)
+class Lost:
+    """Rows [n] of a column, of the table of that number, whose values are no readings."""
+
+    table: int
+    column: str
+    rows: Flags
+
+
+@dataclass(frozen=True, slots=True)
 class Passed:
-    """What a gate says of a capture that it lets through: rows set aside, and warnings."""
+    """What a gate says of a capture that it lets through: rows set aside, values that are missing
+    in truth, and warnings.
+    """
 
     masks: tuple[Mask, ...] = ()
     findings: tuple[Finding, ...] = ()
+    lost: tuple[Lost, ...] = ()
 
 
 GateFunction = Callable[[Capture, Mapping[str, float]], Passed]

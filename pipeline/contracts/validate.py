@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ import polars.selectors as cs
 
 from pipeline.contracts.clocks import held_apart, stamps_counted, streams_split
 from pipeline.contracts.gates import missing_values
-from pipeline.contracts.protocol import warning, with_time
+from pipeline.contracts.protocol import Lost, warning, with_time
 from pipeline.contracts.registry import gates
 from pipeline.contracts.rotor_frame import in_rotor_frame
 from pipeline.contracts.schemas import check_columns, check_metadata, check_tables
@@ -42,8 +42,8 @@ def validate(
     Returns
     -------
     capture
-        With the masks of the gates, with dq columns that the electrical angle makes of the phases',
-        as a `torque_table` where a `torque_map` is one,
+        With the masks of the gates, without values that are no readings, with dq columns that the
+        electrical angle makes of the phases', as a `torque_table` where a `torque_map` is one,
         without columns that hold no value, and without a torque that is the current in other units;
         slow streams that were written into a fast table have a table of their own.
     findings
@@ -67,6 +67,7 @@ def validate(
     capture, settled = as_settled_points(capture)
     check_columns(capture)
     masks: list[Mask] = []
+    lost: list[Lost] = []
     capture, unfilled = _filled_rows(capture)
     capture, twice = _rows_once(capture)
     check_tables(capture)
@@ -89,13 +90,24 @@ def validate(
             broken.append(_broken(gate.name, error))
         else:
             masks.extend(passed.masks)
+            lost.extend(passed.lost)
             findings.extend(passed.findings)
     if refusals or broken:
         raise merged(_causes_first(refusals) or broken)
     settings = {**missing_values.GATE.settings(), **options.get(missing_values.NAME, {})}
-    capture, shaft = _with_shaft_angle(capture)
+    capture, shaft = _with_shaft_angle(_without_lost(capture, lost))
     split = streams_split(capture, settings["dense_share"])
     return split.with_masks(*masks), (*findings, *shaft)
+
+
+def _without_lost(capture: Capture, lost: Iterable[Lost]) -> Capture:
+    """The capture with values missing that are no readings."""
+    tables = list(capture.tables)
+    for one in lost:
+        table = tables[one.table]
+        left = np.where(one.rows, np.nan, table[one.column].to_numpy())
+        tables[one.table] = table.with_columns(pl.Series(one.column, left))
+    return replace(capture, tables=tuple(tables))
 
 
 def _with_shaft_angle(capture: Capture) -> tuple[Capture, list[Finding]]:

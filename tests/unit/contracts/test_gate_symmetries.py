@@ -135,8 +135,8 @@ def test_a_few_holes_in_one_channel_change_no_verdict(
 
 
 def test_rows_are_those_of_the_table_they_stand_in() -> None:
-    """A mask names its table, whichever it is."""
-    for gate in ("stuck_channel", "saturation", "isolated_readings", "missing_values"):
+    """A mask names its table, whichever it is, and so do values that are no readings."""
+    for gate in ("stuck_channel", "saturation", "missing_values"):
         made = next(m for g, m, verdict in FAULTS if g == gate and verdict == "warned")
         alone = GATES[gate].check(made, GATES[gate].options).masks
         behind = replace(made, tables=(STREAM, *made.tables))
@@ -144,6 +144,12 @@ def test_rows_are_those_of_the_table_they_stand_in() -> None:
         assert [m.table for m in alone] == [0]
         assert [m.table for m in masks] == [1]
         assert np.array_equal(masks[0].keep, alone[0].keep)
+    gate = GATES["isolated_readings"]
+    made = next(m for g, m, verdict in FAULTS if g == gate.name and verdict == "warned")
+    behind = replace(made, tables=(STREAM, *made.tables))
+    (alone,), (lost,) = (gate.check(one, gate.options).lost for one in (made, behind))
+    assert (alone.table, lost.table, lost.column) == (0, 1, alone.column)
+    assert np.array_equal(lost.rows, alone.rows)
 
 
 # Channels beside

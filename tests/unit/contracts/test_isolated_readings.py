@@ -49,7 +49,7 @@ def test_isolated_readings_need_rows_and_a_rate(rows: int, interval: float, expe
     if expected:
         passed = GATES["isolated_readings"].check(made, OPTIONS["isolated_readings"])
         assert "the first 0 between 51.99 and 52.01" in passed.findings[0].message
-        assert np.flatnonzero(~passed.masks[0].keep).tolist() == [200]
+        assert np.flatnonzero(passed.lost[0].rows).tolist() == [200]
 
 
 @pytest.mark.parametrize(("times", "expected"), [(7.8, ""), (8.2, "warned")])
