@@ -15,11 +15,13 @@ from pipeline.records.capture import Array, Capture, Indices
 from pipeline.records.finding import Finding
 
 _SAMPLED = ("_v", "_a", "_nm", "omega_mech_rad_s")
-"""Ends of columns that are new in every sample; an angle or a temperature may stay."""
+"""Ends of columns that are new in every sample; a temperature may stay, and an angle by steps."""
 _LEAST_HELD = 50
 """Values from which on a clock is known."""
 _MOST_HELD_S = 0.05
 """Longest that a bus holds a value [s]; a plateau of a test without noise is longer."""
+_VARIED = 2.5
+"""Size of large changes over that of small ones from which on they are no steps of an encoder."""
 _ON_CLOCK = 0.95
 """Least share of a column's changes that keep to its own clock, where it is held between them."""
 _LEAST_STAMPS, _EVEN = 50, 1e-2
@@ -112,7 +114,7 @@ def held_apart(capture: Capture) -> tuple[Capture, list[Finding]]:
     streams: list[pl.DataFrame] = []
     findings = []
     for table in capture.tables:
-        held = _held_rows(table) if "t_s" in table.columns else {}
+        held = _held_rows(table, capture.meta.pwm_hz) if "t_s" in table.columns else {}
         new = {name: rows for name, (rows, _) in held.items()}
         streams += _in_common_rows(table.with_columns(map(_filled, new)), new)
         for count in sorted({count for _, count in held.values()}):
@@ -125,19 +127,23 @@ def held_apart(capture: Capture) -> tuple[Capture, list[Finding]]:
     return (replace(capture, tables=(*tables, *streams)) if findings else capture), findings
 
 
-def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Indices, int]]:
+def _held_rows(table: pl.DataFrame, pwm_hz: float | None) -> dict[str, tuple[Indices, int]]:
     """Rows in which columns that hold are new, and how many rows they hold, by name.
 
     An inverter holds its voltage as well, such as a square wave, and the current follows it in
-    every row. So a voltage is held by a bus only where no current changes faster.
+    every row. So a voltage is held by a bus only where no current changes faster, or for longer
+    than the drive's period.
     """
     held, faster = {}, set()
     row_s = float(np.median(np.diff(table["t_s"].to_numpy()))) if table.height > 1 else 0.0
     for name in table.columns:
-        if not name.endswith(_SAMPLED) or not table[name].dtype.is_float():
+        if not name.endswith((*_SAMPLED, "_rad")) or not table[name].dtype.is_float():
             continue
         # a row without a value brings none
-        changes = np.flatnonzero(np.diff(table.select(_filled(name))[name].to_numpy()) != 0.0) + 1
+        moved = np.diff(table.select(_filled(name))[name].to_numpy())
+        changes = np.flatnonzero(moved != 0.0) + 1
+        if name.endswith("_rad") and not _of_many_sizes(moved[changes - 1]):
+            continue
         steps = np.diff(changes)
         count = int(np.median(steps)) if steps.size >= _LEAST_HELD else 0
         if count == 1:
@@ -151,7 +157,19 @@ def _held_rows(table: pl.DataFrame) -> dict[str, tuple[Indices, int]]:
             rows = np.interp(np.arange(passed[-1] + 1), passed, changes)
             held[name] = np.rint(rows).astype(np.int64), count
     follows = any(name.endswith("_a") for name in faster)
-    return {n: one for n, one in held.items() if not (follows and n.endswith("_v"))}
+    longest = 1.5 / (pwm_hz * row_s) if pwm_hz and row_s else math.inf
+    return {
+        name: (rows, count)
+        for name, (rows, count) in held.items()
+        if not (follows and name.endswith("_v") and count < longest)
+    }
+
+
+def _of_many_sizes(moved: Array) -> bool:
+    """Whether changes of an angle are no steps of an encoder, which are all of one size or two."""
+    size = np.abs(moved[np.isfinite(moved)])
+    low, high = np.quantile(size, (0.1, 0.9)) if size.size else (0.0, 0.0)
+    return bool(high > _VARIED * low)
 
 
 def _filled(name: str) -> pl.Expr:

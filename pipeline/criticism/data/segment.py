@@ -72,11 +72,10 @@ class Sensors:
     torque_s
         Instants of a torque that is sampled more slowly than the log [s, from its first row], which
         is on straight lines between them; None of any other.
-    rows_a_torque
-        Rows from one of its samples to the next; 1 of any other torque.
     torque_span
-        Rows that the acceleration at its samples is differenced over, a quarter of these; 0 of any
-        other.
+        Rows that the acceleration at its samples is differenced over; 0 of any other.
+    every
+        Rows from one sample to the next, of columns that are slower than the log.
 
     """
 
@@ -91,8 +90,8 @@ class Sensors:
     held_speed: bool = False
     phase_samples: int = 0
     torque_s: Array | None = None
-    rows_a_torque: int = 1
     torque_span: int = 0
+    every: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def rounded(self) -> bool:

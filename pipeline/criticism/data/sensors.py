@@ -21,6 +21,7 @@ from pipeline.records.row_means import slower_rows
 
 TEMPERATURES = ("temp_winding_degc", "temp_magnet_degc")
 CURRENTS, TORQUE = ("id_a", "iq_a"), "torque_shaft_nm"
+VOLTS = ("vd_v", "vq_v")
 FREE = 2.2
 """Third differences of white noise that are as good as one independent number."""
 
@@ -72,7 +73,7 @@ def prepared(
 def with_slow_columns(
     capture: Capture, columns: Mapping[str, Array], sensors: Sensors, period: float, policy: Policy
 ) -> tuple[Sensors, int]:
-    """The sensors of a log whose currents or torque may be sampled more slowly than its rows.
+    """The sensors of a log of which columns may be sampled more slowly than its rows.
 
     Parameters
     ----------
@@ -91,8 +92,8 @@ def with_slow_columns(
     -------
     sensors : Sensors
         With white noise of the rows that is as loud in means as that of a slower column's samples,
-        with what straight lines miss of it; and of a slower torque its instants instead, where the
-        angle shows the acceleration at these.
+        of a current or torque with what straight lines miss of it; and of a slower torque its
+        instants instead, where the angle shows the acceleration at these.
     rows : int
         Rows from one sample of such a torque to the next; 0 of any other.
 
@@ -101,20 +102,20 @@ def with_slow_columns(
     Straight lines miss u (1 − u)/2 of a second difference d at a part u of the way: in the mean
     square d²/120. Nothing is known of what a current does faster than its samples. A torque's own
     instants miss nothing, but the noise of an acceleration there makes the inertia smaller than it
-    is: windows average it, samples do not.
+    is: windows average it, samples do not. A voltage has pulses, which count where they are.
 
     """
     rows = capture.arrays("t_s", *(set(columns) & capture.columns), masked=False)["t_s"]
-    noise, every = dict(sensors.noise), 0
-    for name in {*CURRENTS, TORQUE} & set(columns) & capture.columns:
+    noise, every, counts = dict(sensors.noise), 0, {}
+    for name in {*VOLTS, *CURRENTS, TORQUE} & set(columns) & capture.columns:
         slow = capture.finite("t_s", name)
         if not slower_rows(slow["t_s"], rows):
             continue
-        count = max(round(float(np.median(np.diff(slow["t_s"]))) / period), 1)
-        missed = float(np.std(np.diff(slow[name], 2))) / math.sqrt(120.0)
+        counts[name] = count = max(round(float(np.median(np.diff(slow["t_s"]))) / period), 1)
+        bend = 0.0 if name in VOLTS else float(np.std(np.diff(slow[name], 2)))
+        missed = bend / math.sqrt(120.0)
         if name == TORQUE:
             every, span = count, max(round(0.25 * count), 1)
-            sensors = replace(sensors, rows_a_torque=count)
             theta = columns.get("theta_mech_rad", np.zeros(rows.size))
             if shows_acceleration(theta, count, span, policy.cutting):
                 missed = 0.0
@@ -129,7 +130,7 @@ def with_slow_columns(
             slow[name] = beside_columns(slow[name], np.column_stack(driving))
         sigma = math.hypot(sensor_noise(slow[name], policy.sensor_noise), missed)
         noise[name] = sigma * math.sqrt(count)
-    return replace(sensors, noise=noise), every
+    return replace(sensors, noise=noise, every=counts), every
 
 
 def beside_columns(signal: Array, columns: Array) -> Array:

@@ -290,7 +290,7 @@ def _of_slow_torque(segment: Segment, values: Values) -> Array:
     if not sensors.torque_span or segment.instrument.stator or sensors.held_speed:
         return np.zeros(segment.windows.starts.size)
     error = values["j_kgm2"] * acceleration_error(theta, segment.ts_s, sensors.torque_span)
-    return _spread(segment, math.sqrt(sensors.rows_a_torque) * error)
+    return _spread(segment, math.sqrt(sensors.every["torque_shaft_nm"]) * error)
 
 
 def _spread(segment: Segment, error: Array) -> Array:
@@ -373,14 +373,15 @@ def _jumps(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array
     """Error [W] that a jump of signals may make, as weak samples: a quarter of it for a sample.
 
     A log says what a voltage, current or torque was at its samples, not when within a period it
-    changed. A sample of a torque that is slower than the rows is in as many of them.
+    changed. A sample of a column that is slower than the rows is in as many of them.
     """
     there = [name for name in names if name in segment.recorded]
     noise = math.hypot(*(segment.sensors.noise[name] for name in there))
-    every = segment.sensors.rows_a_torque if "torque_shaft_nm" in there else 1
-    bends = [_bends(segment.recorded[name], every) for name in there]
+    counts = [segment.sensors.every.get(name, 1) for name in there]
+    each = zip(there, counts, strict=True)
+    bends = [math.sqrt(count) * _bends(segment.recorded[name], count) for name, count in each]
     # a jump bends the line twice, there and back
-    bend = np.sqrt(every * sum(one**2 for one in bends)) / math.sqrt(2.0)
+    bend = np.sqrt(sum(one**2 for one in bends)) / math.sqrt(2.0)
     bend[bend < policy.jump * noise] = 0.0
     return policy.jump_periods * _spread(segment, bend)
 
