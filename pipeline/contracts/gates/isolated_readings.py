@@ -132,8 +132,9 @@ def off_course(theta: Array, ratio: float) -> Rows:
 
     Notes
     -----
-    Distance from the cubic through the two rows before and the two after, and change of the step
-    from the former two to the latter.
+    Distance from the cubic through the two rows before and the two after, and how far the steps
+    between the former, between the latter, and from these to those are of unlike pace: where rows
+    are lost, the last is.
 
     Examples
     --------
@@ -147,7 +148,9 @@ def off_course(theta: Array, ratio: float) -> Rows:
     with np.errstate(invalid="ignore"):
         near, far = theta[1:-3] + theta[3:-1], theta[:-4] + theta[4:]
         off = np.abs(theta[2:-2] - (4.0 * near - far) / 6.0)
-        pace = np.abs(theta[4:] - theta[3:-1] - theta[1:-3] + theta[:-4])
+        before, after = theta[1:-3] - theta[:-4], theta[4:] - theta[3:-1]
+        across = theta[3:-1] - theta[1:-3]
+        pace = np.maximum(np.abs(after - before), np.abs(across - before - after))
     known = off[np.isfinite(off)]
     if known.size and np.any(theta[1:] != theta[:-1]):
         alone[2:-2] = off > ratio * np.maximum(float(np.quantile(known, 0.99)), pace)
