@@ -102,6 +102,43 @@ def decimals(columns: Columns, _: np.random.Generator) -> Columns:
     }
 
 
+def held(every_nth: int, *names: str) -> Damage:
+    """A bus that is slower than the rows: new values in every so-manieth, the last one between."""
+
+    def repeated(columns: Columns, rng: np.random.Generator) -> Columns:
+        rows = np.arange(columns["t_s"].size)
+        first = int(rng.integers(every_nth))
+        source = np.maximum((rows - first) // every_nth * every_nth + first, 0)
+        return {n: v[source] if n in names else v for n, v in columns.items()}
+
+    return repeated
+
+
+def apart(every_nth: int, *names: str) -> Damage:
+    """Topics of two rates in one table: a slow one's values where it has some."""
+
+    def blank(columns: Columns, rng: np.random.Generator) -> Columns:
+        rows = np.arange(columns["t_s"].size)
+        there = rows % every_nth == rng.integers(every_nth)
+        return {n: np.where(there, v, np.nan) if n in names else v for n, v in columns.items()}
+
+    return blank
+
+
+def readings_of_zero(columns: Columns, rng: np.random.Generator) -> Columns:
+    """A link that loses one reading in a thousand and writes 0."""
+    names = ("id_a", "iq_a", "torque_shaft_nm", "omega_mech_rad_s", "theta_mech_rad")
+    return {
+        n: np.where(rng.uniform(size=v.size) < 1e-3, 0.0, v) if n in names else v
+        for n, v in columns.items()
+    }
+
+
+def six_digits(columns: Columns, _: np.random.Generator) -> Columns:
+    """Six digits of each value, of the angle too, as C and C++ write one."""
+    return {n: v if n == "t_s" else _rounded(v, np.abs(v), 6) for n, v in columns.items()}
+
+
 def begun_late(columns: Columns, rng: np.random.Generator) -> Columns:
     """The last 20 to 70 % of the rows."""
     left = int(columns["t_s"].size * rng.uniform(0.2, 0.7))
@@ -149,8 +186,20 @@ KINDS: Mapping[str, Mapping[str, tuple[Damage, ...]]] = {
         "ended early": (ended_early,),
     },
     "digits": {"three digits": (digits,), "few decimals": (decimals,)},
+    "links": {
+        "torque held": (held(10, "torque_shaft_nm"),),
+        "angle held": (held(4, "theta_mech_rad"),),
+        "voltage held": (held(5, "vd_v", "vq_v"),),
+        "currents and voltages held": (held(5, "id_a", "iq_a", "vd_v", "vq_v"),),
+        "slow torque": (apart(7, "torque_shaft_nm"),),
+        "slow temperatures": (apart(50, *TEMPERATURES),),
+        "readings of zero": (readings_of_zero,),
+        "six digits": (six_digits,),
+    },
 }
 """Groups of damages, and the damages of each, that are done one after the other."""
+JUDGED = ("links",)
+"""Groups whose logs are held against the contract first, which says what is no sample."""
 
 
 def damaged(
@@ -178,8 +227,8 @@ def _rows_a_period(columns: Columns, rate_hz: float) -> int:
     return max(1, round(1.0 / (rate_hz * float(np.median(np.diff(columns["t_s"]))))))
 
 
-def _rounded(values: Array, size: Array) -> Array:
-    """Values to three digits of `size`."""
-    step = 10.0 ** (np.floor(np.log10(np.where(size > 0.0, size, 1.0))) - 2.0)
+def _rounded(values: Array, size: Array, kept: int = 3) -> Array:
+    """Values to so many digits of `size`."""
+    step = 10.0 ** (np.floor(np.log10(np.where(size > 0.0, size, 1.0))) - kept + 1.0)
     rounded: Array = np.round(values / step) * step
     return rounded

@@ -102,6 +102,29 @@ def test_digits_are_lost_of_each_value_or_of_the_largest(log: Columns) -> None:
     assert np.abs(of_all - log["iq_a"]).max() == pytest.approx(0.05, rel=0.1)
 
 
+def test_what_a_bus_holds_and_what_a_link_loses_is_found_again(log: Columns) -> None:
+    bus = left(log, "links", "torque held").tables[0]["torque_shaft_nm"].to_numpy()
+    changes = np.flatnonzero(np.diff(bus))
+    assert np.all(np.diff(changes) == 10)
+    assert set(bus) <= set(log["torque_shaft_nm"])
+    blank = left(log, "links", "slow torque").tables[0]["torque_shaft_nm"].to_numpy()
+    assert np.isfinite(blank).mean() == pytest.approx(1 / 7, rel=0.01)
+    link = left(log, "links", "readings of zero").tables[0]
+    for name in ("iq_a", "torque_shaft_nm"):
+        gone = link[name].to_numpy() != log[name]
+        assert 0 < gone.sum() < 12
+        assert not link[name].to_numpy()[gone].any()
+    assert (link["vq_v"].to_numpy() == log["vq_v"]).all()
+
+
+def test_six_digits_are_those_of_a_print(log: Columns) -> None:
+    log["theta_mech_rad"] = np.linspace(-2.0, 1234.56789, ROWS)
+    table = left(log, "links", "six digits").tables[0]
+    printed = [float(f"{value:.6g}") for value in log["theta_mech_rad"]]
+    assert table["theta_mech_rad"].to_numpy() == pytest.approx(printed, rel=1e-9)
+    assert (table["t_s"].to_numpy() == log["t_s"]).all()
+
+
 def test_two_terminals_keep_what_they_are_made_of(log: Columns) -> None:
     volts = {"t_s": log["t_s"], "va_v": log["vd_v"], "ia_a": log["id_a"]}
     for kind in ("no voltage", "no current"):

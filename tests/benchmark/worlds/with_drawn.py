@@ -13,14 +13,16 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pipeline.records.capture import Campaign
+from pipeline.contracts.validate import validate
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.errors import CaptureError
 from pipeline.simulator.bench import CAMPAIGN
 from pipeline.simulator.bench import campaign as recorded
 from pipeline.simulator.design import Bench, Motor
 from pipeline.simulator.effects import ALWAYS, FORMS, parameters
 from tests.benchmark.sealing import MOTOR_TYPE, captures
 from tests.benchmark.worlds.case import WorldCase
-from tests.benchmark.worlds.damage import KINDS, Damage, damaged
+from tests.benchmark.worlds.damage import JUDGED, KINDS, Damage, damaged
 from tests.simulated import design
 
 MOTORS = ("drone-2306", "gimbal-5208", "joint-11p", "servo-15kw", "servo-ipm")
@@ -84,7 +86,18 @@ def campaign(case: WorldCase) -> Campaign:
     made = captures(recorded(hidden.having(**sizes), draw.bench, case.seed, plan))
     rng = np.random.default_rng([case.seed, 3])
     left = (damaged(capture, draw.damage, rng) for capture in made)
-    return Campaign(hidden.motor_id, tuple(capture for capture in left if capture is not None))
+    kept = (capture for capture in left if capture is not None)
+    if case.programme in JUDGED:
+        kept = (found for found in map(_judged, kept) if found is not None)
+    return Campaign(hidden.motor_id, tuple(kept))
+
+
+def _judged(capture: Capture) -> Capture | None:
+    """A capture as a reader hands it on, None where it refuses it."""
+    try:
+        return validate(capture, {})[0]
+    except CaptureError:
+        return None
 
 
 def _motor(name: str, rng: np.random.Generator) -> Motor:
