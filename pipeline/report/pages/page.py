@@ -44,10 +44,24 @@ def _environment() -> Environment:
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=_in_code,
         trim_blocks=True,
         lstrip_blocks=True,
         auto_reload=False,
     )
+
+
+def _in_code(value: Any) -> Any:
+    """A value as a page shows it: what stands between backticks in a message is code."""
+    if not isinstance(value, str) or hasattr(value, "__html__") or not value.count("`"):
+        return value
+    from markupsafe import Markup
+
+    parts = value.split("`")
+    if len(parts) % 2 == 0:
+        return value
+    code = Markup("<code>{}</code>")
+    return Markup("").join(code.format(part) if k % 2 else part for k, part in enumerate(parts))
 
 
 BEGIN, END = "<!-- links -->", "<!-- end of links -->"

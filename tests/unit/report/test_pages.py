@@ -20,6 +20,7 @@ from pipeline.records.naming import file_stem
 from pipeline.records.uncertainty import Contribution
 from pipeline.report.pages.fleet_page import page_of, render_fleet
 from pipeline.report.pages.motor_page import render_motor
+from pipeline.report.pages.page import Link, link_block
 from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
 from pipeline.views.motor import _relative, conditions, kind_of, parts_of
 from tests.unit.report.conftest import flat
@@ -188,6 +189,18 @@ def test_what_failed_is_a_card_above_the_constants(
     assert html.index('class="cards"') < html.index('id="constants"')
     sound = replace(datasheet, checks=(Check("kt_vs_ke", "pass", "holds", 1.0, 0.01, "1"),))
     assert 'class="cards"' not in render_motor(sound, evidence, ())
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("`run a=<b>` once more", "<code>run a=&lt;b&gt;</code> once more"),
+        ("a ` that is alone & <i>", "a ` that is alone &amp; &lt;i&gt;"),
+    ],
+)
+def test_a_command_in_a_message_is_code_and_everything_is_escaped(text: str, shown: str) -> None:
+    block = link_block([Link(text, "page.html")])
+    assert f">{shown}<" in block
 
 
 def test_numbers_in_names_go_by_size() -> None:
