@@ -323,6 +323,42 @@ class Capture:
         keep = self.kept(home) if masked else np.ones(self.tables[home].height, dtype=bool)
         return {name: self._on_clock(name, home)[keep] for name in names}
 
+    def on_rows_of(self, home: int) -> Capture:
+        """The capture with what faster tables hold on the rows of one, and without these tables.
+
+        Parameters
+        ----------
+        home
+            Number of a table with a clock.
+
+        Returns
+        -------
+        Capture
+            Columns as `arrays` puts them on another clock. The same one where no table is faster.
+
+        """
+        import polars as pl
+
+        row_s = self.tables[home]["t_s"].to_numpy()
+        faster = [
+            place
+            for place, table in enumerate(self.tables)
+            if "t_s" in table.columns and slower_rows(row_s, table["t_s"].to_numpy())
+        ]
+        if not faster:
+            return self
+        names = [name for place in faster for name in self.tables[place].columns if name != "t_s"]
+        joined = [pl.Series(name, self._on_clock(name, home)) for name in names]
+        tables = [self.tables[home].with_columns(joined)]
+        kept = [place for place in range(len(self.tables)) if place not in (home, *faster)]
+        places = {place: number for number, place in enumerate([home, *kept])}
+        masks = (m for m in self.masks if m.table in places)
+        return replace(
+            self,
+            tables=(*tables, *(self.tables[place] for place in kept)),
+            masks=tuple(replace(m, table=places[m.table]) for m in masks),
+        )
+
     def bridged_column(self, index: int, name: str) -> Array:
         """A column of a table, `bridged` in a log of continuous signals.
 

@@ -75,6 +75,8 @@ ARITHMETIC = {
         "_FLOATING",
         "_DIGITS",
         "_MOST_DECIMALS",
+        "_STAIRS",
+        "_ALIKE",
     },
     "data/kept_digits.py": {"_MOST", "_LOOKED_AT", "_DISTINCT", "_FLOATING"},  # digits of a file
     "data/sensors.py": {"FREE"},  # of third differences

@@ -30,6 +30,10 @@ a turn wide: a wider spacing misses it, a finer one costs time."""
 _KNOWN = 16
 """Values that two neighbours share from which on their spacing is a step: a drive that is switched
 off, or limits its current, shares a few."""
+_STAIRS, _ALIKE = 3, 1.5
+"""Steps that show that they are alike, and by how much the largest of them may be more: a rounding
+to the half of one makes it that.
+"""
 _DIGITS = 1e-3
 """Share of a step that the digits of a file may leave where there is none."""
 _FLOATING = 1e-9
@@ -58,16 +62,24 @@ def resolution(signal: Array, policy: SensorNoise) -> float:
     -----
     A rounded signal that came unevenly and was put on an even clock has values between its steps.
     Where two neighbours are the same it has none: the step is that of such values, if there are
-    `_KNOWN` of them. Steps that a file has rounded once more are no multiples of any: of as many
-    values that have as many samples each, the step is the least distance.
+    `_KNOWN` of them. Steps that a file has rounded once more are no multiples of any: of values
+    that have as many samples each, and distances that are much alike, it is the mean distance.
 
     """
     values = np.unique(signal)
     same = np.unique(signal[1:][np.diff(signal) == 0.0])
     of_neighbours = _spacing(same, policy) if same.size >= _KNOWN else 0.0
-    settled = _KNOWN <= values.size <= signal.size / _KNOWN
-    least = min(_gaps(values).tolist(), default=0.0) if settled else 0.0
-    return _spacing(values, policy) or of_neighbours or least
+    return _spacing(values, policy) or of_neighbours or _staircase(values, signal.size)
+
+
+def _staircase(values: Array, samples: int) -> float:
+    """The mean distance of ascending values [n] that are evenly apart but for a rounding, where
+    there are many samples of each; else 0.
+    """
+    gaps = _gaps(values)
+    if gaps.size < _STAIRS or samples < _KNOWN * values.size or gaps.max() > _ALIKE * gaps.min():
+        return 0.0
+    return float(gaps.mean())
 
 
 def _spacing(values: Array, policy: SensorNoise) -> float:

@@ -62,7 +62,17 @@ def with_values(capture: Capture) -> Capture | None:
         for names, t in zip(names_of, capture.tables, strict=True)
     )
     same = all(one is other for one, other in zip(tables, capture.tables, strict=True))
-    return capture if same else replace(capture, tables=tables)
+    return _on_its_motion(capture if same else replace(capture, tables=tables))
+
+
+def _on_its_motion(capture: Capture) -> Capture:
+    """A drive's log on the rows of its angle, where that is slower than its currents: between them
+    nothing shows how the shaft accelerates.
+    """
+    if capture.meta.test not in ("drive", "torque_map"):
+        return capture
+    angle = next((n for n in ("theta_mech_rad", "theta_elec_rad") if capture.has(n)), None)
+    return capture if angle is None else capture.on_rows_of(capture.table_of("t_s", angle))
 
 
 def _rises(table: pl.DataFrame) -> bool:

@@ -47,12 +47,13 @@ def test_the_resolution_of_a_signal_is_the_step_of_its_values(step):
     assert resolution(rounded(step, 0.3), SENSORS) == pytest.approx(step, rel=1e-6)
 
 
-def test_a_slow_signal_in_steps_that_a_file_rounded_once_more_has_them_still():
-    """A winding that warms, by a voltage in steps of 31.3 mV and two decimals: 3.8 floors."""
-    warming = 5.75 + 0.7 * (1.0 - np.exp(-np.linspace(0.0, 3.0, 4000)))
-    written = np.round(0.0313 * np.round(warming / 0.0313), 2)
-    assert resolution(written, SENSORS) == pytest.approx(0.0313, abs=0.005)
-    assert coarse_step(written, 0.0, SENSORS) > 0.02
+@pytest.mark.parametrize(("step", "decimals", "rise"), [(0.0313, 2, 0.7), (1.0 / 64.0, 3, 0.1)])
+def test_a_slow_signal_in_steps_that_a_file_rounded_once_more_has_them_still(step, decimals, rise):
+    """A winding that warms, its voltage in steps and decimals: 3.8 and 12.6 times the floor."""
+    warming = 5.75 + rise * (1.0 - np.exp(-np.linspace(0.0, 3.0, 4000)))
+    written = np.round(step * np.round(warming / step), decimals)
+    assert resolution(written, SENSORS) == pytest.approx(step, rel=0.05)
+    assert coarse_step(written, 0.0, SENSORS) > 0.9 * step
 
 
 def test_numbers_of_no_step_have_no_resolution():

@@ -1,4 +1,4 @@
-"""Logs of a drive whose torque is on a slower clock than its currents."""
+"""Logs of a drive whose torque or angle is on a slower clock than its currents."""
 
 from __future__ import annotations
 
@@ -17,8 +17,11 @@ from tests.simulated import campaign_of, design
 TESTS = ("drive_0", "torque_map_slow", "spin_down_forward", "open_circuit_forward", "resistance_ab")
 
 
-def found(name: str, every: int, **effects: float) -> pipeline.Diagnosis:
-    """Of a motor by five captures, their torque in every so-manieth row alone."""
+TORQUE, ANGLE = "torque_shaft_nm", "theta_mech_rad"
+
+
+def found(name: str, every: int, column: str = TORQUE, **effects: float) -> pipeline.Diagnosis:
+    """Of a motor by five captures, a column of its drive in every so-manieth row alone."""
     motor = replace(design(name), effects={}).having(**effects)
     plan = tuple(step for step in CAMPAIGN if step[0] in TESTS)
     made = campaign_of(campaign(motor, Bench(), 5, plan))
@@ -26,9 +29,9 @@ def found(name: str, every: int, **effects: float) -> pipeline.Diagnosis:
     for log in made.captures:
         table = log.tables[0]
         tables = log.tables
-        if "torque_shaft_nm" in table.columns:
-            slow = table.select("t_s", "torque_shaft_nm").gather_every(every)
-            tables = (table.drop("torque_shaft_nm"), slow)
+        if log.meta.test in ("drive", "torque_map"):
+            slow = table.select("t_s", column).gather_every(every)
+            tables = (table.drop(column), slow)
         captures.append(replace(log, tables=tables))
     whole = replace(made, captures=tuple(captures))
     return pipeline.diagnose(pipeline.Recordings({"m": whole}))["m"]
@@ -59,6 +62,26 @@ def test_what_a_log_of_two_clocks_shows_is_named(name: str) -> None:
     size = parameters(name, replace(design("servo-ipm"), effects={}))["size"]
     diagnosis = found("servo-ipm", 5, **{name: size})
     assert (diagnosis.verdict, diagnosis.missing) == ("missing", (name,))
+
+
+@pytest.mark.parametrize(
+    ("name", "every"),
+    [("servo-ipm", 10), pytest.param("joint-11p", 4, marks=pytest.mark.slow)],
+)
+def test_a_log_is_on_the_clock_of_its_angle(name: str, every: int) -> None:
+    """An angle on straight lines jumps in pace at each of its samples, by orders of the torque and
+    of the voltage: 1.2 and 2.9 floors, or a `torque_lag`.
+    """
+    diagnosis = found(name, every, ANGLE)
+    assert (diagnosis.verdict, diagnosis.missing) == ("adequate", ())
+    assert diagnosis.ladder[-1].held_out < 1.0
+
+
+@pytest.mark.slow
+def test_what_a_log_of_a_slow_angle_shows_is_named() -> None:
+    size = parameters("saturation", replace(design("gimbal-5208"), effects={}))["size"]
+    diagnosis = found("gimbal-5208", 4, ANGLE, saturation=size)
+    assert (diagnosis.verdict, diagnosis.missing) == ("missing", ("saturation",))
 
 
 def test_an_acceleration_is_sure_of_a_smooth_motion_and_unsure_of_a_jump() -> None:

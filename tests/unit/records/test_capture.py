@@ -79,3 +79,24 @@ def test_a_row_without_a_value_bends_whatever_else_is_missing_near_it(beside):
     column = bent.copy()
     column[[20, 20 + beside]] = np.nan
     assert bridged(t_s, column) == pytest.approx(bent, rel=1e-12)
+
+
+@pytest.mark.parametrize("timing", ["instant", "centred"])
+def test_faster_columns_come_onto_the_rows_of_a_slow_table(timing: str) -> None:
+    """Means of a row where voltages are, else what there was at its instant; masks move along."""
+    fast_s = np.arange(100) * 1e-3
+    fast = pl.DataFrame({"t_s": fast_s, "iq_a": fast_s, "vq_v": np.tile([1.0, 3.0], 50)})
+    slow = pl.DataFrame({"t_s": fast_s[::10], "theta_mech_rad": 5.0 * fast_s[::10]})
+    warm = pl.DataFrame({"t_s": [0.0, 0.09], "temp_winding_degc": [25.0, 26.0]})
+    aside = Mask("gate", 1, np.arange(10) != 4)
+    meta = CaptureMeta("m", "drive", voltage_timing=timing)
+    made = Capture("log.csv", "0" * 64, "verified", meta, (fast, slow, warm), (aside,))
+    joined = made.on_rows_of(1)
+    assert [table.height for table in joined.tables] == [10, 2]
+    assert set(joined.tables[0].columns) == {"t_s", "theta_mech_rad", "iq_a", "vq_v"}
+    assert joined.kept(0).tolist() == aside.keep.tolist()
+    inner = joined.tables[0]["iq_a"].to_numpy()[1:-1]
+    assert inner == pytest.approx(fast_s[::10][1:-1], abs=1e-9)
+    volts = joined.tables[0]["vq_v"].to_numpy()[1:-1]
+    assert volts == pytest.approx(2.0 if timing == "centred" else 1.0, abs=0.11)
+    assert made.on_rows_of(0) is made
