@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import polars as pl
 
 from pipeline.criticism.operating import Array
+
+if TYPE_CHECKING:
+    import polars as pl
 
 _MOST = 7
 """Digits beyond which the steps of the largest values are below any sensor's noise."""
@@ -37,6 +41,8 @@ def at_largest_step(table: pl.DataFrame) -> pl.DataFrame:
     most values are, the others are noise that nothing explains.
 
     """
+    import polars as pl
+
     if "t_s" not in table.columns:
         return table
     changed = []
