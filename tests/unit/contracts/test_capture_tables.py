@@ -128,6 +128,31 @@ def test_a_voltage_that_an_inverter_holds_is_whole() -> None:
     assert len(findings) == 1
 
 
+@pytest.mark.parametrize(("pwm_hz", "apart"), [(100.0, False), (160.0, True), (None, False)])
+def test_a_voltage_that_is_held_for_longer_than_the_drive_holds_it_is_a_bus(
+    pwm_hz: float | None, apart: bool
+) -> None:
+    """Ten rows of 1 ms: one PWM period of 100 Hz, and more than one and a half of 160 Hz."""
+    steps = held(np.random.default_rng(5).normal(size=101))
+    current = np.cumsum(steps) * 1e-2
+    made = capture("drive", meta={"pwm_hz": pwm_hz}, t_s=CLOCK, vq_v=steps, iq_a=current)
+    tables = [table.columns for table in held_apart(made)[0].tables]
+    assert tables == ([["t_s", "iq_a"], ["t_s", "vq_v"]] if apart else [["t_s", "vq_v", "iq_a"]])
+
+
+def test_an_angle_of_a_bus_has_changes_of_many_sizes_and_one_of_an_encoder_has_not() -> None:
+    """A coast by a held angle was 1e9 times its floor; an encoder's own steps come on no clock."""
+    at_s = np.arange(101) * 0.01
+    made = capture("drive", t_s=CLOCK, iq_a=CLOCK**2, theta_mech_rad=held(20.0 * at_s**2))
+    kept, findings = held_apart(made)
+    assert [t.columns for t in kept.tables] == [["t_s", "iq_a"], ["t_s", "theta_mech_rad"]]
+    assert [f.code for f in findings] == ["held_values"]
+    step = 2.0 * np.pi / 512
+    encoder = step * np.floor(100.0 * CLOCK)
+    made = capture("drive", t_s=CLOCK, iq_a=CLOCK**2, theta_mech_rad=encoder)
+    assert held_apart(made) == (made, [])
+
+
 def test_an_electrical_angle_alone_is_that_of_the_shaft_by_the_stated_pole_pairs() -> None:
     """Such a drive's sheet was empty, and the motor `unknown` at 28 noise floors."""
     columns = {"t_s": CLOCK, "iq_a": CLOCK, "theta_elec_rad": 7.0 * CLOCK}
