@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment, projected, row_index
-from pipeline.criticism.data.traces import acceleration_error
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, evaluate, zero
@@ -278,27 +277,7 @@ def _of_torque(segment: Segment, model: Model, values: Values) -> Array | float:
     if "torque_jumps" in errors:
         jumps = _jumps(segment, ("torque_shaft_nm",), policy)
         total = np.hypot(total, jumps[:, None])
-        total = np.hypot(total, _of_slow_torque(segment, values)[:, None])
     return total / reported_unit(segment, values)
-
-
-def _of_slow_torque(segment: Segment, values: Values) -> Array:
-    """Torque [W] by which the inertia's is off at the samples of a torque that is slower than the
-    rows, as weak samples: rows in between do not average what the acceleration is off by there.
-    """
-    sensors, theta = segment.sensors, segment.recorded["theta_mech_rad"]
-    if not sensors.torque_span or segment.instrument.stator or sensors.held_speed:
-        return np.zeros(segment.windows.starts.size)
-    error = values["j_kgm2"] * acceleration_error(theta, segment.ts_s, sensors.torque_span)
-    return _spread(segment, math.sqrt(sensors.every["torque_shaft_nm"]) * error)
-
-
-def _spread(segment: Segment, error: Array) -> Array:
-    """Weak samples [W] of errors [n] of rows that are not of one sign."""
-    weak = segment.windows
-    rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
-    spread: Array = np.sqrt((error[rows] ** 2) @ (weak.functions[0, 0] ** 2))
-    return spread
 
 
 def _of_pulses(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
@@ -383,7 +362,9 @@ def _jumps(segment: Segment, names: Sequence[str], policy: NoiseFloors) -> Array
     # a jump bends the line twice, there and back
     bend = np.sqrt(sum(one**2 for one in bends)) / math.sqrt(2.0)
     bend[bend < policy.jump * noise] = 0.0
-    return policy.jump_periods * _spread(segment, bend)
+    weak = segment.windows
+    rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
+    return policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
 
 
 def _bends(signal: Array, every: int) -> Array:
