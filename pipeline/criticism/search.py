@@ -297,7 +297,7 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
     wrong form. They are looked for again without it.
 
     """
-    searched = search(start.system.fit, library)
+    searched = _that_explain(search(start.system.fit, library))
     errors = [leave_out(step.system) for step in searched]
     steps, unconfirmed = _confirmed(searched, errors)
     kept, remainders = truncated(steps, in_common([r.system for r in steps], errors[: len(steps)]))
@@ -309,6 +309,21 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
     held_out = in_common([r.system for r in kept], errors[: len(kept)])
     cut = {step.added[-1]: contradiction(step) for step in steps[len(kept) :]}
     return Ladder(start, kept, list(held_out), remainders, cut | unconfirmed)
+
+
+def _that_explain(steps: Sequence[LadderStep]) -> Sequence[LadderStep]:
+    """The steps without trailing ones whose fit, by its own floors, has no less deviance than the
+    one before by its own, but for a `tie`.
+
+    A floor goes with the constants that noise is multiplied by. Where captures leave them free, an
+    effect that takes their place makes them smaller, and the floor with them: by that floor the fit
+    before misses, and by its own it does not.
+    """
+    tie = steps[-1].fit.policy.selection.tie
+    count = len(steps)
+    while count > 1 and (steps[count - 2].system.deviance - steps[count - 1].system.deviance < tie):
+        count -= 1
+    return steps[:count]
 
 
 def _from_other_place(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder:

@@ -525,6 +525,8 @@ def shows_acceleration(theta_rad: Array, every: int, span: int, policy: Cutting)
     Fuller, Measurement Error Models, Wiley, 1987, ch. 1 (attenuation), doi:10.1002/9780470316665.
 
     """
+    if theta_rad.size <= 2 * every:
+        return False
     error = acceleration_error(theta_rad, 1.0, span)
     means = (
         theta_rad[2 * every :] - 2.0 * theta_rad[every:-every] + theta_rad[: -2 * every]

@@ -172,3 +172,11 @@ def test_an_error_of_a_sensor_without_a_size_is_no_name(monkeypatch: pytest.Monk
     sized = {name.partition(".")[0] for name, one in parameters.items() if one.value is not None}
     assert set(diagnosis.missing) <= sized
     assert "torque_scale" not in diagnosis.missing
+
+
+@pytest.mark.slow
+def test_what_captures_leave_free_is_no_name() -> None:
+    """A slow turn in one sense, a holding current and a coast had a `torque_offset`."""
+    found = with_drawn.campaign(WorldCase("drawn", "links", 166, {}))
+    diagnosis = diagnose(Recordings({found.motor_id: found}))[found.motor_id]
+    assert (diagnosis.verdict, diagnosis.missing) == ("insufficient", ())

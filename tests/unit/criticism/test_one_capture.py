@@ -118,6 +118,7 @@ def test_trailing_effects_that_one_capture_alone_asks_for_are_notes_and_no_names
         around = SimpleNamespace(number=n, fit=SimpleNamespace(model=model))
         steps.append(SimpleNamespace(added=names[1 : n + 1], system=around, fit=around.fit))
     monkeypatch.setattr(search, "search", lambda *_: tuple(steps))
+    monkeypatch.setattr(search, "_that_explain", lambda steps: steps)
     monkeypatch.setattr(search, "leave_out", lambda system: system.number)
     monkeypatch.setattr(search, "in_common", lambda _, held: list(held))
     monkeypatch.setattr(search, "truncated", lambda steps, _: (tuple(steps), ()))

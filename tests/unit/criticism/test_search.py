@@ -218,6 +218,7 @@ def test_what_was_found_beside_a_wrong_form_is_looked_for_without_it(monkeypatch
         return (steps[:1] if "iron_eddy" in steps[-1].added else steps[:2]), ()
 
     monkeypatch.setattr(search, "search", searched)
+    monkeypatch.setattr(search, "_that_explain", lambda steps: steps)
     monkeypatch.setattr(search, "leave_out", lambda _: None)
     monkeypatch.setattr(search, "in_common", lambda systems, _: systems)
     monkeypatch.setattr(search, "_confirmed", lambda steps, _: (steps, {}))
@@ -258,3 +259,22 @@ def test_a_share_that_may_be_none_is_no_change(u: float, told: bool, monkeypatch
     )
     monkeypatch.setattr(free_shares, "free_tests", lambda _: ("spin_down",))
     assert bool(list(free_shares.share_notes(system))) == told
+
+
+@pytest.mark.parametrize(
+    ("deviances", "kept"),
+    [
+        ((135.4, 128.7), 1),
+        ((135.4, 100.0), 2),
+        ((300.0, 299.0, 200.0), 3),
+        ((300.0, 200.0, 195.0, 190.0), 2),
+        ((50.0,), 1),
+    ],
+)
+def test_trailing_steps_without_less_deviance_by_their_own_floors_are_left_out(
+    deviances: tuple[float, ...], kept: int
+) -> None:
+    """A `torque_offset` took the place of friction, and J and its noise went down with it: 6.8."""
+    fit = Fit((), Model(machine(), ()), {}, (), {})
+    steps = [SimpleNamespace(fit=fit, system=SimpleNamespace(deviance=one)) for one in deviances]
+    assert len(search._that_explain(steps)) == kept
