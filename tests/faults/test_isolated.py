@@ -60,7 +60,7 @@ def test_an_angle_off_the_course_of_a_fast_shaft_is_missing(
 
 @pytest.mark.parametrize("name", ["id_a", "iq_a", "torque_shaft_nm"])
 def test_a_current_or_torque_of_nothing_is_missing(name: str, rng: np.random.Generator) -> None:
-    """Warned: five zeros in a drive's log made a sound motor `unknown`; other columns stay."""
+    """Warned: one zero in a thousand readings made a sound motor `unknown`; other columns stay."""
     capture = drive(MOTOR, rng)
     t_s = column(capture, "t_s")
     values = 8.0 + np.sin(3.0 * t_s) + rng.normal(0.0, 0.02, t_s.size)

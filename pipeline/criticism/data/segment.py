@@ -72,8 +72,6 @@ class Sensors:
     torque_s
         Instants of a torque that is sampled more slowly than the log [s, from its first row], which
         is on straight lines between them; None of any other.
-    torque_span
-        Rows that the acceleration at its samples is differenced over; 0 of any other.
     every
         Rows from one sample to the next, of columns that are slower than the log.
 
@@ -90,7 +88,6 @@ class Sensors:
     held_speed: bool = False
     phase_samples: int = 0
     torque_s: Array | None = None
-    torque_span: int = 0
     every: Mapping[str, int] = field(default_factory=dict)
 
     @property

@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.criticism.data.acceleration import shows_acceleration
 from pipeline.criticism.data.hysteresis import play_lag, with_travel
 from pipeline.criticism.data.locked_waves import LockedWaves
 from pipeline.criticism.data.rounding import coarse_step, step_of_differences
 from pipeline.criticism.data.segment import Sensors, SpeedSensor
-from pipeline.criticism.data.traces import READ_BETWEEN, shows_acceleration, smoothed
+from pipeline.criticism.data.traces import READ_BETWEEN, smoothed
 from pipeline.criticism.operating import Array
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.sensors import SensorNoise
@@ -115,11 +116,11 @@ def with_slow_columns(
         bend = 0.0 if name in VOLTS else float(np.std(np.diff(slow[name], 2)))
         missed = bend / math.sqrt(120.0)
         if name == TORQUE:
-            every, span = count, max(round(0.25 * count), 1)
+            every = count
             theta = columns.get("theta_mech_rad", np.zeros(rows.size))
-            if shows_acceleration(theta, count, span, policy.cutting):
+            if shows_acceleration(theta, count, policy.cutting):
                 missed = 0.0
-                sensors = replace(sensors, torque_s=slow["t_s"] - rows[0], torque_span=span)
+                sensors = replace(sensors, torque_s=slow["t_s"] - rows[0])
             at = (slow["t_s"] - rows[0]) / period
             driving = [
                 np.interp(at, np.arange(columns[n].size), columns[n])

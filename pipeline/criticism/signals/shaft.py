@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.criticism.data.acceleration import acceleration_at_samples
 from pipeline.criticism.data.segment import Segment, clock
-from pipeline.criticism.data.traces import quiet_acceleration
 from pipeline.criticism.machine.coenergy import air_gap_torque
 from pipeline.criticism.machine.model import (
     EARLY_S,
@@ -260,10 +260,10 @@ def _acceleration(segment: Segment, theta_rad: Array) -> Array:
     """Acceleration [n, rad/s²] of an angle [n]. Beside a torque that is slower than the rows it is
     differenced over more of them: windows do not average its noise at samples.
     """
-    span = segment.sensors.torque_span
-    if not span:
+    sensors = segment.sensors
+    if sensors.torque_s is None:
         return second_difference(theta_rad, segment.ts_s)
-    return quiet_acceleration(theta_rad, segment.ts_s, span)
+    return acceleration_at_samples(theta_rad, segment.ts_s, sensors.every["torque_shaft_nm"])
 
 
 def _at_samples(segment: Segment, torque_nm: Array) -> Array:

@@ -103,7 +103,7 @@ def decimals(columns: Columns, _: np.random.Generator) -> Columns:
 
 
 def held(every_nth: int, *names: str) -> Damage:
-    """A bus that is slower than the rows: new values in every so-manieth, the last one between."""
+    """A bus that is slower than the rows: new values in every n-th, the last one between."""
 
     def repeated(columns: Columns, rng: np.random.Generator) -> Columns:
         rows = np.arange(columns["t_s"].size)

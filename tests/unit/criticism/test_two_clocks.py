@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import pipeline
-from pipeline.criticism.data.traces import acceleration_error, quiet_acceleration
+from pipeline.criticism.data.acceleration import acceleration_at_samples, shows_acceleration
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.design import Bench
 from pipeline.simulator.effects import parameters
@@ -21,7 +22,7 @@ TORQUE, ANGLE = "torque_shaft_nm", "theta_mech_rad"
 
 
 def found(name: str, every: int, column: str = TORQUE, **effects: float) -> pipeline.Diagnosis:
-    """Of a motor by five captures, a column of its drive in every so-manieth row alone."""
+    """Of a motor by five captures, a column of its drive in every n-th row alone."""
     motor = replace(design(name), effects={}).having(**effects)
     plan = tuple(step for step in CAMPAIGN if step[0] in TESTS)
     made = campaign_of(campaign(motor, Bench(), 5, plan))
@@ -84,15 +85,15 @@ def test_what_a_log_of_a_slow_angle_shows_is_named() -> None:
     assert (diagnosis.verdict, diagnosis.missing) == ("missing", ("saturation",))
 
 
-def test_an_acceleration_is_sure_of_a_smooth_motion_and_unsure_of_a_jump() -> None:
-    period, span = 1e-4, 3
+@pytest.mark.parametrize(("bits", "shown"), [(28, True), (12, False)])
+def test_an_acceleration_at_samples_is_known_by_a_fine_angle(bits: int, shown: bool) -> None:
+    """By a coarse one its noise has more than a hundredth of its power."""
+    period, every = 1e-4, 12
     t = period * np.arange(2000)
-    smooth = 3.0 * t**2 + 0.01 * np.sin(200.0 * t)
+    step = 2.0 * np.pi / 2**bits
+    theta = step * np.round((3.0 * t**2 + 0.01 * np.sin(200.0 * t)) / step)
     true = 6.0 - 400.0 * np.sin(200.0 * t)
-    inner = slice(4 * span, -4 * span)
-    assert quiet_acceleration(smooth, period, span)[inner] == pytest.approx(true[inner], abs=0.1)
-    assert np.abs(acceleration_error(smooth, period, span)[inner]).max() < 1.0
-    late = np.maximum(t - 0.1, 0.0)
-    error = acceleration_error(50.0 * late**2, period, span)
-    assert np.abs(error[1000 - span : 1000 + span]).max() > 15.0
-    assert np.abs(error[4 * span : 900]).max() < 1e-4
+    found = acceleration_at_samples(theta, period, every)[every:-every]
+    assert (found == pytest.approx(true[every:-every], abs=10.0)) == shown
+    assert shows_acceleration(theta, every, DEFAULT.cutting) == shown
+    assert not shows_acceleration(theta[: 2 * every], every, DEFAULT.cutting)
