@@ -59,7 +59,10 @@ def start_values(model: Model, machine: Machine) -> dict[str, float]:
 
 
 def gauss_newton(
-    fit: Fit, before: LinearSystem | None = None, most: float = np.inf
+    fit: Fit,
+    before: LinearSystem | None = None,
+    most: float = np.inf,
+    within_reach: float = np.inf,
 ) -> LinearSystem:
     """Fits a model's own parameters.
 
@@ -68,9 +71,12 @@ def gauss_newton(
     fit
         Where to begin, with the noise floors that the rows are weighed by.
     before
-        A system around a near fit, whose columns may serve.
+        A system around a near fit, with whose columns it begins.
     most
         Deviance from which on it is not begun: the system around `fit` is returned as it is.
+    within_reach
+        Deviance that must come within reach: a fit ends where twice the fall that new columns
+        predict would not do (`policy.selection.choice_falls`).
 
     Returns
     -------
@@ -88,25 +94,32 @@ def gauss_newton(
     Ortega and Rheinboldt, Iterative Solution of Nonlinear Equations, Academic Press, 1970, ch. 7.
 
     """
-    policy = fit.policy.fit
-    system, fresh = linear_system(fit, before=before), True
-    for _ in range(policy.iterations if system.deviance < most else 0):
+    policy, times = fit.policy.fit, fit.policy.selection.choice_falls
+    fresh = before is None
+    system = linear_system(fit, before=before, chord=not fresh)
+    if system.deviance >= most:
+        return system
+    for _ in range(policy.iterations):
         fit = system.fit
         step = bounded_step(_damped(system), system.columns, fit.model, fit.values)
         if fresh and (farther := _after_far_step(system, step)) is not None:
             system = farther
             continue
-        if system.deviance - system.predicted_deviance(step) >= policy.converged:
+        promised = system.deviance - system.predicted_deviance(step)
+        if fresh and system.deviance - times * promised > within_reach:
+            break
+        if promised >= policy.converged:
             halvings = policy.halvings if fresh else 1
             tried, predicted_fall = _tried(system, step, halvings)
             gain = system.deviance - tried.deviance
-            if fresh and gain < policy.kept_share * predicted_fall:
+            kept = gain >= policy.kept_share * predicted_fall
+            if fresh and not kept and predicted_fall - gain >= fit.policy.selection.tie:
                 tried = _two_whole_steps(system, step, _over_inertia(system, step, tried))
                 gain = system.deviance - tried.deviance
             if gain > 0:
                 system = tried
-            fresh = fresh and gain <= 0
-            if gain >= max(policy.kept_share * predicted_fall, policy.converged):
+            fresh = fresh and gain < policy.converged
+            if kept and not fresh:
                 continue
         if fresh:
             break

@@ -172,9 +172,10 @@ def _refits(system: LinearSystem) -> Iterator[LinearSystem]:
         if any(which):
             each = zip(system.segments, which, strict=True)
             read = tuple(other(segment) if its_own else segment for segment, its_own in each)
-            yield gauss_newton(replace(system.fit, segments=read))
+            yield gauss_newton(replace(system.fit, segments=read), before=system)
     if any(ripples(segment) for segment in system.segments):
-        yield gauss_newton(replace(system.fit, segments=tuple(map(_other_lines, system.segments))))
+        other_lines = tuple(map(_other_lines, system.segments))
+        yield gauss_newton(replace(system.fit, segments=other_lines), before=system)
     elsewhere = at_other_place(system)
     # what neither place explains is an effect's, and no coupling shows at the stator; the
     # deviance is logarithmic, so what it spoils in other captures counts by its power

@@ -101,7 +101,7 @@ def best_pair(
         return None
     baseline = Baseline.of(wide, added)
     for pair in list(best_first.values())[: policy.refits]:
-        tried = gauss_newton(_begun(wide.fit, pair))
+        tried = gauss_newton(_begun(wide.fit, pair), before=wide, most=wide.deviance + pair.fall)
         if wide.deviance - tried.deviance < pair.penalty:
             continue
         tried = gauss_newton(with_all_terms(tried.fit), before=tried)

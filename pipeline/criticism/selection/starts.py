@@ -307,7 +307,7 @@ def _fits_from_form(fit: Fit, effect: Effect, form: LinearForm) -> list[Fit]:
         fit, model=model, values={**fit.values, **zero(form.effect, model)}, sigma=sigmas
     )
     starts = []
-    for end in map(gauss_newton, _by_choices(begun)):
+    for end in (gauss_newton(start, before=rigid) for start in _by_choices(begun)):
         moved = dict(end.fit.values)
         linear = {p.name: moved.pop(f"{form.effect.name}.{p.name}") for p in form.effect.parameters}
         values = form.values(linear, moved, machine)
@@ -353,11 +353,13 @@ def with_round_rotor_start(
     """
     so_far = list(scores)
     passing = {score.candidate.effect.name for score in scores if score.passes}
+    close = wide.policy.selection.close_share * max((s.fall for s in scores), default=0.0)
     for name, candidate in first_of_each(offered).items():
         effect = candidate.effect
         if effect.angle is None or name in passing or not _may_bend(wide, effect, significant):
             continue
-        end = gauss_newton(_round_rotor(wide.fit, candidate))
+        begun = _round_rotor(wide.fit, candidate)
+        end = gauss_newton(begun, within_reach=wide.deviance - close)
         so_far = with_better(so_far, score_between(wide, end, candidate), offered)
     return tuple(so_far)
 

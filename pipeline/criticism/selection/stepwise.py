@@ -264,7 +264,7 @@ def _is_reading(
     """
     if chosen is None or reread is wide:
         return False
-    both = gauss_newton(replace(chosen.fit, segments=reread.segments))
+    both = gauss_newton(replace(chosen.fit, segments=reread.segments), before=chosen)
     beside, alone = chosen.deviance - both.deviance, wide.deviance - reread.deviance
     if beside >= wide.policy.selection.unexplained_share * alone:
         return False
