@@ -78,13 +78,13 @@ def _even_stamps(table: pl.DataFrame) -> Array | None:
         return None
     time = table["t_s"].to_numpy()
     steps = np.diff(time)
-    clock = counted(time, _MISSING, _MOST_SCATTER)
-    if clock is None or np.abs(steps - np.median(steps)).max() <= _EVEN * np.median(steps):
+    if np.abs(steps - np.median(steps)).max() <= _EVEN * np.median(steps):
         return None
     signals = [n for n in table.columns if n.endswith((*_SAMPLED, "_rad"))]
     columns = [table[n].to_numpy() for n in signals if table[n].dtype.is_float()]
     whole = [column for column in columns if np.isfinite(column).all()]
-    if clearest_ratio(time, clock[1], whole) >= _SMOOTHER:
+    clock = counted(time, _MISSING, _MOST_SCATTER, whole)
+    if clock is None or clearest_ratio(time, clock[1], whole) >= _SMOOTHER:
         return None
     period, first = np.polyfit(clock[1], time, 1)
     even: Array = first + period * clock[1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,16 @@ _BY_ITSELF = 0.2
 _PARTS, _PART, _FAR = 8, 64, 0.2
 """Parts of a record that its clock is looked for in, stamps of each, and how far from the median
 step [its logarithm]."""
+_MOVED = 16
+"""Samples at either side whose stamps tell the pace of a signal: of stamps that scatter by half a
+period it is off by a fiftieth."""
+_SMOOTHER = 0.5
+"""Roughness of a signal over its own count, of that over another, that shows the other wrong."""
 
 
-def counted(time: Array, missing: float, most_scatter: float) -> tuple[float, Indices] | None:
+def counted(
+    time: Array, missing: float, most_scatter: float, columns: Sequence[Array] = ()
+) -> tuple[float, Indices] | None:
     """The even clock behind stamps that scatter.
 
     Parameters
@@ -29,6 +36,9 @@ def counted(time: Array, missing: float, most_scatter: float) -> tuple[float, In
         Distance of two stamps [periods] from which on a sample may be missing between them.
     most_scatter
         Scatter of stamps [periods] from which on a stamp does not number its sample.
+    columns
+        Signals [n each, any unit]. One that only rises or only falls numbers its samples where it
+        is smoother over that count than over the stamps'.
 
     Returns
     -------
@@ -41,7 +51,9 @@ def counted(time: Array, missing: float, most_scatter: float) -> tuple[float, In
     Two counts are tried: one in which a long step stands for missing samples, whose numbers are
     left out, and one in which it does not. The one with less scatter counts. Of stamps that scatter
     a count goes wrong once and stays so: where neither count is even, every stamp is numbered by
-    itself, on the clock that most of them agree with.
+    itself, on the clock that most of them agree with. A computer that stamps in whole milliseconds
+    gives a sample of every millisecond its own number or the one before, and loses what has a
+    number twice; such stamps are even, and wrong. The angle of a shaft that turns knows better.
 
     Examples
     --------
@@ -60,9 +72,43 @@ def counted(time: Array, missing: float, most_scatter: float) -> tuple[float, In
         scatter = float(np.std(since - first - period * number)) / period
         ends.append((scatter, float(period), number.astype(np.int64)))
     scatter, period, number = min(ends, key=lambda end: end[0])
-    if scatter > _BY_ITSELF and (alone := _numbered(since)) is not None:
-        return alone
-    return None if scatter > most_scatter else (period, number)
+    found = None if scatter > most_scatter else (period, number)
+    if scatter > _BY_ITSELF:
+        found = _numbered(since) or found
+    moved = _by_motion(since, columns)
+    known = since if found is None else found[1].astype(float)
+    if moved is not None and clearest_ratio(known, moved[1], columns) < _SMOOTHER:
+        return moved
+    return found
+
+
+def _by_motion(since: Array, columns: Iterable[Array]) -> tuple[float, Indices] | None:
+    """Period and number of each sample [n] by the signal that tells it best: its change from one to
+    the next, over its pace. None where no signal only rises or only falls by such steps.
+    """
+    best, least = None, _BY_ITSELF
+    for column in columns:
+        steps = np.diff(column)
+        if steps.size <= 2 * _MOVED or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+            continue
+        ahead, behind = slice(2 * _MOVED, None), slice(None, -2 * _MOVED)
+        pace = (column[ahead] - column[behind]) / (since[ahead] - since[behind])
+        middle = 0.5 * (since[ahead] + since[behind])
+        # a coast goes on slowing down in its last samples
+        ends = [
+            np.polyval(np.polyfit(middle[part], pace[part], 1), since[end])
+            for part, end in ((slice(_MOVED), 0), (slice(-_MOVED, None), -1))
+        ]
+        at, paces = [since[0], *middle, since[-1]], [ends[0], *pace, ends[1]]
+        lasted = steps / np.interp(0.5 * (since[1:] + since[:-1]), at, paces)
+        lasted /= np.median(lasted)
+        counts = np.maximum(np.rint(lasted), 1.0)
+        scatter = float(np.sqrt(np.mean((lasted - counts) ** 2)))
+        if scatter < least:
+            number = np.concatenate([[0.0], np.cumsum(counts)])
+            best = float(np.polyfit(number, since, 1)[0]), number.astype(np.int64)
+            least = scatter
+    return best
 
 
 def _numbered(since: Array) -> tuple[float, Indices] | None:

@@ -220,8 +220,9 @@ def _counts(
     """Period [s] and number of each row [n] of an even clock that its stamps [n, s] are about; None
     where its columns [n each] are not of one.
     """
-    clock = counted(time, policy.clock_missing, policy.clock_scatter)
-    even = clock and clearest_ratio(time, clock[1], columns.values()) <= policy.clock_ratio
+    signals = list(columns.values())
+    clock = counted(time, policy.clock_missing, policy.clock_scatter, signals)
+    even = clock and clearest_ratio(time, clock[1], signals) <= policy.clock_ratio
     return clock if even else None
 
 

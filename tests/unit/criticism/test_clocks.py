@@ -204,3 +204,57 @@ def test_stamps_that_scatter_are_numbered_though_a_tenth_of_the_rows_is_lost(sca
 def test_stamps_without_a_clock_are_not_numbered():
     stamps = np.cumsum(np.random.default_rng(4).exponential(PERIOD, 4000))
     assert counted(stamps, 1.6, 0.5) is None
+
+
+def coast(n=900, period=1e-3, seed=4):
+    """Instants [n, s] that scatter by a fiftieth of a period, and an angle [rad] that slows down."""
+    t = period * (np.arange(n) + 0.02 * np.random.default_rng(seed).standard_normal(n))
+    return t, 250.0 * t - 135.0 * t**2
+
+
+def test_a_shaft_numbers_samples_whose_stamps_are_whole_milliseconds():
+    """Of two samples in one millisecond the second was dropped: the stamps are even, and wrong."""
+    t, theta = coast()
+    stamps = np.floor(1e3 * t) / 1e3
+    first = np.diff(stamps, prepend=-np.inf) > 0.0
+    known = counted(stamps[first], CUTTING.clock_missing, CUTTING.clock_scatter)
+    assert known is not None
+    assert not np.array_equal(known[1], np.flatnonzero(first) - np.flatnonzero(first)[0])
+    capture = log(stamps[first], theta[first])
+    period, found, keep = even_clock(capture, ("theta_mech_rad",), CUTTING)
+    assert period == pytest.approx(1e-3, rel=1e-3)
+    numbers = np.flatnonzero(first)
+    expected = theta[numbers[0] : numbers[-1] + 1]
+    assert found["theta_mech_rad"].size == expected.size
+    assert np.abs(found["theta_mech_rad"] - expected)[keep].max() < 0.1 * 0.25
+    counted_capture, findings = stamps_counted(capture)
+    assert [finding.code for finding in findings] == ["scattered_stamps"]
+    steps = np.diff(counted_capture.tables[0]["t_s"].to_numpy())
+    assert np.allclose(steps, np.diff(numbers) * 1e-3, rtol=1e-3)
+
+
+@pytest.mark.parametrize("scatter", [0.3, 0.45])
+def test_a_shaft_numbers_samples_whose_stamps_scatter_and_of_which_many_are_lost(scatter):
+    t, theta = coast(n=3000, period=2e-4)
+    rng = np.random.default_rng(9)
+    stamps = t + 2e-4 * scatter * np.clip(rng.standard_normal(t.size), -1.0, 1.0)
+    kept = (rng.uniform(size=t.size) > 0.1) & (np.diff(stamps, prepend=-np.inf) > 0.0)
+    kept &= stamps >= np.maximum.accumulate(stamps)
+    numbers = np.flatnonzero(kept)
+    found = counted(stamps[kept], CUTTING.clock_missing, CUTTING.clock_scatter, [theta[kept]])
+    assert found is not None
+    assert found[0] == pytest.approx(2e-4, rel=1e-3)
+    assert np.array_equal(found[1], numbers - numbers[0])
+
+
+def test_an_angle_in_steps_as_large_as_its_motion_numbers_nothing():
+    t, theta = coast()
+    stamps = np.floor(1e3 * t) / 1e3
+    first = np.diff(stamps, prepend=-np.inf) > 0.0
+    step = 2.0 * np.pi / 16.0
+    coarse = step * np.round(theta[first] / step)
+    arguments = stamps[first], CUTTING.clock_missing, CUTTING.clock_scatter
+    plain, with_angle = counted(*arguments), counted(*arguments, [coarse])
+    assert plain is not None
+    assert with_angle is not None
+    assert np.array_equal(plain[1], with_angle[1])
