@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.quantisation import resolution
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _REACH = 2
@@ -19,6 +21,8 @@ step [its logarithm]."""
 _MOVED = 16
 """Samples at either side whose stamps tell the pace of a signal: of stamps that scatter by half a
 period it is off by a fiftieth."""
+_STEPS = 8
+"""Steps of an encoder in a change from which on their rounding, √(1/6) of one, is no sample."""
 _SMOOTHER = 0.5
 """Roughness of a signal over its own count, of that over another, that shows the other wrong."""
 
@@ -84,12 +88,15 @@ def counted(
 
 def _by_motion(since: Array, columns: Iterable[Array]) -> tuple[float, Indices] | None:
     """Period and number of each sample [n] by the signal that tells it best: its change from one to
-    the next, over its pace. None where no signal only rises or only falls by such steps.
+    the next, over its pace. None where no signal only rises or only falls, by many times its
+    resolution.
     """
     best, least = None, _BY_ITSELF
     for column in columns:
         steps = np.diff(column)
         if steps.size <= 2 * _MOVED or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+            continue
+        if np.median(np.abs(steps)) < _STEPS * resolution(steps):
             continue
         ahead, behind = slice(2 * _MOVED, None), slice(None, -2 * _MOVED)
         pace = (column[ahead] - column[behind]) / (since[ahead] - since[behind])

@@ -247,14 +247,13 @@ def test_a_shaft_numbers_samples_whose_stamps_scatter_and_of_which_many_are_lost
     assert np.array_equal(found[1], numbers - numbers[0])
 
 
-def test_an_angle_in_steps_as_large_as_its_motion_numbers_nothing():
-    t, theta = coast()
-    stamps = np.floor(1e3 * t) / 1e3
-    first = np.diff(stamps, prepend=-np.inf) > 0.0
-    step = 2.0 * np.pi / 16.0
-    coarse = step * np.round(theta[first] / step)
-    arguments = stamps[first], CUTTING.clock_missing, CUTTING.clock_scatter
-    plain, with_angle = counted(*arguments), counted(*arguments, [coarse])
-    assert plain is not None
-    assert with_angle is not None
-    assert np.array_equal(plain[1], with_angle[1])
+@pytest.mark.parametrize("steps_a_row", [0.7, 1.23, 2.6])
+def test_an_angle_in_steps_as_large_as_its_motion_numbers_nothing(steps_a_row):
+    """One or two steps from row to row are no one or two samples."""
+    even, stamps = instants(scatter=0.2)
+    coarse = np.floor(steps_a_row * np.arange(even.size) + 0.3) * 2.0 * np.pi / 2048
+    arguments = np.sort(stamps), CUTTING.clock_missing, CUTTING.clock_scatter
+    found = counted(*arguments, [coarse])
+    assert found is not None
+    assert found[0] == pytest.approx(PERIOD, rel=1e-4)
+    assert np.array_equal(found[1], np.arange(even.size))
