@@ -207,7 +207,7 @@ def test_stamps_without_a_clock_are_not_numbered():
 
 
 def coast(n=900, period=1e-3, seed=4):
-    """Instants [n, s] that scatter by a fiftieth of a period, and an angle [rad] that slows down."""
+    """Instants [n, s] that scatter by a fiftieth of a period, and an angle [rad] of a coast."""
     t = period * (np.arange(n) + 0.02 * np.random.default_rng(seed).standard_normal(n))
     return t, 250.0 * t - 135.0 * t**2
 
