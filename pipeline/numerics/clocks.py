@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,10 @@ step [its logarithm]."""
 _MOVED = 16
 """Samples at either side whose stamps tell the pace of a signal: of stamps that scatter by half a
 period it is off by a fiftieth."""
+_MOST_OF_WAY = 0.8
+"""Share of the way of a signal in stretches that number their samples."""
+_NEAR = 8
+"""Samples that a change may stand for: of more, a fiftieth is no longer a small part of one."""
 _STEPS = 8
 """Steps of an encoder in a change from which on their rounding, √(1/6) of one, is no sample."""
 _SMOOTHER = 0.5
@@ -87,35 +92,77 @@ def counted(
 
 
 def _by_motion(since: Array, columns: Iterable[Array]) -> tuple[float, Indices] | None:
-    """Period and number of each sample [n] by the signal that tells it best: its change from one to
-    the next, over its pace. None where no signal only rises or only falls, by many times its
-    resolution.
+    """Period and number of each sample by the signal that tells most of them: in stretches in which
+    it only rises or only falls, by many times its resolution, its change from one sample to the
+    next over its pace. Where it hardly moves the stamps number it: there a number that is one off
+    is as good. None where no signal goes most of its way in such stretches.
     """
-    best, least = None, _BY_ITSELF
+    best, most, apart = None, _MOST_OF_WAY, np.diff(since)
+    near = apart <= _NEAR * np.median(apart)
     for column in columns:
         steps = np.diff(column)
-        if steps.size <= 2 * _MOVED or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
-            continue
-        if np.median(np.abs(steps)) < _STEPS * resolution(steps):
-            continue
-        ahead, behind = slice(2 * _MOVED, None), slice(None, -2 * _MOVED)
-        pace = (column[ahead] - column[behind]) / (since[ahead] - since[behind])
-        middle = 0.5 * (since[ahead] + since[behind])
-        # a coast goes on slowing down in its last samples
-        ends = [
-            np.polyval(np.polyfit(middle[part], pace[part], 1), since[end])
-            for part, end in ((slice(_MOVED), 0), (slice(-_MOVED, None), -1))
+        seen = near & (np.abs(steps) >= _STEPS * resolution(steps))
+        way = np.where(seen, np.sign(steps), 0.0)
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(way)) + 1, [way.size]]).tolist()
+        stretches = [
+            slice(first, end + 1)
+            for first, end in pairwise(edges)
+            if way[first] and end - first > 2 * _MOVED
         ]
-        at, paces = [since[0], *middle, since[-1]], [ends[0], *pace, ends[1]]
-        lasted = steps / np.interp(0.5 * (since[1:] + since[:-1]), at, paces)
-        lasted /= np.median(lasted)
-        counts = np.maximum(np.rint(lasted), 1.0)
-        scatter = float(np.sqrt(np.mean((lasted - counts) ** 2)))
-        if scatter < least:
-            number = np.concatenate([[0.0], np.cumsum(counts)])
-            best = float(np.polyfit(number, since, 1)[0]), number.astype(np.int64)
-            least = scatter
+        moved = sum(float(np.abs(steps[one.start : one.stop - 1]).sum()) for one in stretches)
+        share = moved / max(float(np.abs(steps[near]).sum()), 1e-300)
+        if share > most and (clock := _on_one_clock(since, column, stretches)) is not None:
+            best, most = clock, share
     return best
+
+
+def _on_one_clock(
+    since: Array, column: Array, stretches: Sequence[slice]
+) -> tuple[float, Indices] | None:
+    """Period and number of each sample, those of the stretches by the way of the column; None where
+    that is not in steps of one period.
+    """
+    lasted = [_lasted(since[one], column[one]) for one in stretches]
+    every = np.concatenate(lasted)
+    usual = float(np.median(every))
+    counts = [np.maximum(np.rint(one / usual), 1.0) for one in lasted]
+    if np.sqrt(np.mean((every / usual - np.concatenate(counts)) ** 2)) > _BY_ITSELF:
+        return None
+    within = [np.concatenate([[0.0], np.cumsum(one)]) for one in counts]
+    apart = [(n - n.mean(), since[one]) for n, one in zip(within, stretches, strict=True)]
+    period = sum(float(n @ t) for n, t in apart) / sum(float(n @ n) for n, _ in apart)
+    begins = [
+        float(np.median(since[one] / period - n)) for n, one in zip(within, stretches, strict=True)
+    ]
+    sizes = [n.size for n in within]
+    phase = float(np.angle(np.exp(2j * np.pi * np.array(begins)) @ sizes)) / (2.0 * np.pi)
+    number = np.rint(since / period - phase)
+    for n, one, begin in zip(within, stretches, begins, strict=True):
+        number[one] = np.rint(begin - phase) + n
+    outside = np.concatenate([[0], *([one.start, one.stop] for one in stretches), [since.size]])
+    for first, end in outside.reshape(-1, 2).tolist():
+        place = np.arange(end - first)
+        low = number[first - 1] + 1.0 if first else -np.inf
+        high = number[end] - float(place.size) if end < since.size else np.inf
+        rising = np.maximum.accumulate(np.clip(number[first:end] - place, low, max(low, high)))
+        number[first:end] = rising + place
+    if np.any(np.diff(number) < 1.0):
+        return None
+    return float(np.polyfit(number, since, 1)[0]), (number - number[0]).astype(np.int64)
+
+
+def _lasted(since: Array, column: Array) -> Array:
+    """Time from each sample to the next [n - 1, s] by the change of a column over its pace."""
+    ahead, behind = slice(2 * _MOVED, None), slice(None, -2 * _MOVED)
+    pace = (column[ahead] - column[behind]) / (since[ahead] - since[behind])
+    middle = 0.5 * (since[ahead] + since[behind])
+    at, paces = [since[0], *middle, since[-1]], [pace[0], *pace, pace[-1]]
+    if middle.size >= _MOVED:
+        # a coast goes on slowing down in its last samples
+        for part, end in ((slice(_MOVED), 0), (slice(-_MOVED, None), -1)):
+            paces[end] = np.polyval(np.polyfit(middle[part], pace[part], 1), since[end])
+    lasted: Array = np.diff(column) / np.interp(0.5 * (since[1:] + since[:-1]), at, paces)
+    return lasted
 
 
 def _numbered(since: Array) -> tuple[float, Indices] | None:

@@ -247,6 +247,27 @@ def test_a_shaft_numbers_samples_whose_stamps_scatter_and_of_which_many_are_lost
     assert np.array_equal(found[1], numbers - numbers[0])
 
 
+def test_a_shaft_that_turns_back_numbers_samples_beside_gaps():
+    """Where it hardly moves the stamps number them, where a sample that is one off is as good."""
+    t, _ = coast(n=20000, period=5e-5)
+    theta = 30.0 * np.sin(8.0 * t)
+    rng = np.random.default_rng(2)
+    stamps = t + 2e-5 * np.clip(rng.standard_normal(t.size), -1.2, 1.2)
+    kept = rng.uniform(size=t.size) > 0.1
+    for begin in (3000, 11000, 16500):
+        kept[begin : begin + 650] = False
+    kept &= stamps > np.maximum.accumulate(np.append(-np.inf, stamps[:-1]))
+    numbers = np.flatnonzero(kept)
+    found = counted(stamps[kept], CUTTING.clock_missing, CUTTING.clock_scatter, [theta[kept]])
+    assert counted(stamps[kept], CUTTING.clock_missing, CUTTING.clock_scatter) is None
+    assert found is not None
+    assert found[0] == pytest.approx(5e-5, rel=1e-6)
+    off = found[1] - (numbers - numbers[0])
+    assert np.abs(off).max() <= 1
+    pace = np.abs(np.cos(8.0 * t[kept]))
+    assert not off[pace > 0.3].any()
+
+
 @pytest.mark.parametrize("steps_a_row", [0.7, 1.23, 2.6])
 def test_an_angle_in_steps_as_large_as_its_motion_numbers_nothing(steps_a_row):
     """One or two steps from row to row are no one or two samples."""
