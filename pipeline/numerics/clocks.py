@@ -20,7 +20,7 @@ _PARTS, _PART, _FAR = 8, 64, 0.2
 """Parts of a record that its clock is looked for in, stamps of each, and how far from the median
 step [its logarithm]."""
 _MOVED = 16
-"""Samples at either side whose stamps tell the pace of a signal: of stamps that scatter by half a
+"""Samples at either side whose stamps give the pace of a signal: of stamps that scatter by half a
 period it is off by a fiftieth."""
 _MOST_OF_WAY = 0.8
 """Share of the way of a signal in stretches that number their samples."""
@@ -92,7 +92,7 @@ def counted(
 
 
 def _by_motion(since: Array, columns: Iterable[Array]) -> tuple[float, Indices] | None:
-    """Period and number of each sample by the signal that tells most of them: in stretches in which
+    """Period and number of each sample by the signal that shows most of them: in stretches in which
     it only rises or only falls, by many times its resolution, its change from one sample to the
     next over its pace. Where it hardly moves the stamps number it: there a number that is one off
     is as good. None where no signal goes most of its way in such stretches.
