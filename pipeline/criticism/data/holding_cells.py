@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -62,11 +63,15 @@ def holding_cells(capture: Capture, policy: Policy) -> Cells | None:
     Where a rotor turns back, friction is of neither sense until it has moved. The noise of a cell's
     mean comes from the scatter within cells about a straight line, with its correlation from sample
     to sample; a loop that holds does not repeat better than that. Where few cells have rows enough
-    it comes from the differences between neighbours.
+    it comes from the differences between neighbours. What all rows of a cell have in common, as the
+    rounding of a phase current that stays, shows between passes.
 
     """
     if not capture.has("theta_mech_rad", "iq_a"):
         return None
+    if capture.has("t_s"):
+        # of a current that a bus holds, rows between its own are of no angle
+        capture = capture.on_rows_of(capture.table_of("iq_a"))
     columns = capture.arrays("theta_mech_rad", "iq_a")
     finite = np.isfinite(columns["theta_mech_rad"]) & np.isfinite(columns["iq_a"])
     theta, current = columns["theta_mech_rad"][finite], columns["iq_a"][finite]
@@ -84,7 +89,7 @@ def holding_cells(capture: Capture, policy: Policy) -> Cells | None:
     if not rows or sum(len(r) for r in rows) < policy.tables.sectors:
         return None
     table = np.concatenate(rows)
-    noise = _noise(spread, [cells[:, 1] for cells in rows], policy)
+    noise = _noise(spread, rows, policy)
     sector = _sectors_of(table[:, 0], policy.tables.sectors)
     return Cells(table[:, 0], table[:, 1], table[:, 2], sector, noise)
 
@@ -110,10 +115,11 @@ def _about_a_line(theta: Array, current: Array) -> Array:
     return current - current.mean() - slope * at
 
 
-def _noise(spread: list[Array], means: list[Array], policy: Policy) -> float:
-    """Standard deviation [A] of a cell's mean, of cells' `means` pass by pass and of their rows'
-    scatter; never below a ten-thousandth of the largest.
+def _noise(spread: list[Array], passed: list[Array], policy: Policy) -> float:
+    """Standard deviation [A] of a cell's mean, of the cells [K, 3] pass by pass and of their rows'
+    scatter; never below a ten-thousandth of the largest, nor what two passes differ by.
     """
+    means = [cells[:, 1] for cells in passed]
     least = max(policy.tables.reading * max(float(np.abs(one).max()) for one in means), 1e-12)
     if len(spread) < policy.tables.cell_share * sum(one.size for one in means):
         return max(*(sensor_noise(one, policy.sensor_noise) for one in means), least)
@@ -124,7 +130,21 @@ def _noise(spread: list[Array], means: list[Array], policy: Policy) -> float:
     a_cell = n / len(spread)
     free = max(a_cell * (1.0 - alike) / (1.0 + alike), 1.0)
     scatter = math.sqrt(power / max(n - 2 * len(spread), 1))
-    return max(scatter / math.sqrt(free), least)
+    return max(scatter / math.sqrt(free), _between_passes(passed, policy), least)
+
+
+def _between_passes(passed: list[Array], policy: Policy) -> float:
+    """Standard deviation [A] of a cell's mean by the differences of passes of both senses, in which
+    all that repeats with the angle is gone; 0 without any.
+    """
+    found = [0.0]
+    for one, other in pairwise(passed):
+        numbers = [np.floor(c[:, 0] / TURN_RAD * policy.tables.cells) for c in (one, other)]
+        _, *places = np.intersect1d(*numbers, return_indices=True)
+        apart = one[places[0], 1] - other[places[1], 1]
+        if apart.size >= policy.tables.sectors:
+            found.append(sensor_noise(apart, policy.sensor_noise) / math.sqrt(2.0))
+    return max(found)
 
 
 def _sectors_of(theta: Array, sectors: int) -> Indices:

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import pipeline
 from pipeline.criticism.data.holding_cells import holding_cells
@@ -45,3 +46,34 @@ def test_a_cell_where_the_rotor_turns_back_is_of_neither_sense() -> None:
         assert np.abs(one - np.median(one)).max() < 0.1 * abs(np.median(up) - np.median(down))
     both, last = cells.theta_mech_rad, held.tables[0]["theta_mech_rad"].max()
     assert both.max() < last
+
+
+def sound(**sensors):
+    """A holding current of a sound motor by such sensors."""
+    motor, plan = replace(design("joint-11p"), effects={}), (("h", "holding_current", {}),)
+    (held,) = campaign_of(campaign(motor, replace(Bench(), **sensors), 2, plan)).captures
+    return held
+
+
+@pytest.mark.parametrize("noise", [0.3, 3.0])
+def test_what_all_rows_of_a_position_have_in_common_is_noise(noise):
+    """Phase currents stay while the rotor is held, and so does their rounding: of four rows by 12
+    bits a mean was taken to be twice as good as one, and a sound motor was `unknown`.
+    """
+    cells = holding_cells(sound(adc_bits=12, noise_scale=noise), DEFAULT)
+    assert cells is not None
+    scatter = math.sqrt(np.mean([np.var(cells.iq_a[cells.sense == s]) for s in (1.0, -1.0)]))
+    assert 0.75 * scatter < cells.noise_a < 1.6 * scatter
+
+
+def test_a_current_that_a_bus_holds_is_read_at_the_angles_of_its_own_rows():
+    held = sound()
+    (table,) = held.tables
+    slow = table.gather_every(5).select("t_s", "id_a", "iq_a")
+    apart = replace(held, tables=(table.drop("id_a", "iq_a"), slow))
+    cells = holding_cells(apart, DEFAULT)
+    assert cells is not None
+    every = holding_cells(replace(held, tables=(table.gather_every(5),)), DEFAULT)
+    assert every is not None
+    assert np.array_equal(cells.iq_a, every.iq_a)
+    assert cells.noise_a == every.noise_a
