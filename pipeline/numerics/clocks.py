@@ -139,16 +139,21 @@ def _on_one_clock(
     number = np.rint(since / period - phase)
     for n, one, begin in zip(within, stretches, begins, strict=True):
         number[one] = np.rint(begin - phase) + n
-    outside = np.concatenate([[0], *([one.start, one.stop] for one in stretches), [since.size]])
-    for first, end in outside.reshape(-1, 2).tolist():
-        place = np.arange(end - first)
-        low = number[first - 1] + 1.0 if first else -np.inf
-        high = number[end] - float(place.size) if end < since.size else np.inf
-        rising = np.maximum.accumulate(np.clip(number[first:end] - place, low, max(low, high)))
-        number[first:end] = rising + place
+    _fit_between(number, stretches)
     if np.any(np.diff(number) < 1.0):
         return None
     return float(np.polyfit(number, since, 1)[0]), (number - number[0]).astype(np.int64)
+
+
+def _fit_between(number: Array, stretches: Sequence[slice]) -> None:
+    """Makes numbers outside of the stretches rise from one stretch to the next, in place."""
+    edges = [0, *(edge for one in stretches for edge in (one.start, one.stop)), number.size]
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        place = np.arange(end - first)
+        low = number[first - 1] + 1.0 if first else -np.inf
+        high = number[end] - float(place.size) if end < number.size else np.inf
+        rising = np.maximum.accumulate(np.clip(number[first:end] - place, low, max(low, high)))
+        number[first:end] = rising + place
 
 
 def _lasted(since: Array, column: Array) -> Array:

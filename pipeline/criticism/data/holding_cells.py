@@ -139,9 +139,9 @@ def _between_passes(passed: list[Array], policy: Policy) -> float:
     """
     found = [0.0]
     for one, other in pairwise(passed):
-        numbers = [np.floor(c[:, 0] / TURN_RAD * policy.tables.cells) for c in (one, other)]
-        _, *places = np.intersect1d(*numbers, return_indices=True)
-        apart = one[places[0], 1] - other[places[1], 1]
+        first, second = (np.floor(c[:, 0] / TURN_RAD * policy.tables.cells) for c in (one, other))
+        _, there, back = np.intersect1d(first, second, return_indices=True)
+        apart = one[there, 1] - other[back, 1]
         if apart.size >= policy.tables.sectors:
             found.append(sensor_noise(apart, policy.sensor_noise) / math.sqrt(2.0))
     return max(found)
