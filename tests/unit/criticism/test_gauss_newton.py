@@ -276,3 +276,33 @@ def test_a_torque_beside_a_coast_is_a_whole_step_away_from_a_tenth_of_the_inerti
     begun = Fit(cut, sound.model, light, floors(cut, sound.model, light), light)
     end = gauss_newton(begun).fit.values
     assert end["j_kgm2"] == pytest.approx(motor.j_rotor_kgm2, rel=0.05)
+
+
+def moved_away(inertia: float) -> tuple[LinearSystem, Fit]:
+    """A fit, and its start from another inertia."""
+    noisy = tuple(log(seed=n, noise=1.0) for n in (1, 2))
+    model = Model(machine(), ())
+    end = gauss_newton(Fit(noisy, model, BASE, floors(noisy, model, BASE), BASE))
+    return end, end.fit.at({"j_kgm2": inertia * end.fit.values["j_kgm2"]})
+
+
+def test_a_fit_that_cannot_come_within_reach_is_left_where_it_began():
+    end, start = moved_away(1.2)
+    assert gauss_newton(start, within_reach=end.deviance).deviance == pytest.approx(
+        end.deviance, abs=0.1
+    )
+    begun = linear_system(start)
+    beyond = begun.deviance - 2.5 * (begun.deviance - end.deviance)
+    left = gauss_newton(start, within_reach=beyond)
+    assert left.fit.values == start.values
+    assert left.deviance == begun.deviance
+
+
+def test_a_refit_begins_with_the_columns_of_the_fit_beside_it():
+    """Made anew at each start, they were most of what a search takes."""
+    end, start = moved_away(1.02)
+    again = gauss_newton(start, before=end)
+    assert again.deviance < end.deviance + end.policy.fit.converged
+    assert all(again.made_at[key] is values for key, values in end.made_at.items())
+    far = gauss_newton(moved_away(1.5)[1], before=end)
+    assert far.deviance < end.deviance + end.policy.fit.converged
