@@ -83,7 +83,8 @@ def best_pair(
         Effects that the search added to it.
     most_deviance
         Deviance that the fit must not exceed. A pair is not fitted where
-        `policy.selection.choice_falls` times its fall to first order would not do.
+        `policy.selection.choice_falls` times its fall to first order would not do, nor where its
+        step ends farther above the fit than it promised to end below.
 
     Returns
     -------
