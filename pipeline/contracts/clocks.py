@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from pipeline.contracts.protocol import warning
-from pipeline.numerics.clocks import clearest_ratio, counted
+from pipeline.numerics.clocks import SMOOTHER, clearest_ratio, counted
 from pipeline.records.capture import Array, Capture, Indices
 from pipeline.records.finding import Finding
 
@@ -29,8 +29,6 @@ _LEAST_STAMPS, _EVEN = 50, 1e-2
 _MISSING, _MOST_SCATTER = 1.6, 0.5
 """Distance of two stamps beyond which a sample may be missing, and scatter beyond which a stamp may
 be its neighbour's [periods]."""
-_SMOOTHER = 0.5
-"""Roughness of a signal over the count, of that over the stamps, that shows an even sampling."""
 _JITTER = 0.2
 """What a change may be off its clock by, over the time for which values are held."""
 
@@ -84,7 +82,7 @@ def _even_stamps(table: pl.DataFrame) -> Array | None:
     columns = [table[n].to_numpy() for n in signals if table[n].dtype.is_float()]
     whole = [column for column in columns if np.isfinite(column).all()]
     clock = counted(time, _MISSING, _MOST_SCATTER, whole)
-    if clock is None or clearest_ratio(time, clock[1], whole) >= _SMOOTHER:
+    if clock is None or clearest_ratio(time, clock[1], whole) >= SMOOTHER:
         return None
     period, first = np.polyfit(clock[1], time, 1)
     even: Array = first + period * clock[1]

@@ -28,7 +28,7 @@ _NEAR = 8
 """Samples that a change may stand for: of more, a fiftieth is no longer a small part of one."""
 _STEPS = 8
 """Steps of an encoder in a change from which on their rounding, √(1/6) of one, is no sample."""
-_SMOOTHER = 0.5
+SMOOTHER = 0.5
 """Roughness of a signal over its own count, of that over another, that shows the other wrong."""
 
 
@@ -46,8 +46,8 @@ def counted(
     most_scatter
         Scatter of stamps [periods] from which on a stamp does not number its sample.
     columns
-        Signals [n each, any unit]. One that only rises or only falls numbers its samples where it
-        is smoother over that count than over the stamps'.
+        Signals [n each, any unit]. One that goes most of its way in long stretches of one sense
+        numbers its samples, where it is smoother over that count than over the stamps'.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def counted(
         found = _numbered(since) or found
     moved = _by_motion(since, columns)
     known = since if found is None else found[1].astype(float)
-    if moved is not None and clearest_ratio(known, moved[1], columns) < _SMOOTHER:
+    if moved is not None and clearest_ratio(known, moved[1], columns) < SMOOTHER:
         return moved
     return found
 

@@ -69,9 +69,10 @@ def holding_cells(capture: Capture, policy: Policy) -> Cells | None:
     """
     if not capture.has("theta_mech_rad", "iq_a"):
         return None
-    if capture.has("t_s"):
+    home = capture.table_of("iq_a")
+    if "t_s" in capture.tables[home].columns:
         # of a current that a bus holds, rows between its own are of no angle
-        capture = capture.on_rows_of(capture.table_of("iq_a"))
+        capture = capture.on_rows_of(home)
     columns = capture.arrays("theta_mech_rad", "iq_a")
     finite = np.isfinite(columns["theta_mech_rad"]) & np.isfinite(columns["iq_a"])
     theta, current = columns["theta_mech_rad"][finite], columns["iq_a"][finite]

@@ -86,7 +86,8 @@ def gauss_newton(
     Notes
     -----
     A step that makes the deviance worse is shortened. Columns stay as they are while steps do about
-    what they predict (chord method); a fit has converged where new columns predict no fall.
+    what they predict (chord method); a fit has converged where new columns predict no fall, or a
+    step along them wins none. Two whole steps are tried where one falls short by a tie.
 
     References
     ----------

@@ -226,7 +226,8 @@ def test_a_shaft_numbers_samples_whose_stamps_are_whole_milliseconds():
     numbers = np.flatnonzero(first)
     expected = theta[numbers[0] : numbers[-1] + 1]
     assert found["theta_mech_rad"].size == expected.size
-    assert np.abs(found["theta_mech_rad"] - expected)[keep].max() < 0.1 * 0.25
+    # read between rows that scatter by a fiftieth, each of a quarter of a radian
+    assert np.abs(found["theta_mech_rad"] - expected)[keep].max() < 5.0 * 0.02 * 0.25
     counted_capture, findings = stamps_counted(capture)
     assert [finding.code for finding in findings] == ["scattered_stamps"]
     steps = np.diff(counted_capture.tables[0]["t_s"].to_numpy())
@@ -264,8 +265,7 @@ def test_a_shaft_that_turns_back_numbers_samples_beside_gaps():
     assert found is not None
     assert found[0] == pytest.approx(5e-5, rel=1e-5)
     off = found[1] - (numbers - numbers[0])
-    off -= int(np.median(off))
-    assert np.abs(off).max() <= 2
+    assert np.abs(off).max() <= 1
     pace = np.abs(np.cos(8.0 * t[kept]))
     assert not off[pace > 0.3].any()
 
