@@ -138,14 +138,16 @@ def _scales(
     turned = max((_speed(c) for c in campaign.captures if c.meta.test != _HELD), default=0.0)
     speed = turned or max((_speed(c) for c in campaign.captures), default=0.0) or 1.0
     flux = 0.0 if voltage else _largest(tables, ("psi_d_wb", "psi_q_wb"))
-    voltage = voltage or flux * pole_pairs * speed
+    # without the voltage of a turning winding, the torque that a current makes
+    made = _largest(logs, ("torque_shaft_nm",)) / (1.5 * pole_pairs * current) if current else 0.0
+    voltage = voltage or (flux or made) * pole_pairs * speed
     # without a winding on record the torque's own size is all there is
     shaft = 0.0 if current and voltage else _largest(campaign.captures, ("torque_shaft_nm",))
     shaft = shaft or (0.0 if current and voltage else _stated_torque(known, speed))
     clamped = _largest(tables, ("torque_shaft_nm",))
     recorded = {"impedance_ohm": voltage / current} if current and voltage else {}
     current, voltage = current or 1.0, voltage or 1.0
-    psi = _flux_scale(campaign.captures, pole_pairs) or voltage / (pole_pairs * speed)
+    psi = _flux_scale(campaign.captures, pole_pairs) or made or voltage / (pole_pairs * speed)
     if not turned and (amperes := _largest(campaign.of("torque_table"), ("iq_a",))):
         # the voltage of a winding that no test turned is that of its resistance
         psi = clamped / (1.5 * pole_pairs * amperes)

@@ -31,7 +31,7 @@ from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.selection.discrimination import discriminate
 from pipeline.criticism.selection.improvement import clears, fall_below_floor, power_share
 from pipeline.criticism.selection.score_test import Score
-from pipeline.criticism.selection.sizes import material, shaped, size_of
+from pipeline.criticism.selection.sizes import driving_friction, material, shaped, size_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +108,21 @@ def matters(
     effect
         The effect; the newest where not given.
 
+    Returns
+    -------
+    bool
+        False for an effect that is no torque and makes viscous friction drive the shaft.
+
+    Notes
+    -----
+    A speed that gives way under load follows the torque as the torque's sensor may follow the
+    current: a lag in place of the inertia explains the same where friction is free to drive.
+
     """
     fit = system.fit
     effect = effect or fit.model.effects[-1]
+    if effect.hook != "torque" and driving_friction(system) and not driving_friction(before):
+        return False
     return material(fit, effect) or _takes_most(system, before, significant, effect)
 
 

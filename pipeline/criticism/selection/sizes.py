@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from pipeline.criticism.effect import Effect
@@ -9,6 +10,7 @@ from pipeline.criticism.library.friction_parts import drives
 from pipeline.criticism.parameter import Parameter
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.regression.linear_system import LinearSystem
 
 
 def material(fit: Fit, effect: Effect) -> bool:
@@ -53,6 +55,24 @@ def shaped(fit: Fit, effect: Effect) -> bool:
         if not p.amplitude
     )
     return over and not drives(effect, fit.model, fit.values) and not _beyond(fit, effect)
+
+
+def driving_friction(system: LinearSystem) -> float:
+    """The viscous friction of a fit [N·m·s/rad] where it certainly drives the shaft; else zero.
+
+    Parameters
+    ----------
+    system
+        Around the fit.
+
+    """
+    value = system.fit.values["b_nm_s_rad"]
+    names = [system.columns[place].name for place in system.model_columns.tolist()]
+    if value >= 0.0 or "b_nm_s_rad" not in names:
+        return 0.0
+    place = names.index("b_nm_s_rad")
+    u = math.sqrt(float(system.covariance(system.model_columns)[place, place]))
+    return value if value < -system.policy.selection.least_u * u else 0.0
 
 
 def _beyond(fit: Fit, effect: Effect) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,7 +13,7 @@ from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import remainder, significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.noise_floors import form_tolerance
-from pipeline.criticism.selection.sizes import is_rare
+from pipeline.criticism.selection.sizes import driving_friction, is_rare
 from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.records.diagnosis import Remainder
 
@@ -125,14 +124,8 @@ def _driving_friction(step: LadderStep) -> float:
     shaft; else zero. A drag of a wrong form leaves its difference from the true one to it; a wave
     of the angle leaves it none.
     """
-    system, value = step.system, step.fit.values["b_nm_s_rad"]
     drags = [e for e in step.fit.model.effects if e.name in step.added and _is_drag(e, step.fit)]
-    if value >= 0.0 or not drags:
-        return 0.0
-    names = [system.columns[place].name for place in system.model_columns.tolist()]
-    place = names.index("b_nm_s_rad")
-    u = math.sqrt(float(system.covariance(system.model_columns)[place, place]))
-    return value if value < -system.policy.selection.least_u * u else 0.0
+    return driving_friction(step.system) if drags else 0.0
 
 
 def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:

@@ -180,3 +180,19 @@ def test_what_captures_leave_free_is_no_name() -> None:
     found = with_drawn.campaign(WorldCase("drawn", "links", 166, {}))
     diagnosis = diagnose(Recordings({found.motor_id: found}))[found.motor_id]
     assert (diagnosis.verdict, diagnosis.missing) == ("insufficient", ())
+
+
+@pytest.mark.parametrize(
+    ("group", "seed"),
+    [
+        # no voltage but that of a resistance test: the flux began 200 times too low
+        ("columns", 303),
+        # a speed that gives way: a lag of the torque's sensor stood in place of the inertia
+        ("whole", 385),
+    ],
+)
+def test_nothing_is_missing_of_a_sound_motor(group: str, seed: int) -> None:
+    found = with_drawn.campaign(WorldCase("drawn", group, seed, {}))
+    diagnosis = diagnose(Recordings({found.motor_id: found}))[found.motor_id]
+    assert (diagnosis.verdict, diagnosis.missing) == ("insufficient", ())
+    assert diagnosis.ladder[-1].held_out < 1.1
