@@ -120,7 +120,7 @@ def largest_order(turns: Sequence[Turn], ceiling: int) -> int:
 
 
 def even_positions(turns: Sequence[Turn]) -> int | None:
-    """How many evenly spaced positions every turn was sampled at.
+    r"""How many evenly spaced positions every turn was sampled at.
 
     Parameters
     ----------
@@ -135,20 +135,31 @@ def even_positions(turns: Sequence[Turn]) -> int | None:
     Notes
     -----
     On n even positions the orders k, n − k, n + k, ... are the same numbers and cannot be
-    separated.
+    separated. n is the lowest order of the angles themselves: \|mean of exp(j n θ)\| is 1 on even
+    positions, 2/π where an encoder rounds them to half of their spacing (the mean resultant length
+    of directional statistics), and that of chance where they are uneven. Positions that are
+    missing, or visited often, leave it.
+
+    References
+    ----------
+    Mardia and Jupp, Directional Statistics, Wiley, 2000, 2.3.
 
     """
     counts = set()
     for turn in turns:
-        angle = np.unique(np.mod(turn.theta_rad, TURN_RAD))
-        gaps = np.diff(np.append(angle, angle[0] + TURN_RAD))
-        step = float(np.median(gaps[gaps > 0.3 * float(np.max(gaps))]))
-        regular = np.abs(gaps - step) < 0.05 * step
-        if np.count_nonzero(regular) < 0.95 * TURN_RAD / step:
+        places = np.mod(turn.theta_rad, TURN_RAD) * (PLACES / TURN_RAD)
+        held = np.bincount(places.astype(np.int64) % PLACES, minlength=PLACES)
+        length = np.abs(np.fft.rfft(held)) / turn.theta_rad.size
+        even = np.flatnonzero(length[1:] >= 2.0 / np.pi)
+        if even.size == 0:
             return None
-        counts.add(round(TURN_RAD / step))
+        counts.add(int(even[0]) + 1)
     return counts.pop() if len(counts) == 1 else None
 
+
+PLACES = 2**15
+"""Places a turn at which angles are told apart: sixteen an order of the highest that is asked
+for."""
 
 ComplexArray = NDArray[np.complex128]
 

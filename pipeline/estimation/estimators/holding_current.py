@@ -293,11 +293,16 @@ def _cogging(waves: _Waves, known: Constants, campaign: Campaign) -> tuple[Estim
         return (order, amps_of, *(METHOD.missing(n, why) for n in TORQUES))
     peak, u_peak = half_peak_to_peak(lines)
     sizes = {TORQUES[0]: (lines[0].amplitude, lines[0].u), TORQUES[1]: (peak, u_peak)}
+    if alias:
+        del sizes[TORQUES[1]]
     torques, notes = [], (note, unstated_note(captures, ("current",)))
     for name, (amps, u) in sizes.items():
         read = (METHOD.scatter(name, u, lines[0].dof), *_gains(captures, amps))
         parts = propagate([(amps, kt.budget), (kt.number, read)])
         torques.append(METHOD.measured(name, amps * kt.number, parts, captures, notes=notes))
+    if alias:
+        why = f"{waves.positions} positions do not show the wave between them; {EXPERIMENT}"
+        torques.append(METHOD.missing(TORQUES[1], why))
     return (order, amps_of, *torques)
 
 

@@ -308,16 +308,29 @@ def test_the_largest_order_has_more_than_two_positions_a_cycle(positions: int, o
     assert largest_order([], 20) == 0
 
 
-def test_even_positions_may_miss_a_few_and_jitter_a_little() -> None:
-    """Nineteen of twenty gaps within a twentieth of the step; every turn the same number."""
+@pytest.mark.parametrize("bits", [11, 12, 14])
+def test_even_positions_read_by_an_encoder_of_few_bits(bits: int) -> None:
+    """Gaps of 360 positions are eleven or twelve steps of twelve bits, and noise splits them."""
+    rng = np.random.default_rng(bits)
+    step = 2.0 * np.pi / 2**bits
+    theta = np.repeat(np.arange(360) * (2.0 * np.pi / 360), 4)
+    read = step * np.round((theta + 1e-4 * rng.standard_normal(theta.size)) / step)
+    lost = np.r_[100:140, 700:748]
+    for angle in (read, np.delete(read, lost)):
+        assert even_positions([Turn(angle, np.ones(angle.size), 1)]) == 360
+
+
+def test_even_positions_may_miss_some_and_scatter_a_little() -> None:
+    """Up to a sixth of their spacing, as an encoder's steps of half of it do; every turn has the
+    same number.
+    """
+    rng = np.random.default_rng(0)
     theta = np.arange(400) * (2.0 * np.pi / 400)
-    step = theta[1]
     made = lambda angle: Turn(angle, np.ones(angle.size), 1)  # noqa: E731
-    assert even_positions([made(np.delete(theta, [7, 90, 91, 200]))]) == 400
-    assert even_positions([made(np.delete(theta, np.arange(0, 60, 2)))]) is None
-    wiggle = np.where(np.arange(400) % 2, 1.0, 0.0)
-    assert even_positions([made(theta + 0.045 * step * wiggle)]) == 400
-    assert even_positions([made(theta + 0.06 * step * wiggle)]) is None
+    assert even_positions([made(np.delete(theta, np.arange(0, 60, 2)))]) == 400
+    scatter = theta[1] * rng.standard_normal(400)
+    assert even_positions([made(theta + 0.12 * scatter)]) == 400
+    assert even_positions([made(theta + 0.18 * scatter)]) is None
     third = np.arange(300) * (2.0 * np.pi / 300)
     assert even_positions([made(theta), made(third)]) is None
     assert even_positions([made(theta + 40.0), made(theta)]) == 400
