@@ -11,12 +11,43 @@ Reference: Widrow and Kollar, Quantization Noise, Cambridge University Press, 20
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.records.capture import Array
 
 _K = np.arange(1.0, 65.0)
+_LATTICE = 8
+"""Distinct values from which on their common step is a converter's: a few are what was set."""
+_MOST_DIGITS = 5
+"""Digits beyond which a number's rounding is below any instrument's error."""
+_EXACT = 1e-6
+"""Share of a step, or of a value, that is rounding of floating-point numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rounding:
+    """What rounding leaves in the mean of one level.
+
+    Attributes
+    ----------
+    u
+        Its standard uncertainty [unit of the readings], with the sign of the level: a converter
+        rounds both senses alike.
+    cell
+        The level in whole steps, without its sign. Levels of one cell, read in one way, have one
+        error.
+
+    """
+
+    u: float
+    cell: int
+
+
+EXACT = Rounding(0.0, 0)
+"""A mean that no rounding shows in."""
 
 
 def resolution(signal: Array) -> float:
@@ -83,6 +114,149 @@ def rounding_rms(step: float, sigma: float) -> float:
         return 0.0
     terms = np.exp(-((2.0 * math.pi * _K * sigma / step) ** 2)) / _K**2
     return step * math.sqrt(float(terms.sum()) / 2.0) / math.pi
+
+
+def steps_of(column: Array) -> Array:
+    """The step to which each value of a column is rounded: a converter's, or a file's digits.
+
+    Parameters
+    ----------
+    column
+        Readings [n, any unit].
+
+    Returns
+    -------
+    array [n]
+        [same unit]; 0 where no rounding shows.
+
+    Notes
+    -----
+    All values are multiples of one step, or of the last of five digits at most. A file that keeps a
+    number of digits has a step a decade, one that keeps decimals the step of its largest values.
+
+    Examples
+    --------
+    >>> steps_of(np.array([0.122, 0.0447, -0.109])).round(6).tolist()
+    [0.001, 0.0001, 0.001]
+
+    """
+    values = np.abs(column)
+    there = np.isfinite(values) & (values > 0.0)
+    if not there.any():
+        return np.zeros(column.size)
+    distinct, step = np.unique(values[there]), resolution(column)
+    several = np.unique(column[np.isfinite(column)]).size >= _LATTICE
+    if not (several and step > 0.0 and _multiples(distinct, step)):
+        step = 0.0
+    # a converter's step beside the last digit, which is never coarser at small values
+    return np.maximum(step, _digit_steps(np.where(there, values, distinct[-1]), distinct))
+
+
+def _digit_steps(values: Array, distinct: Array) -> Array:
+    """The last digit that each of positive values [n] keeps; 0 where they keep more than five."""
+    decades, of_distinct = (np.floor(np.log10(one) + 1e-9) for one in (values, distinct))
+    for digits in range(1, _MOST_DIGITS + 1):
+        if _multiples(distinct, 10.0 ** (of_distinct - digits + 1.0)):
+            coarsest = 10.0 ** (of_distinct[-1] - digits + 1.0)
+            if _multiples(distinct, coarsest):
+                return np.full(values.size, coarsest)
+            steps: Array = 10.0 ** (decades - digits + 1.0)
+            return steps
+    return np.zeros(values.size)
+
+
+def _multiples(values: Array, step: Array | float) -> bool:
+    """Whether all values [n] are whole steps [n, or one for all]."""
+    counts = values / step
+    return bool(np.all(np.abs(counts - np.round(counts)) <= _EXACT * np.maximum(counts, 1.0)))
+
+
+@dataclass(frozen=True, slots=True)
+class RoundedColumn:
+    """A column with what it is rounded to.
+
+    Attributes
+    ----------
+    readings
+        [n, any unit].
+    steps
+        What each is rounded to [n, same unit]; 0 where no rounding shows.
+    noise
+        Scatter from reading to reading, over all levels together [same unit].
+
+    """
+
+    readings: Array
+    steps: Array
+    noise: float
+
+    def error_of_mean(self, rows: slice) -> Rounding:
+        """What rounding leaves in the mean of rows of one level.
+
+        Parameters
+        ----------
+        rows
+            Of the column.
+
+        Returns
+        -------
+        Rounding
+            Of no error where no rounding shows, or noise hides it.
+
+        Notes
+        -----
+        The noise is that of all levels, or its own where that is less: one near a threshold
+        scatters by half a step where another of the same noise stands still.
+
+        """
+        level, step = self.readings[rows], float(np.max(self.steps[rows], initial=0.0))
+        known = level[np.isfinite(level)]
+        if step <= 0.0 or known.size == 0:
+            return EXACT
+        mean = float(np.mean(known))
+        noise = min(self.noise, noise_after_rounding(level, step))
+        left = rounding_rms(step, noise_before_rounding(noise, step))
+        return Rounding(math.copysign(left, mean), round(abs(mean) / step))
+
+
+def rounded_column(column: Array, levels: Sequence[slice]) -> RoundedColumn:
+    """A column with its steps, and its noise at some levels.
+
+    Parameters
+    ----------
+    column
+        Readings [n, any unit] in their order.
+    levels
+        Rows of each level that it stays at: what moves between them is no noise.
+
+    """
+    steps = steps_of(column)
+    usual = float(np.median(steps)) if steps.size else 0.0
+    scatter = np.array([noise_after_rounding(column[rows], usual) for rows in levels])
+    sizes = np.array([rows.stop - rows.start for rows in levels], dtype=np.float64)
+    noise = math.sqrt(float(sizes @ scatter**2) / max(float(sizes.sum()), 1.0))
+    return RoundedColumn(column, steps, noise)
+
+
+def covariance_alike(errors: Array, cells: Sequence[Hashable]) -> Array:
+    """Covariance of errors of which those of one cell are one error.
+
+    Parameters
+    ----------
+    errors
+        Standard uncertainties [n, any unit], with the sign of what they act on.
+    cells
+        Of each.
+
+    Returns
+    -------
+    array [n, n]
+        [unit²].
+
+    """
+    alike = np.array([[one == other for other in cells] for one in cells])
+    covariance: Array = alike * np.outer(errors, errors)
+    return covariance
 
 
 def noise_after_rounding(signal: Array, step: float) -> float:

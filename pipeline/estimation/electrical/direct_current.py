@@ -27,9 +27,12 @@ from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import Plateau, find_plateaus
 from pipeline.numerics.quantisation import (
+    EXACT,
+    Rounding,
     noise_after_rounding,
     noise_before_rounding,
     resolution,
+    rounded_column,
     rounding_rms,
 )
 from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
@@ -58,7 +61,9 @@ class Point:
     temp_degc
         Mean winding temperature.
     u_v, u_i
-        Standard errors of the means, correlation included [V, A].
+        Standard errors of the means by noise, correlation included [V, A].
+    rounded_v, rounded_i
+        What rounding leaves in the means [V, A].
     meta
         Metadata of the capture.
     temp_logged
@@ -82,6 +87,8 @@ class Point:
     temp_logged: bool = True
     u_temp_k: float = 0.0
     warming: float = 0.0
+    rounded_v: Rounding = EXACT
+    rounded_i: Rounding = EXACT
 
     @property
     def temperature_source(self) -> str:
@@ -201,6 +208,8 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> Ite
         readings = capture.arrays(column)[column]
         temps = bridged(columns["t_s"], columns[column])
     settled = _settled(capture, columns["i_a"])
+    levels = [plateau.rows for plateau in settled]
+    volts, amperes = (rounded_column(columns[name], levels) for name in ("v_v", "i_a"))
     warmed = 0.0 if logged or capture.meta.test == STEP else warming(columns, settled)
     for plateau in settled:
         v, i = columns["v_v"][plateau.rows], columns["i_a"][plateau.rows]
@@ -212,7 +221,9 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> Ite
         means = (float(v.mean()) - rising, float(i.mean()))
         errors = (math.hypot(errors[0], rising / math.sqrt(3.0)), errors[1])
         u_temp_k = _error_of_temperature(readings, plateau.size / temps.size) if logged else 0.0
-        yield Point(index, pair, *means, temp, *errors, capture.meta, logged, u_temp_k, warmed)
+        left_v, left_a = (one.error_of_mean(plateau.rows) for one in (volts, amperes))
+        made = Point(index, pair, *means, temp, *errors, capture.meta, logged, u_temp_k, warmed)
+        yield replace(made, rounded_v=left_v, rounded_i=left_a)
 
 
 def _captures(campaign: Campaign) -> tuple[Capture, ...]:

@@ -11,6 +11,7 @@ from pipeline.estimation.electrical.operating_points import Point
 from pipeline.estimation.electrical.sample_hold import hold_s
 from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import linear_fit
+from pipeline.numerics.quantisation import covariance_alike
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +27,11 @@ class Flux:
     psi_d_wb, psi_q_wb
         Flux linkages [Wb].
     u_d_wb, u_q_wb
-        Their standard uncertainties from scatter [Wb].
+        Their standard uncertainties from scatter and rounding [Wb].
     temp_magnet_degc
         Mean temperature of the magnets.
+    u_id_a, u_iq_a
+        What rounding leaves in the currents [A], as standard uncertainties.
 
     """
 
@@ -40,6 +43,8 @@ class Flux:
     u_d_wb: float
     u_q_wb: float
     temp_magnet_degc: float
+    u_id_a: float = 0.0
+    u_iq_a: float = 0.0
 
 
 def frame_of(points: Sequence[Point], pole_pairs: int) -> tuple[float, float]:
@@ -137,16 +142,20 @@ def flux_pairs(points: Sequence[Point], pole_pairs: int) -> list[Flux]:
                 _root_sum(
                     share * plus.u_vq_v,
                     share * minus.u_vq_v,
+                    _left(plus, minus, "vq_v", 1.0),
                     wobble * (abs(half.real) + abs(gap.real)) / np.sqrt(2.0),
                 )
                 / abs(omega),
                 _root_sum(
                     share * plus.u_vd_v,
                     share * minus.u_vd_v,
+                    _left(plus, minus, "vd_v", -1.0),
                     wobble * (abs(half.imag) + abs(gap.imag)) / np.sqrt(2.0),
                 )
                 / abs(omega),
                 0.5 * (plus.temp_magnet_degc + minus.temp_magnet_degc),
+                _left(plus, minus, "id_a", 1.0),
+                _left(plus, minus, "iq_a", -1.0),
             )
         )
     return fluxes
@@ -165,6 +174,15 @@ def _less_drop(voltage: complex, current: complex, axis: complex, least_a: float
         return voltage
     drop = (voltage / axis).real * aside / along
     return voltage - 1j * axis * drop
+
+
+def _left(plus: Point, minus: Point, name: str, sign: float) -> float:
+    """What rounding leaves in half the sum of a pair's means, or in half their difference."""
+    if name not in plus.rounded or name not in minus.rounded:
+        return 0.0
+    one, other = plus.rounded[name], minus.rounded[name]
+    errors = 0.5 * np.array([one.u, sign * other.u])
+    return float(np.sqrt(covariance_alike(errors, [one.cell, other.cell]).sum()))
 
 
 def _root_sum(*parts: float) -> float:

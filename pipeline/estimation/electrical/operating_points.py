@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,10 +16,12 @@ from pipeline.estimation.uncertainty.instruments import current_source, torque_s
 from pipeline.estimation.uncertainty.instruments import voltage_source as source_of_voltage
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import find_plateaus, white_noise_sigma
+from pipeline.numerics.quantisation import RoundedColumn, Rounding, rounded_column
 from pipeline.records.capture import Array, Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 
+ROUNDED = ("vd_v", "vq_v", "id_a", "iq_a")
 MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
 TURN_RAD = 2.0 * np.pi
 SPEED = "omega_mech_rad_s"
@@ -41,7 +43,7 @@ class Point:
     id_a, iq_a, vd_v, vq_v, torque_nm
         Means in the frame of the drive [A, V, N·m].
     u_vd_v, u_vq_v
-        Standard errors of the means, correlation included.
+        Standard errors of the means by noise, correlation included.
     temp_magnet_degc
         Mean, or assumed.
     cos_turn, sin_turn
@@ -55,6 +57,9 @@ class Point:
     ripple_nm, u_ripple_nm
         Torque that harmonics of the currents make beside their means (`ripple_torque`), and its
         standard uncertainty; 0 where it is not known.
+    rounded
+        What rounding leaves in the means of voltages and currents, by column; none where it is
+        empty.
 
     """
 
@@ -76,6 +81,7 @@ class Point:
     alpha_mech_rad_s2: float = 0.0
     ripple_nm: float = 0.0
     u_ripple_nm: float = 0.0
+    rounded: Mapping[str, Rounding] = field(default_factory=dict, repr=False)
 
     @property
     def torque_of_means_nm(self) -> float:
@@ -201,9 +207,11 @@ def operating_points(
         total += n
         if n < policy().evidence.rows:
             continue
-        for rows in _stretches(columns):
+        stretches = _stretches(columns)
+        readings = {name: rounded_column(columns[name], stretches) for name in ROUNDED}
+        for rows in stretches:
             whole = _whole_cycles(rows, columns, pole_pairs)
-            point = _point(capture, columns, whole)
+            point = _point(capture, columns, whole, readings)
             ripple, u = (
                 (0.0, 0.0) if point.standing else ripple_of(capture, columns, whole, winding)
             )
@@ -340,7 +348,27 @@ def _columns(capture: Capture) -> dict[str, Array]:
         columns["id_a"] = np.zeros(blank.size)
     columns["temp_magnet_degc"] = bridged(columns["t_s"], columns["temp_magnet_degc"])
     ok = np.isfinite(columns["iq_a"]) & np.isfinite(columns["id_a"])
-    return {name: column[ok] for name, column in columns.items()}
+    return _without_gaps({name: column[ok] for name, column in columns.items()})
+
+
+def _without_gaps(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Columns with straight lines across gaps that are shorter than any settled stretch, without
+    the rows before and after that such a gap leaves open.
+    """
+    t_s, longest = columns["t_s"], policy().evidence.rows
+    filled, begin, end = {}, 0, t_s.size
+    for name, column in columns.items():
+        filled[name] = column
+        edges = np.flatnonzero(np.diff(np.isfinite(column), prepend=True, append=True))
+        short = [(a, b) for a, b in edges.reshape(-1, 2) if b - a < longest]
+        if not short:
+            continue
+        rows = np.concatenate([np.arange(a, b) for a, b in short])
+        filled[name] = column.copy()
+        filled[name][rows] = bridged(t_s, column)[rows]
+        begin = max([begin, *(b for a, b in short if a == 0)])
+        end = min([end, *(a for a, b in short if b == t_s.size)])
+    return {name: column[begin:end] for name, column in filled.items()}
 
 
 def _stretches(data: Mapping[str, Array]) -> list[slice]:
@@ -417,7 +445,10 @@ def _whole_cycles(rows: slice, data: Mapping[str, Array], pole_pairs: int | None
     return rows
 
 
-def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
+def _point(
+    capture: Capture, data: Mapping[str, Array], rows: slice, readings: Mapping[str, RoundedColumn]
+) -> Point:
+    """The means over some rows, of which those of some `readings` are rounded."""
     t, theta = data["t_s"][rows], data["theta_mech_rad"][rows]
     cos_turn = sin_turn = 0.0
     has_angle = bool(np.all(np.isfinite(theta)))
@@ -435,6 +466,7 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
         omega = 0.0
     means = {name: float(np.mean(data[name][rows])) for name in MEANS}
     u = {name: _error_of_mean(data[name][rows]) for name in ("vd_v", "vq_v")}
+    rounded = {name: one.error_of_mean(rows) for name, one in readings.items()}
     if not np.isfinite(means["temp_magnet_degc"]):
         means["temp_magnet_degc"] = assumed_temperature(capture)
     return Point(
@@ -454,6 +486,7 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
         period_s=float(np.median(np.diff(t))),
         capture=capture,
         alpha_mech_rad_s2=alpha,
+        rounded=rounded,
     )
 
 

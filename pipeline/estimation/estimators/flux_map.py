@@ -29,6 +29,7 @@ from pipeline.estimation.uncertainty.instruments import (
     unstated_note,
 )
 from pipeline.numerics.least_squares import LinearFit, linear_fit
+from pipeline.numerics.quantisation import covariance_alike, resolution, steps_of
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.capture import Array, Campaign, Capture, Flags, Indices
 from pipeline.records.constants import Constants
@@ -134,7 +135,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 class _Rows:
     """Rows [n] of all tables that show the flux linkage of one axis.
 
-    `signal` is `factor` times the flux linkage, and an offset a `level` where that is not negative.
+    `signal` is `factor` times the flux linkage, and an offset a `level` where that is not negative;
+    `rounded` and `rounded_a` are what its readings and those of its axis's current are rounded to.
     """
 
     axis: str
@@ -146,6 +148,8 @@ class _Rows:
     factor: Array
     level: Indices
     excess_k: Array
+    rounded: Array
+    rounded_a: Array
 
     @property
     def reach(self) -> Array:
@@ -156,7 +160,8 @@ class _Rows:
     def at(self, rows: Flags) -> _Rows:
         """Some of the rows."""
         names = ("table", "id_a", "iq_a", "signal", "factor", "level", "excess_k")
-        return replace(self, **{name: getattr(self, name)[rows] for name in names})
+        kept = (*names, "rounded", "rounded_a")
+        return replace(self, **{name: getattr(self, name)[rows] for name in kept})
 
     def design(self, alpha_1_k: float) -> Array:
         """The derivatives [n, k] of the signal, those by offsets of levels last."""
@@ -169,8 +174,16 @@ class _Rows:
         )
 
     def solved(self, alpha_1_k: float) -> LinearFit:
-        """Least squares over these rows."""
-        return linear_fit(self.design(alpha_1_k), self.signal)
+        """Least squares over these rows; what their readings are rounded to adds to its scatter."""
+        design = self.design(alpha_1_k)
+        found = linear_fit(design, self.signal)
+        across = self.id_a if self.axis == "d" else self.iq_a
+        slope = self.factor * found.coefficients[1]
+        left = _rounded(self.signal, self.rounded) + np.outer(slope, slope) * _rounded(
+            across, self.rounded_a
+        )
+        inverse = np.linalg.pinv(design)
+        return replace(found, covariance=found.covariance + inverse @ left @ inverse.T)
 
     def shifted(self, shift: Shift) -> _Rows:
         """The rows as they were if instruments are off."""
@@ -206,7 +219,7 @@ def _joined(axis: str, captures: Sequence[Capture], tables: Sequence[dict[str, A
     for one in tables:
         levels.append(np.where(one["level"] < 0, -1, one["level"] + first).astype(np.int64))
         first += int(one["level"].max(initial=-1)) + 1
-    names = ("id_a", "iq_a", "signal", "factor", "excess_k")
+    names = ("id_a", "iq_a", "signal", "factor", "excess_k", "rounded", "rounded_a")
     table = np.repeat(np.arange(len(tables)), [one["id_a"].size for one in tables])
     columns = {name: np.concatenate([one[name] for one in tables]) for name in names}
     return _Rows(axis, tuple(captures), table, level=np.concatenate(levels), **columns)
@@ -216,21 +229,43 @@ def _flux_table(capture: Capture, linkage: str) -> dict[str, Array]:
     columns = _columns(capture, "id_a", "iq_a", linkage)
     size = columns["id_a"].size
     signal = columns.pop(linkage)
-    return columns | {"signal": signal, "factor": np.ones(size), "level": np.full(size, -1.0)}
+    across = columns["id_a" if linkage == LINKAGES["d"] else "iq_a"]
+    read = {"signal": signal, "rounded": steps_of(signal), "rounded_a": _steps_a(across)}
+    return columns | read | {"factor": np.ones(size), "level": np.full(size, -1.0)}
 
 
 def _speed_table(capture: Capture, pole_pairs: int) -> dict[str, Array]:
     """The drop of the q current is taken off in the file, and with it what that current does."""
     columns = _columns(capture, "id_a", "omega_mech_rad_s", "vq_v")
+    signal = columns.pop("vq_v")
     id_a, omega = columns["id_a"], columns.pop("omega_mech_rad_s")
     order, level = np.argsort(id_a), np.empty(id_a.size)
     level[order] = np.cumsum(np.diff(id_a[order], prepend=id_a[order[:1]]) > SAME * np.ptp(id_a))
     return columns | {
         "iq_a": np.zeros(id_a.size),
-        "signal": columns.pop("vq_v"),
+        "signal": signal,
+        "rounded": steps_of(signal),
+        "rounded_a": _steps_a(id_a),
         "factor": pole_pairs * omega,
         "level": level,
     }
+
+
+def _steps_a(current_a: Array) -> Array:
+    """What readings of a current are rounded to [n]; 0 of levels that were set, which have no
+    scatter.
+    """
+    if resolution(current_a) > SAME * float(np.ptp(current_a)):
+        return np.zeros(current_a.size)
+    return steps_of(current_a)
+
+
+def _rounded(values: Array, steps: Array) -> Array:
+    """Covariance [n, n] of what rounding leaves in readings: one error in all of one step."""
+    cells = np.round(np.abs(values) / np.where(steps > 0.0, steps, 1.0))
+    return covariance_alike(
+        np.sign(values) * steps / math.sqrt(12.0), [*zip(cells, steps, strict=True)]
+    )
 
 
 def _columns(capture: Capture, *names: str) -> dict[str, Array]:

@@ -184,9 +184,8 @@ def _quadrature(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     weights = np.array([1.0 / max(f.u_q_wb, 1e-150) ** 2 for f in used])
     weights /= weights.sum()
     value = float(sum(w * f.psi_q_wb / f.iq_a for w, f in zip(weights, used, strict=True)))
-    u = float(
-        np.sqrt(sum((w * f.u_q_wb / f.iq_a) ** 2 for w, f in zip(weights, used, strict=True)))
-    )
+    noise = [np.hypot(f.u_q_wb, value * f.u_iq_a) / f.iq_a for f in used]
+    u = float(np.linalg.norm(weights * noise))
     return Result(value, u, used[0].id_a, rated)
 
 
@@ -228,9 +227,10 @@ def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
         share = float(weight) / (f.id_a - zero.id_a)
         levers[id(f)] = levers.get(id(f), 0.0) + share
         levers[id(zero)] = levers.get(id(zero), 0.0) - share
-    noise = {id(f): f.u_d_wb for pair in used for f in pair}
+    value = float(weights @ values)
+    noise = {id(f): np.hypot(f.u_d_wb, value * f.u_id_a) for pair in used for f in pair}
     u = float(np.sqrt(sum((share * noise[k]) ** 2 for k, share in levers.items())))
-    return Result(float(weights @ values), u, used[0][0].id_a, smallest)
+    return Result(value, u, used[0][0].id_a, smallest)
 
 
 def _other_side(fluxes: Sequence[Flux], magnet: float, result: Result) -> str:
@@ -273,7 +273,7 @@ def _evidence(
     if not fluxes:
         return ()
     tolerance = policy().flux_pairs.same_current
-    reach = max(max(abs(f.id_a), f.iq_a) for f in fluxes)
+    reach = max(max(abs(f.id_a), f.iq_a, 1e-300) for f in fluxes)
     plots = []
     for axis, current, flux, result in (
         ("q", "iq_a", "psi_q_wb", quadrature),

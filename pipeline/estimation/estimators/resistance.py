@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
 
 from pipeline.estimation.electrical.direct_current import (
     POINT_OPTIONS,
@@ -25,10 +26,12 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import (
     Shift,
     contributions,
+    current_source,
     unstated_note,
     voltage_source,
 )
 from pipeline.numerics.least_squares import linear_fit
+from pipeline.numerics.quantisation import covariance_alike
 from pipeline.physics.copper import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import Term
 from pipeline.physics.windings import phase_from_line, phase_resistances_ohm
@@ -175,9 +178,10 @@ def fit_direct_current(
     Notes
     -----
     Weights from all standard errors, u² = u_V² + (R u_I)² + (α V u_T)² (York 1966, for errors
-    small against the span). The covariance holds the scatter alone, widened where the points
-    scatter more than their own noise explains (Birge 1932); the prior's share is for the caller to
-    add.
+    small against the span), and from what rounding leaves in the means, which is one error in all
+    plateaus of one step of a converter (GUM F.2.2.1). The covariance holds these and the scatter
+    alone, widened where the points scatter more than that explains (Birge 1932); the prior's share
+    is for the caller to add.
 
     References
     ----------
@@ -189,19 +193,19 @@ def fit_direct_current(
     alpha = prior
     width = columns.size + 1
     v = np.array([p.v_v for p in points])
-    sigma = np.array([_noise_v(p, prior) for p in points])
+    root = cholesky(_covariance_v2(points, prior), lower=True)
+    slack = np.append(np.ones(v.size), 0.5 * max(u_alpha_rel, 1e-9))
     for _ in range(4):
         design = np.array([terminal_voltage(p, columns, alpha) for p in points])
-        rows = np.vstack([design, np.eye(1, width, width - 1)])
-        known = np.append(v, 0.5 * (prior - alpha) / COPPER_COEFFICIENT_25_1_K)
-        slack = np.append(sigma, 0.5 * max(u_alpha_rel, 1e-9))
-        fit = linear_fit(rows, known, slack)
+        rows = np.vstack([_whitened(root, design), np.eye(1, width, width - 1)])
+        prior_row = 0.5 * (prior - alpha) / COPPER_COEFFICIENT_25_1_K
+        fit = linear_fit(rows, np.append(_whitened(root, v), prior_row), slack)
         alpha += 2.0 * float(fit.coefficients[-1]) * COPPER_COEFFICIENT_25_1_K
     last = fit.covariance[:, -1]
     scatter = fit.covariance - np.outer(last, last) / slack[-1] ** 2
-    residuals = fit.residuals[:-1]
+    whitened = fit.residuals[:-1]
     dof = len(points) - fit.rank + (1 if math.isfinite(u_alpha_rel) else 0)
-    factor = _birge(residuals / sigma, dof)
+    factor = _birge(whitened, dof)
     scatter = scatter * factor
     u_alpha = 2.0 * COPPER_COEFFICIENT_25_1_K * math.sqrt(max(float(scatter[-1, -1]), 0.0))
     size = columns.size
@@ -210,10 +214,29 @@ def fit_direct_current(
         scatter[:size, :size],
         alpha,
         u_alpha,
-        residuals,
+        root @ whitened,
         fit.full_rank,
         float(dof) if factor > 1.0 else math.inf,
     )
+
+
+def _whitened(root: Array, values: Array) -> Array:
+    """Values [n] or rows [n, k] over the root [n, n] of their covariance."""
+    over: Array = solve_triangular(root, values, lower=True)
+    return over
+
+
+def _covariance_v2(points: Sequence[Point], alpha_1_k: float) -> Array:
+    """Covariance [n, n; V²] of the plateaus' voltages: noise of each, and what is rounded alike."""
+    covariance = np.diag([_noise_v(p, alpha_1_k) ** 2 for p in points])
+    for name, lever, source in (
+        ("rounded_v", np.ones(len(points)), voltage_source),
+        ("rounded_i", np.array([p.v_v / p.i_a for p in points]), current_source),
+    ):
+        left = [getattr(p, name) for p in points]
+        cells = [(source(p.meta), one.cell) for p, one in zip(points, left, strict=True)]
+        covariance += covariance_alike(lever * np.array([one.u for one in left]), cells)
+    return covariance
 
 
 def _noise_v(p: Point, alpha_1_k: float) -> float:

@@ -112,7 +112,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         table = table.beside(table_points(tables))
         captures += tables
     points = [
-        p for p in table.points if np.isfinite(p.torque_nm) and np.isfinite(p.temp_magnet_degc)
+        p
+        for p in table.points
+        if np.isfinite([p.torque_nm, p.omega_mech_rad_s, p.temp_magnet_degc]).all()
     ]
     turning = [p for p in points if not p.standing]
     if _enough(turning):

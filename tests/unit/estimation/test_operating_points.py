@@ -120,7 +120,7 @@ def test_a_points_means() -> None:
         2.0 * math.pi * 3.0, torque_shaft_nm=shaken, temp_magnet_degc=np.full(1000, 40.0)
     )
     data = made.arrays(*made.tables[0].columns) | {"id_a": np.zeros(1000)}
-    one = _point(made, data, slice(200, 1000))
+    one = _point(made, data, slice(200, 1000), {})
     assert one.omega_mech_rad_s == pytest.approx(6.0 * math.pi)
     assert (one.iq_a, one.id_a, one.vd_v, one.vq_v) == (3.0, 0.0, -1.0, 2.0)
     assert one.temp_magnet_degc == 40.0
@@ -220,8 +220,8 @@ def test_temperature_and_pole_pairs_where_nobody_measured_them() -> None:
     assert pole_pairs_of(Constants(), 5) == 5
     assert pole_pairs_of(Constants(), "5") is None
     bare = turning(10.0)
-    one = _point(bare, {**{n: np.full(1000, np.nan) for n in ("temp_magnet_degc", "id_a")},
-                        **bare.arrays(*bare.tables[0].columns)}, slice(0, 1000))  # fmt: skip
+    blank = {name: np.full(1000, np.nan) for name in ("temp_magnet_degc", "id_a")}
+    one = _point(bare, blank | bare.arrays(*bare.tables[0].columns), slice(0, 1000), {})
     assert one.temp_magnet_degc == 25.0
 
 

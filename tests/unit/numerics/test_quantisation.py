@@ -7,10 +7,14 @@ import pytest
 from scipy.stats import norm
 
 from pipeline.numerics.quantisation import (
+    EXACT,
+    covariance_alike,
     noise_after_rounding,
     noise_before_rounding,
     resolution,
+    rounded_column,
     rounding_rms,
+    steps_of,
 )
 
 STEP = 0.25
@@ -81,3 +85,83 @@ def test_much_noise_gains_a_twelfth_of_the_steps_square() -> None:
         expected = STEP * np.sqrt(share**2 - 1.0 / 12.0)
         assert noise_before_rounding(share * STEP, STEP) == pytest.approx(expected, rel=1e-12)
     assert noise_before_rounding(0.7, 0.0) == 0.7
+
+
+@pytest.mark.parametrize("kept", [2, 3, 5])
+def test_digits_of_a_file_are_a_step_a_decade(kept: int) -> None:
+    rng = np.random.default_rng(kept)
+    values = rng.uniform(0.02, 7.0, 400) * rng.choice([-1.0, 1.0], 400)
+    written = np.array([float(f"{x:.{kept}g}") for x in values])
+    decade = np.floor(np.log10(np.abs(written)))
+    steps = steps_of(np.append(written, [0.0, np.nan]))
+    assert steps[:400] == pytest.approx(10.0 ** (decade - kept + 1.0))
+    assert np.max(np.abs(written - values) / steps[:400]) <= 0.5 + 1e-6
+
+
+def test_decimals_and_converters_have_one_step_and_exact_numbers_none() -> None:
+    rng = np.random.default_rng(1)
+    values = rng.uniform(-30.0, 30.0, 200)
+    assert steps_of(np.round(values, 1)) == pytest.approx(np.full(200, 0.1))
+    of_ten_bits = 60.0 / 1024.0
+    assert steps_of(of_ten_bits * np.round(values / of_ten_bits)) == pytest.approx(
+        np.full(200, of_ten_bits)
+    )
+    assert not steps_of(values).any()
+    assert not steps_of(np.array([np.nan, 0.0])).any()
+    # three levels that were set have a least spacing, and no step
+    assert not steps_of(np.repeat([0.0, 1.2345678, 2.4691356], 9)).any()
+
+
+def test_what_rounding_leaves_has_the_sign_and_the_cell_of_its_level() -> None:
+    """Without noise q/√12, of both senses; half a step of noise hides it."""
+    rng = np.random.default_rng(2)
+    levels = np.repeat(np.arange(-7.0, 8.0) + 0.3, 200)
+    each = [slice(200 * k, 200 * (k + 1)) for k in range(15)]
+    still = rounded_column(STEP * np.round(levels), each)
+    assert still.error_of_mean(slice(0, 200)).u == pytest.approx(-STEP / np.sqrt(12.0), rel=0.03)
+    assert still.error_of_mean(slice(0, 200)).cell == 7
+    noise = 0.5 * rng.standard_normal(levels.size)
+    noisy = rounded_column(STEP * np.round(levels + noise), each)
+    assert abs(noisy.error_of_mean(slice(0, 200)).u) < 0.02 * STEP
+    assert rounded_column(levels + noise, each).error_of_mean(slice(0, 200)) == EXACT
+    assert rounded_column(np.full(9, np.nan), each[:1]).error_of_mean(slice(0, 9)) == EXACT
+
+
+def test_a_level_near_a_threshold_has_the_noise_of_the_others() -> None:
+    """It scatters by half a step at a fifth of a step of noise, and is as far off as any other. One
+    that stands still may be off by all that rounding leaves without noise.
+    """
+    rng = np.random.default_rng(3)
+    levels = np.repeat(np.arange(-20.0, 20.0) * 0.975 + 0.46, 200)
+    each = [slice(200 * k, 200 * (k + 1)) for k in range(40)]
+    read = STEP * np.round(levels + 0.18 * rng.standard_normal(levels.size))
+    column = rounded_column(read, each)
+    wanted = rounding_rms(STEP, 0.18 * STEP)
+    for rows in each:
+        found = column.error_of_mean(rows)
+        assert 0.7 * wanted < abs(found.u) <= STEP / np.sqrt(12.0)
+
+
+def test_errors_of_one_cell_are_one() -> None:
+    covariance = covariance_alike(np.array([2.0, -2.0, 3.0]), ["a", "a", "b"])
+    assert covariance.tolist() == [[4.0, -4.0, 0.0], [-4.0, 4.0, 0.0], [0.0, 0.0, 9.0]]
+
+
+def test_what_moves_between_levels_is_no_noise() -> None:
+    """Edges that ring for a tenth of the rows, beside levels that stand still."""
+    rings = 3.0 * np.sin(np.arange(20.0)) * 0.8 ** np.arange(20.0)
+    levels = [np.append(k + rings, np.full(180, k)) for k in np.arange(-7.0, 8.0) + 0.3]
+    column = STEP * np.round(np.concatenate(levels))
+    each = [slice(200 * k + 20, 200 * (k + 1)) for k in range(15)]
+    still = rounded_column(column, each).error_of_mean(each[0])
+    assert abs(still.u) == pytest.approx(STEP / np.sqrt(12.0), rel=0.03)
+
+
+def test_a_level_without_noise_beside_levels_with_it() -> None:
+    rng = np.random.default_rng(4)
+    levels = np.repeat(np.arange(-8.0, 8.0) * 0.95, 200)
+    noise = np.where(np.arange(levels.size) < 200, 0.0, 0.6) * rng.standard_normal(levels.size)
+    each = [slice(200 * k, 200 * (k + 1)) for k in range(16)]
+    column = rounded_column(STEP * np.round(levels + noise), each)
+    assert abs(column.error_of_mean(each[0]).u) == pytest.approx(STEP / np.sqrt(12.0), rel=0.03)
+    assert abs(column.error_of_mean(each[9]).u) < 0.02 * STEP
