@@ -14,7 +14,7 @@ from pipeline.criticism.machine.model import Model, Pieces, evaluate
 from pipeline.criticism.operating import Array, Operating, Recorded, Signals, Values
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.signals.shaft import net_torque
-from pipeline.criticism.signals.true_current import table_current, true_current
+from pipeline.criticism.signals.true_current import true_current
 from pipeline.criticism.signals.true_state import Motion, operating
 from pipeline.records.capture import Capture
 
@@ -125,8 +125,13 @@ def measured(segment: Segment, signals: Signals, model: Model, values: Values) -
     """
     pairs = model.machine.pole_pairs
     eps, omega = pairs * signals["theta_mech_rad"], pairs * _CRAWL * signals["sense"]
-    recorded = np.zeros(eps.size) + 1j * signals["iq_a"]
-    true = table_current(segment, recorded, eps, omega, model, values)
+    zero = values["zero_alpha_a"] + 1j * values["zero_beta_a"]
+    current = 1j * signals["iq_a"] - zero * np.exp(-1j * eps)
+    # of a drive: the sensors of its phases turn against the rotor that it holds
+    read = Recorded(
+        current, np.zeros(eps.size), eps, omega, segment.ts_s, True, segment.instrument.name
+    )
+    true = true_current(read, segment.instrument.ammeter, model, values)
     return (true.imag / _current_slope(segment, model, values))[None]
 
 
@@ -188,7 +193,7 @@ EQUATION = Equation(
     measured=measured,
     predicted=predicted,
     observes=Observes(
-        ("psi_wb",),
+        ("psi_wb", "zero_alpha_a", "zero_beta_a"),
         hooks=frozenset({"flux", "torque"}),
         sensors=frozenset({"current"}),
         form="affine",

@@ -10,11 +10,17 @@ import pytest
 
 import pipeline
 from pipeline.criticism.data.holding_cells import holding_cells
+from pipeline.criticism.equations.holding import measured
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.simulator.bench import campaign
+from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.design import EXACT, Bench
+from pipeline.simulator.effects import parameters
 from pipeline.simulator.truth import truth
 from tests.simulated import campaign_of, design
+from tests.unit.criticism.machines import BASE, machine
+from tests.unit.criticism.test_zero_effects import segment_of
 
 
 def test_holding_currents_alone_name_the_cogging_with_its_size() -> None:
@@ -78,3 +84,30 @@ def test_a_current_that_a_bus_holds_is_read_at_the_angles_of_its_own_rows():
     assert every is not None
     assert np.array_equal(cells.iq_a, every.iq_a)
     assert cells.noise_a == every.noise_a
+
+
+def test_a_shunt_that_is_off_zero_is_no_cogging():
+    """It turns against the rotor that the drive holds: a wave of the pole pairs in the q current,
+    which was a `cogging` of 14 mN·m.
+    """
+    motor = replace(design("joint-11p"), effects={})
+    tests = ("holding_current", "resistance_ab", "drive_1_warm")
+    plan = tuple(step for step in CAMPAIGN if step[0] in tests)
+    off = motor.having(current_offset=0.5 * parameters("current_offset", motor)["size"])
+    whole = campaign_of(campaign(off, Bench(), 2, plan))
+    found = pipeline.diagnose(pipeline.Recordings({whole.motor_id: whole}))[whole.motor_id]
+    assert "cogging" not in found.missing
+    assert not any(left.capture == "holding_current.mcap" for left in found.remainder)
+
+
+@pytest.mark.parametrize("name", ["zero", "current_offset."])
+def test_zeros_of_the_shunts_turn_against_the_rotor_that_they_hold(name):
+    """Im(−(α + jβ) e^(−jpθ)) of the true q current, of usual ones and of an effect."""
+    effect = effects()["current_offset"]
+    segment, model = segment_of("standing"), Model(machine(), (effect,))
+    base = {**BASE, **zero(effect, model)}
+    alpha, beta = (f"{name}{axis}_a" for axis in ("_alpha", "_beta"))
+    off = {alpha.replace("._", "."): 0.2, beta.replace("._", "."): -0.1}
+    was, now = (measured(segment, segment.recorded, model, one)[0] for one in (base, base | off))
+    eps = model.machine.pole_pairs * segment.recorded["theta_mech_rad"]
+    assert now - was == pytest.approx(0.2 * np.sin(eps) + 0.1 * np.cos(eps))
