@@ -8,7 +8,7 @@ misses, two at a time are tried.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -68,6 +68,7 @@ def best_pair(
     scores: Sequence[Score],
     added: Sequence[Effect],
     most_deviance: float = math.inf,
+    among: Set[str] | None = None,
 ) -> LinearSystem | None:
     """The fit with two further effects that hold only together.
 
@@ -85,6 +86,8 @@ def best_pair(
         Deviance that the fit must not exceed. A pair is not fitted where
         `policy.selection.choice_falls` times its fall to first order would not do, nor where its
         step ends farther above the fit than it promised to end below.
+    among
+        Effects of which a pair has one; None for any pair.
 
     Returns
     -------
@@ -95,7 +98,8 @@ def best_pair(
     """
     policy = wide.policy.selection
     best_first: dict[frozenset[str], Pair] = {}
-    for pair in sorted(pairs_of(wide, offered, scores), key=lambda pair: pair.penalty - pair.fall):
+    pairs = pairs_of(wide, offered, scores, among)
+    for pair in sorted(pairs, key=lambda pair: pair.penalty - pair.fall):
         if wide.deviance - policy.choice_falls * pair.fall <= most_deviance:
             best_first.setdefault(pair.names, pair)
     if not best_first:
@@ -148,7 +152,10 @@ def _begun(fit: Fit, pair: Pair) -> Fit:
 
 
 def pairs_of(
-    wide: LinearSystem, offered: Sequence[Candidate], scores: Sequence[Score]
+    wide: LinearSystem,
+    offered: Sequence[Candidate],
+    scores: Sequence[Score],
+    among: Set[str] | None = None,
 ) -> Iterator[Pair]:
     """Pairs of which both are needed, to first order.
 
@@ -160,6 +167,8 @@ def pairs_of(
         The candidates, as `wide` has them.
     scores
         Their scores, one an effect.
+    among
+        Effects of which a pair has one; None for any pair.
 
     Yields
     ------
@@ -177,8 +186,10 @@ def pairs_of(
         if c.effect.name in known and c.effect.discriminator is None
     ]
     for (one, at), (other, at_other) in combinations(usable, 2):
-        same = one.candidate.effect is other.candidate.effect
-        if same or (one.fall <= one.penalty and other.fall <= other.penalty):
+        names_of = {one.candidate.effect.name, other.candidate.effect.name}
+        if len(names_of) == 1 or (among is not None and among.isdisjoint(names_of)):
+            continue
+        if one.fall <= one.penalty and other.fall <= other.penalty:
             continue
         live = np.concatenate([model, at, at_other])
         end = equations.only(live).best(*policy.quick)

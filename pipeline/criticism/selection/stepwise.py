@@ -186,23 +186,29 @@ def _instead_of_effect(
 def _with_pair(
     steps: list[LadderStep], library: Mapping[str, Effect], base: int, unsure: Set[str]
 ) -> LinearSystem | None:
-    """The fit with two effects that hold together where none joins the last step alone, and that
-    step is over its floors; the `steps` get one with the first of them.
+    """The fit with two effects that hold together where none joins the last step alone; the `steps`
+    get one with the first of them.
 
     They may be two behind an earlier step, if that explains more than the last one: beside an
-    effect that took a part of another one's, neither shows.
+    effect that took a part of another one's, neither shows. Where the last step is at its floors,
+    one of the two has to be an effect that would have done nearly as much as the one that was
+    taken there, and both have to pay for their parameters.
     """
     last = steps[-1].system
-    if not significant_groups(last).any():
-        return None
-    for place in range(len(steps) - 1, -1, -1):
+    over = bool(significant_groups(last).any())
+    for place in range(len(steps) - 1 if over else len(steps) - 2, -1, -1):
         step = steps[place]
+        among = None if over else _nearly_as_good(steps, place)
+        if among is not None and not among:
+            continue
         model, policy = step.fit.model, step.fit.policy.selection
         scores = [s for s in step.scores if s.candidate.effect.name not in unsure]
         most = last.deviance - policy.tie if place < len(steps) - 1 else math.inf
         offered, added = candidates(library, model), model.effects[base:]
-        both = best_pair(step.system, offered, scores, added, most)
+        both = best_pair(step.system, offered, scores, added, most, among)
         if both is None or place + 2 >= policy.most_steps:
+            continue
+        if not over and _cost(both) > _cost(last) - policy.tie:
             continue
         first, second = (effect.name for effect in both.fit.model.effects[-2:])
         without = {
@@ -219,6 +225,19 @@ def _with_pair(
         ]
         return both
     return None
+
+
+def _nearly_as_good(steps: Sequence[LadderStep], place: int) -> frozenset[str]:
+    """Effects that would have done most of what the one did that was taken at a step, to first
+    order, but were not.
+    """
+    before, after = steps[place].system, steps[place + 1].system
+    least = before.policy.selection.close_share * (before.deviance - after.deviance)
+    return frozenset(
+        score.candidate.effect.name
+        for score in steps[place].scores
+        if score.fall >= least and score.candidate.effect.name not in steps[place + 1].added
+    )
 
 
 def scored(

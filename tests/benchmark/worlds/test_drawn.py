@@ -189,6 +189,8 @@ def test_what_captures_leave_free_is_no_name() -> None:
         ("columns", 303),
         # a speed that gives way: a lag of the torque's sensor stood in place of the inertia
         ("whole", 385),
+        # by chance: the floors of a voltage were larger beside a `torque_offset`
+        ("whole", 487),
     ],
 )
 def test_nothing_is_missing_of_a_sound_motor(group: str, seed: int) -> None:
@@ -196,3 +198,11 @@ def test_nothing_is_missing_of_a_sound_motor(group: str, seed: int) -> None:
     diagnosis = diagnose(Recordings({found.motor_id: found}))[found.motor_id]
     assert (diagnosis.verdict, diagnosis.missing) == ("insufficient", ())
     assert diagnosis.ladder[-1].held_out < 1.1
+
+
+def test_two_effects_are_found_where_one_does_nearly_as_much() -> None:
+    """A skin effect beside hysteresis was a current sampled 11 µs too early, which left nothing."""
+    hidden = {"iron_hysteresis": 1.0, "skin_effect": 0.5}
+    found = with_drawn.campaign(WorldCase("drawn", "whole", 321, hidden))
+    diagnosis = diagnose(Recordings({found.motor_id: found}))[found.motor_id]
+    assert (diagnosis.verdict, set(diagnosis.missing)) == ("missing", set(hidden))
