@@ -363,12 +363,12 @@ def _may_be_observer_noise(end: SearchResult) -> bool:
 
 
 def _may_be_unlogged_current(end: SearchResult) -> bool:
-    """Whether all that is left is of torque maps without their d current: a map steps through both,
-    and whatever is missed there may be of the one that is not known. A curve over the angle alone
-    is of no current.
+    """Whether all that is left is of logs of a q current without the d current: a map steps through
+    both, a drive weakens its field, and whatever is missed there may be of the one that is not
+    known. A curve over the angle alone is of no current.
     """
     last = end.ladder.steps[-1].system
-    maps = {s.capture for s in last.segments if s.test == "torque_map" and "id_a" not in s.recorded}
+    of_q = {s.capture for s in last.segments if "iq_a" in s.recorded and "id_a" not in s.recorded}
     left = {left_over.capture for left_over in end.remainders}
     of_angle = end.sketch is not None and ANGLES.issuperset(end.sketch.variables)
-    return not (end.freed or of_angle) and bool(left) and left <= maps
+    return not (end.freed or of_angle) and bool(left) and left <= of_q

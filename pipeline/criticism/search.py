@@ -13,6 +13,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pipeline.criticism.discovery.changed_constants import Change, changed_constant
 from pipeline.criticism.discovery.changed_within import ChangeWithin, changed_within
 from pipeline.criticism.discovery.unknown_structure import is_part_of_a_curve, unknown_structure
@@ -22,8 +24,9 @@ from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.cross_validation import HeldOut, in_common, leave_out
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import remainder
+from pipeline.criticism.regression.goodness import remainder, significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.normal_equations import deviances_of
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.drift import drifting_segments
 from pipeline.criticism.selection.free_shares import friction_notes, share_notes
@@ -312,18 +315,55 @@ def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
 
 
 def _that_explain(steps: Sequence[LadderStep]) -> Sequence[LadderStep]:
-    """The steps without trailing ones whose fit, by its own floors, has no less deviance than the
-    one before by its own, but for a `tie`.
+    """The steps without trailing ones whose fit has too little less deviance than the one before,
+    whichever floors it is held against: a `tie` is asked for, and where nothing was over its floor
+    `below_floor_penalties` of the effect's own.
 
-    A floor goes with the constants that noise is multiplied by. Where captures leave them free, an
-    effect that takes their place makes them smaller, and the floor with them: by that floor the fit
-    before misses, and by its own it does not.
+    A floor goes with the constants that noise is multiplied by. Where captures leave an inertia
+    free, an effect that takes its place makes the noise of its acceleration smaller: by that floor
+    the fit before misses, and by its own it does not. Or floors of a voltage are larger in the one
+    fit by chance, and its residual counts less.
     """
-    tie = steps[-1].fit.policy.selection.tie
-    count = len(steps)
-    while count > 1 and (steps[count - 2].system.deviance - steps[count - 1].system.deviance < tie):
+    policy, count = steps[-1].fit.policy.selection, len(steps)
+    while count > 1:
+        before, after = steps[count - 2 : count]
+        least = [policy.tie]
+        if not significant_groups(before.system).any():
+            own = [s for s in before.scores if s.candidate.effect.name == after.added[-1]]
+            least += [policy.below_floor_penalties * score.penalty for score in own]
+        if sure_fall(before.system, after.system) >= max(least):
+            break
         count -= 1
     return steps[:count]
+
+
+def sure_fall(before: LinearSystem, after: LinearSystem) -> float:
+    """Fall of the deviance from one fit to another: of each group the lesser by the floors of each
+    fit and by the larger of both.
+
+    Parameters
+    ----------
+    before, after
+        Fits of the same rows.
+
+    Returns
+    -------
+    float
+        That of the priors included.
+
+    """
+    fall = float(before.prior_costs().sum()) - float(after.prior_costs().sum())
+    if before.labels != after.labels or before.size != after.size:
+        return before.deviance - after.deviance
+    larger = np.minimum(before.row_weight, after.row_weight)
+    own, common = (
+        np.subtract(*(deviances_of(one.counts, one.reduced_chi2(r)) for one, r in ends))
+        for ends in (
+            [(one, one.residual) for one in (before, after)],
+            [(one, one.residual * larger / one.row_weight) for one in (before, after)],
+        )
+    )
+    return fall + float(np.minimum(own, common).sum())
 
 
 def _from_other_place(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder:

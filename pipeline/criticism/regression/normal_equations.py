@@ -299,6 +299,32 @@ def _place(rows: Indices, columns: Indices, size: int) -> Indices:
     return rows * (2 * size - rows - 1) // 2 + columns
 
 
+def deviances_of(counts: Array, reduced_chi2: Array) -> Array:
+    """−2 log likelihood [G] of each group of rows whose scatter is at least their noise floor.
+
+    Parameters
+    ----------
+    counts
+        Rows n of each group [G].
+    reduced_chi2
+        q = χ²/n of each group [G].
+
+    Returns
+    -------
+    array [G]
+        Less constants.
+
+    Notes
+    -----
+    n [log max(1, q) + min(1, q) − 1]: χ² where q < 1, and that of a normal distribution of
+    unknown variance where q > 1, so that a group which misses its floor counts 1/q.
+
+    """
+    nats = np.log(np.maximum(reduced_chi2, 1.0)) + np.minimum(reduced_chi2, 1.0) - 1.0
+    each: Array = counts * nats
+    return each
+
+
 def deviance_of(counts: Array, reduced_chi2: Array) -> float:
     """−2 log likelihood of groups of rows whose scatter is at least their noise floor.
 
@@ -312,12 +338,7 @@ def deviance_of(counts: Array, reduced_chi2: Array) -> float:
     Returns
     -------
     float
-        Less constants.
-
-    Notes
-    -----
-    Σ n [log max(1, q) + min(1, q) − 1]: χ² where q < 1, and that of a normal distribution of
-    unknown variance where q > 1, so that a group which misses its floor counts 1/q.
+        Less constants, the sum of `deviances_of`.
 
     Examples
     --------
@@ -325,8 +346,7 @@ def deviance_of(counts: Array, reduced_chi2: Array) -> float:
     10.0
 
     """
-    nats = np.log(np.maximum(reduced_chi2, 1.0)) + np.minimum(reduced_chi2, 1.0) - 1.0
-    return float((counts * nats).sum())
+    return float(deviances_of(counts, reduced_chi2).sum())
 
 
 def pseudo_inverse(normal: Array) -> Array:

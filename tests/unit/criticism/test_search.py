@@ -262,19 +262,60 @@ def test_a_share_that_may_be_none_is_no_change(u: float, told: bool, monkeypatch
 
 
 @pytest.mark.parametrize(
-    ("deviances", "kept"),
+    ("deviances", "over", "kept"),
     [
-        ((135.4, 128.7), 1),
-        ((135.4, 100.0), 2),
-        ((300.0, 299.0, 200.0), 3),
-        ((300.0, 200.0, 195.0, 190.0), 2),
-        ((50.0,), 1),
+        ((135.4, 128.7), True, 1),
+        ((135.4, 120.0), True, 2),
+        ((135.4, 122.0), False, 1),
+        ((135.4, 100.0), False, 2),
+        ((300.0, 299.0, 200.0), False, 3),
+        ((300.0, 200.0, 195.0, 190.0), True, 2),
+        ((50.0,), True, 1),
     ],
 )
-def test_trailing_steps_without_less_deviance_by_their_own_floors_are_left_out(
-    deviances: tuple[float, ...], kept: int
+def test_trailing_steps_without_less_deviance_are_left_out(
+    monkeypatch: pytest.MonkeyPatch, deviances: tuple[float, ...], over: bool, kept: int
 ) -> None:
-    """A `torque_offset` took the place of friction, and J and its noise went down with it: 6.8."""
+    """A tie is 12. Below the floors an effect pays half as much again as its penalty, 9."""
     fit = Fit((), Model(machine(), ()), {}, (), {})
-    steps = [SimpleNamespace(fit=fit, system=SimpleNamespace(deviance=one)) for one in deviances]
+    effects = [SimpleNamespace(effect=SimpleNamespace(name=str(k))) for k in range(9)]
+    scores = [SimpleNamespace(candidate=one, penalty=9.0) for one in effects]
+    steps = [
+        SimpleNamespace(fit=fit, system=one, scores=scores, added=tuple("12345"[:k]))
+        for k, one in enumerate(deviances)
+    ]
+    monkeypatch.setattr(search, "sure_fall", lambda before, after: before - after)
+    monkeypatch.setattr(search, "significant_groups", lambda _: np.array([over]))
     assert len(search._that_explain(steps)) == kept
+
+
+def missed(rms: tuple[float, ...], floors: tuple[float, ...]) -> SimpleNamespace:
+    """A fit with a residual and a floor a group, of a hundred rows each."""
+    floor = np.repeat(floors, 100)
+    return SimpleNamespace(
+        labels=tuple(range(len(rms))),
+        size=floor.size,
+        row_weight=1.0 / floor,
+        prior_costs=lambda: np.zeros(2),
+        residual=np.repeat(rms, 100) / floor,
+        reduced_chi2=lambda r: np.mean(np.reshape(r, (-1, 100)) ** 2, axis=1),
+        counts=np.full(len(rms), 100.0),
+        deviance=float("nan"),
+    )
+
+
+def test_a_fall_that_the_floors_make_is_none() -> None:
+    """A `torque_offset` took the place of friction, and J and its noise went down with it; and the
+    floor of a voltage that it does not act in was larger in the one fit.
+    """
+    before = missed((0.95, 0.9, 0.9), (1.0, 1.0, 1.0))
+    smaller = missed((0.3, 0.9, 0.9), (0.32, 1.0, 1.0))
+    larger = missed((0.95, 0.9, 0.9), (1.0, 1.4, 1.4))
+    assert abs(search.sure_fall(before, smaller)) < 5.0
+    assert abs(search.sure_fall(before, larger)) < 1e-9
+    better = missed((0.3, 0.9, 0.9), (1.0, 1.0, 1.0))
+    assert search.sure_fall(before, better) == pytest.approx(100.0 * (0.95**2 - 0.3**2))
+    worse = missed((3.0, 0.9, 0.9), (1.0, 1.0, 1.0))
+    assert search.sure_fall(worse, before) == pytest.approx(
+        100.0 * (2.0 * np.log(3.0) + 1 - 0.95**2)
+    )

@@ -1,4 +1,4 @@
-"""A torque map without its d current says neither that a motor is sound nor what it lacks."""
+"""A log without its d current says neither that a motor is sound nor what it lacks."""
 
 from __future__ import annotations
 
@@ -16,13 +16,16 @@ MAP = "torque_map_backward"
 SOUND = replace(design("joint-11p"), effects={})
 
 
-def found(*gone: str, motor: Motor = SOUND) -> pipeline.Diagnosis:
-    """Of a motor by one torque map, some columns of it not recorded."""
-    plan = tuple(step for step in CAMPAIGN if step[0] == MAP)
+def found(*gone: str, motor: Motor = SOUND, log: str = MAP) -> pipeline.Diagnosis:
+    """Of a motor by one log beside a spin, some of its columns not recorded."""
+    names = (log, "open_circuit_forward") if log != MAP else (log,)
+    plan = tuple(step for step in CAMPAIGN if step[0] in names)
     made = campaign_of(campaign(motor, Bench(instruments=EXACT), 2, plan))
-    (log,) = made.captures
-    short = replace(log, tables=(log.tables[0].drop(gone),))
-    whole = replace(made, captures=(short,))
+    short = tuple(
+        replace(c, tables=(c.tables[0].drop(gone),)) if c.path == f"{log}.mcap" else c
+        for c in made.captures
+    )
+    whole = replace(made, captures=short)
     return pipeline.diagnose(pipeline.Recordings({"m": whole}))["m"]
 
 
@@ -30,6 +33,15 @@ def found(*gone: str, motor: Motor = SOUND) -> pipeline.Diagnosis:
 def test_what_a_map_misses_without_its_d_current_is_insufficient(gone: tuple[str, ...]) -> None:
     """Reluctance torque of the current that was not recorded was `unknown`, at 8 and 83 floors."""
     diagnosis = found(*gone)
+    assert (diagnosis.verdict, diagnosis.missing) == ("insufficient", ())
+    assert any(left.matters for left in diagnosis.remainder)
+    assert any("id_a that was not recorded" in note for note in diagnosis.notes)
+
+
+def test_what_a_drive_misses_without_its_d_current_is_insufficient() -> None:
+    """It weakens its field: what the reluctance makes of that was `unknown`, at 44 floors."""
+    sound = replace(design("servo-ipm"), effects={})
+    diagnosis = found("id_a", motor=sound, log="drive_0")
     assert (diagnosis.verdict, diagnosis.missing) == ("insufficient", ())
     assert any(left.matters for left in diagnosis.remainder)
     assert any("id_a that was not recorded" in note for note in diagnosis.notes)
