@@ -16,7 +16,7 @@ CheckStatus = Literal["pass", "marginal", "fail", "not_evaluated"]
 DatasheetStatus = Literal["released", "provisional", "refused"]
 
 AWAITS_APPROVAL = (
-    "not approved: approve it in the registry; release=auto releases what has no other reason here"
+    "not approved in the registry; release=auto releases what has no other reason here"
 )
 """The reason in `why` of every datasheet that is not released by itself."""
 
