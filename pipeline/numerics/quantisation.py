@@ -254,8 +254,33 @@ def covariance_alike(errors: Array, cells: Sequence[Hashable]) -> Array:
         [unit²].
 
     """
-    alike = np.array([[one == other for other in cells] for one in cells])
-    covariance: Array = alike * np.outer(errors, errors)
+    return spread_alike(np.eye(errors.size), errors, cells)
+
+
+def spread_alike(levers: Array, errors: Array, cells: Sequence[Hashable]) -> Array:
+    """Covariance of sums of errors of which those of one cell are one error.
+
+    Parameters
+    ----------
+    levers
+        What each error counts in each sum [k, n].
+    errors
+        Standard uncertainties [n, any unit], with the sign of what they act on.
+    cells
+        Of each.
+
+    Returns
+    -------
+    array [k, k]
+        [unit²], without a matrix of all errors.
+
+    """
+    numbers = {cell: number for number, cell in enumerate(dict.fromkeys(cells))}
+    sums = np.zeros((max(len(numbers), 1), levers.shape[0]))
+    np.add.at(
+        sums, np.array([numbers[cell] for cell in cells], dtype=np.int64), (levers * errors).T
+    )
+    covariance: Array = sums.T @ sums
     return covariance
 
 

@@ -29,7 +29,7 @@ from pipeline.estimation.uncertainty.instruments import (
     unstated_note,
 )
 from pipeline.numerics.least_squares import LinearFit, linear_fit
-from pipeline.numerics.quantisation import covariance_alike, resolution, steps_of
+from pipeline.numerics.quantisation import resolution, spread_alike, steps_of
 from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.capture import Array, Campaign, Capture, Flags, Indices
 from pipeline.records.constants import Constants
@@ -177,13 +177,13 @@ class _Rows:
         """Least squares over these rows; what their readings are rounded to adds to its scatter."""
         design = self.design(alpha_1_k)
         found = linear_fit(design, self.signal)
+        if not (self.rounded.any() or self.rounded_a.any()):
+            return found
         across = self.id_a if self.axis == "d" else self.iq_a
-        slope = self.factor * found.coefficients[1]
-        left = _rounded(self.signal, self.rounded) + np.outer(slope, slope) * _rounded(
-            across, self.rounded_a
-        )
-        inverse = np.linalg.pinv(design)
-        return replace(found, covariance=found.covariance + inverse @ left @ inverse.T)
+        levers, slope = np.linalg.pinv(design), self.factor * found.coefficients[1]
+        left = _rounded(levers, self.signal, self.rounded)
+        left += _rounded(levers * slope, across, self.rounded_a)
+        return replace(found, covariance=found.covariance + left)
 
     def shifted(self, shift: Shift) -> _Rows:
         """The rows as they were if instruments are off."""
@@ -260,12 +260,11 @@ def _steps_a(current_a: Array) -> Array:
     return steps_of(current_a)
 
 
-def _rounded(values: Array, steps: Array) -> Array:
-    """Covariance [n, n] of what rounding leaves in readings: one error in all of one step."""
+def _rounded(levers: Array, values: Array, steps: Array) -> Array:
+    """Covariance [k, k] by what rounding leaves in readings [n]: one error in all of one step."""
     cells = np.round(np.abs(values) / np.where(steps > 0.0, steps, 1.0))
-    return covariance_alike(
-        np.sign(values) * steps / math.sqrt(12.0), [*zip(cells, steps, strict=True)]
-    )
+    alike = [*zip(cells.tolist(), steps.tolist(), strict=True)]
+    return spread_alike(levers, np.sign(values) * steps / math.sqrt(12.0), alike)
 
 
 def _columns(capture: Capture, *names: str) -> dict[str, Array]:

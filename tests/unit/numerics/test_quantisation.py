@@ -14,6 +14,7 @@ from pipeline.numerics.quantisation import (
     resolution,
     rounded_column,
     rounding_rms,
+    spread_alike,
     steps_of,
 )
 
@@ -145,6 +146,9 @@ def test_a_level_near_a_threshold_has_the_noise_of_the_others() -> None:
 def test_errors_of_one_cell_are_one() -> None:
     covariance = covariance_alike(np.array([2.0, -2.0, 3.0]), ["a", "a", "b"])
     assert covariance.tolist() == [[4.0, -4.0, 0.0], [-4.0, 4.0, 0.0], [0.0, 0.0, 9.0]]
+    levers = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 0.5]])
+    spread = spread_alike(levers, np.array([2.0, -2.0, 3.0]), ["a", "a", "b"])
+    assert spread == pytest.approx(levers @ covariance @ levers.T)
 
 
 def test_what_moves_between_levels_is_no_noise() -> None:
