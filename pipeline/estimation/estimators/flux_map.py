@@ -180,7 +180,8 @@ class _Rows:
         if not (self.rounded.any() or self.rounded_a.any()):
             return found
         across = self.id_a if self.axis == "d" else self.iq_a
-        levers, slope = np.linalg.pinv(design), self.factor * found.coefficients[1]
+        levers = np.linalg.pinv(design).astype(np.float64)
+        slope = self.factor * found.coefficients[1]
         left = _rounded(levers, self.signal, self.rounded)
         left += _rounded(levers * slope, across, self.rounded_a)
         return replace(found, covariance=found.covariance + left)
