@@ -20,6 +20,7 @@ from pipeline.criticism.discovery.changed_within import ChangeWithin, changed_wi
 from pipeline.criticism.discovery.unknown_structure import is_part_of_a_curve, unknown_structure
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.operating import Array
 from pipeline.criticism.parameter import Machine
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.cross_validation import HeldOut, in_common, leave_out
@@ -352,18 +353,19 @@ def sure_fall(before: LinearSystem, after: LinearSystem) -> float:
         That of the priors included.
 
     """
-    fall = float(before.prior_costs().sum()) - float(after.prior_costs().sum())
     if before.labels != after.labels or before.size != after.size:
         return before.deviance - after.deviance
     larger = np.minimum(before.row_weight, after.row_weight)
-    own, common = (
-        np.subtract(*(deviances_of(one.counts, one.reduced_chi2(r)) for one, r in ends))
-        for ends in (
-            [(one, one.residual) for one in (before, after)],
-            [(one, one.residual * larger / one.row_weight) for one in (before, after)],
-        )
-    )
-    return fall + float(np.minimum(own, common).sum())
+    own = _deviances(before, before.row_weight) - _deviances(after, after.row_weight)
+    common = _deviances(before, larger) - _deviances(after, larger)
+    priors = before.prior_costs().sum() - after.prior_costs().sum()
+    return float(np.minimum(own, common).sum() + priors)
+
+
+def _deviances(system: LinearSystem, weight: Array) -> Array:
+    """−2 log likelihood [G] of the groups of a fit whose rows [R] are weighted by other floors."""
+    residual = system.residual * (weight / system.row_weight)
+    return deviances_of(system.counts, system.reduced_chi2(residual))
 
 
 def _from_other_place(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder:

@@ -17,6 +17,10 @@ from pipeline.physics.units import TURN_RAD
 
 WHOLE_TURN = 0.98
 """Least part of a turn that counts as one at the end of a pass [1]."""
+PLACES = 2**15
+"""Places a turn at which angles are told apart: thirty-two an order of the highest that is asked
+for.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,10 +160,6 @@ def even_positions(turns: Sequence[Turn]) -> int | None:
         counts.add(int(even[0]) + 1)
     return counts.pop() if len(counts) == 1 else None
 
-
-PLACES = 2**15
-"""Places a turn at which angles are told apart: sixteen an order of the highest that is asked
-for."""
 
 ComplexArray = NDArray[np.complex128]
 

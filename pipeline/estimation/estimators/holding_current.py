@@ -292,9 +292,9 @@ def _cogging(waves: _Waves, known: Constants, campaign: Campaign) -> tuple[Estim
         why = f"{lines[0].amplitude:.4g} A of order {lines[0].order}; a torque constant is missing"
         return (order, amps_of, *(METHOD.missing(n, why) for n in TORQUES))
     peak, u_peak = half_peak_to_peak(lines)
-    sizes = {TORQUES[0]: (lines[0].amplitude, lines[0].u), TORQUES[1]: (peak, u_peak)}
-    if alias:
-        del sizes[TORQUES[1]]
+    sizes = {TORQUES[0]: (lines[0].amplitude, lines[0].u)}
+    if not alias:
+        sizes[TORQUES[1]] = peak, u_peak
     torques, notes = [], (note, unstated_note(captures, ("current",)))
     for name, (amps, u) in sizes.items():
         read = (METHOD.scatter(name, u, lines[0].dof), *_gains(captures, amps))

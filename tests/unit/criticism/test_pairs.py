@@ -147,3 +147,51 @@ def test_of_a_pair_one_goes_whose_place_another_choice_takes(
     found = stepwise._with_pair(ladder, {}, 0, frozenset())
     assert found is (both if second_is_needed else rechosen["torque_offset"])
     assert len(ladder) == steps
+
+
+@pytest.mark.parametrize(
+    ("beside", "deviance", "found"),
+    [
+        # beside one that leaves nothing: seven for the parameter more, and a tie of twelve
+        ({"skin_effect": 105.0}, -325.0, True),
+        ({"skin_effect": 105.0}, -310.0, False),
+        # no other effect would have done as much
+        ({"skin_effect": 40.0}, -325.0, False),
+    ],
+)
+def test_two_are_tried_at_the_floors_where_one_does_nearly_as_much(
+    monkeypatch: pytest.MonkeyPatch, beside: dict[str, float], deviance: float, found: bool
+) -> None:
+    def fitted(deviance: float, *names: str) -> SimpleNamespace:
+        effects = tuple(SimpleNamespace(name=name) for name in names)
+        model = SimpleNamespace(effects=effects)
+        fit = SimpleNamespace(model=model, policy=DEFAULT, without=lambda name: name)
+        return SimpleNamespace(deviance=deviance, fit=fit, policy=DEFAULT)
+
+    both = fitted(deviance, "skin_effect", "iron_hysteresis")
+    scores = tuple(
+        SimpleNamespace(candidate=SimpleNamespace(effect=SimpleNamespace(name=name)), fall=fall)
+        for name, fall in {"current_delay": 115.0, **beside}.items()
+    )
+    asked: list[frozenset[str]] = []
+    given = {
+        "significant_groups": lambda _: np.array([False]),
+        "candidates": lambda *_: (),
+        "best_pair": lambda *given: asked.append(given[-1]) or both,
+        "_cost": lambda system: system.deviance + 7.0 * len(system.fit.model.effects),
+        "gauss_newton": lambda name, **_: name,
+        "reconsidered": lambda *_, **__: fitted(-280.0, "skin_effect"),
+        "scored": lambda *_: (fitted(-280.0, "skin_effect"), ()),
+        "_refloored": lambda *_: None,
+    }
+    for name, answer in given.items():
+        monkeypatch.setattr(stepwise, name, answer)
+    ladder = [
+        stepwise.LadderStep((), fitted(-176.0), scores),  # type: ignore[arg-type]
+        stepwise.LadderStep(("current_delay",), fitted(-292.0, "current_delay"), ()),  # type: ignore[arg-type]
+    ]
+    assert (stepwise._with_pair(ladder, {}, 0, frozenset()) is both) is found
+    assert all(names == {"skin_effect"} for names in asked)
+    assert [step.added for step in ladder[1:]] == [
+        ("skin_effect",) if found else ("current_delay",)
+    ]
